@@ -1,0 +1,1 @@
+"""Checks: rules over a linked model."""

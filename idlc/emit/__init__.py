@@ -1,0 +1,1 @@
+"""Emit: Python output, from layout plan to rendered files."""

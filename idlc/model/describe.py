@@ -1,0 +1,189 @@
+"""Type descriptions and RIHS01 hashes (spec section 6), from one place."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TypedDict
+
+from idlc.model import derive, ir
+
+STRING_TYPE_IDS = {
+    (False, False): 17,
+    (True, False): 18,
+    (False, True): 21,
+    (True, True): 22,
+}
+ARRAY_OFFSET = 48
+BOUNDED_SEQUENCE_OFFSET = 96
+SEQUENCE_OFFSET = 144
+
+
+class TypeDict(TypedDict):
+    """A field's type; key order is part of the hash."""
+
+    type_id: int
+    capacity: int
+    string_capacity: int
+    nested_type_name: str
+
+
+class FieldDict(TypedDict):
+    """A field; key order is part of the hash."""
+
+    name: str
+    type: TypeDict
+    default_value: str
+
+
+class IndividualDict(TypedDict):
+    """One structure."""
+
+    type_name: str
+    fields: list[FieldDict]
+
+
+class DescriptionDict(TypedDict):
+    """One structure and all that it refers to, sorted by name."""
+
+    type_description: IndividualDict
+    referenced_type_descriptions: list[IndividualDict]
+
+
+class HashDict(TypedDict):
+    """One entry of a Name.json file's hashes."""
+
+    type_name: str
+    hash_string: str
+
+
+class InstalledDict(TypedDict):
+    """The content of the Name.json file that ROS 2 installs."""
+
+    type_description_msg: DescriptionDict
+    type_hashes: list[HashDict]
+
+
+def _element_type(element: ir.Element) -> tuple[int, int, str]:
+    match element:
+        case ir.Primitive():
+            return element.info.type_id, 0, ""
+        case ir.String():
+            type_id = STRING_TYPE_IDS[element.wide, element.bound is not None]
+            return type_id, element.bound or 0, ""
+        case ir.Ref():
+            return 1, 0, str(element.target)
+        case ir.Unknown():
+            raise ValueError("an unknown type has no description")
+
+
+def _type(type_: ir.FieldType) -> TypeDict:
+    capacity = offset = 0
+    if isinstance(type_, ir.Array):
+        capacity, offset = type_.size, ARRAY_OFFSET
+    elif isinstance(type_, ir.Sequence):
+        capacity = type_.bound or 0
+        offset = SEQUENCE_OFFSET if type_.bound is None else BOUNDED_SEQUENCE_OFFSET
+    type_id, string_capacity, nested = _element_type(ir.element_of(type_))
+    return {
+        "type_id": type_id + offset,
+        "capacity": capacity,
+        "string_capacity": string_capacity,
+        "nested_type_name": nested,
+    }
+
+
+def individual(message: ir.Message) -> IndividualDict:
+    """Return a structure's own description, the dummy member included."""
+    return {
+        "type_name": str(message.name),
+        "fields": [
+            {
+                "name": field.name,
+                "type": _type(field.type),
+                "default_value": field.default.text if field.default else "",
+            }
+            for field in message.wire_fields
+        ],
+    }
+
+
+class Describer:
+    """Descriptions and hashes over a closed set of interfaces, each made once.
+
+    `interfaces` must hold every interface that is referred to, and no `Unknown` type;
+    a missing name raises KeyError.
+    """
+
+    def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
+        self._interfaces = interfaces
+        self._closures: dict[str, frozenset[str]] = {}
+        self._hashes: dict[str, str] = {}
+        self._texts: dict[str, str] = {}
+
+    @cached_property
+    def _individuals(self) -> dict[str, IndividualDict]:
+        found = {}
+        for interface in self._interfaces.values():
+            for message in (
+                *derive.messages(interface),
+                *derive.pseudo_structures(interface),
+            ):
+                found[str(message.name)] = individual(message)
+        return found
+
+    def _closure(self, name: str) -> frozenset[str]:
+        """Return all names that `name` refers to, itself excluded."""
+        known = self._closures.get(name)
+        if known is None:
+            direct = {
+                nested
+                for field in self._individuals[name]["fields"]
+                if (nested := field["type"]["nested_type_name"])
+            }
+            known = frozenset(direct.union(*(self._closure(nested) for nested in direct)))
+            self._closures[name] = known
+        return known
+
+    def description(self, name: str) -> DescriptionDict:
+        """Return the full description of a structure, service or action by its full name."""
+        return {
+            "type_description": self._individuals[name],
+            "referenced_type_descriptions": [
+                self._individuals[nested] for nested in sorted(self._closure(name))
+            ],
+        }
+
+    def hash(self, name: str) -> str:
+        """Return RIHS01_ and 64 hexadecimal digits for a full name."""
+        known = self._hashes.get(name)
+        if known is None:
+            references = ", ".join(self._hashed_text(n) for n in sorted(self._closure(name)))
+            text = (
+                f'{{"type_description": {self._hashed_text(name)}, '
+                f'"referenced_type_descriptions": [{references}]}}'
+            )
+            known = "RIHS01_" + hashlib.sha256(text.encode("ascii")).hexdigest()
+            self._hashes[name] = known
+        return known
+
+    def _hashed_text(self, name: str) -> str:
+        """Return the JSON of an individual description without default values."""
+        known = self._texts.get(name)
+        if known is None:
+            own = self._individuals[name]
+            fields = [{"name": field["name"], "type": field["type"]} for field in own["fields"]]
+            known = json.dumps({"type_name": own["type_name"], "fields": fields})
+            self._texts[name] = known
+        return known
+
+    def installed(self, name: str) -> InstalledDict:
+        """Return the content of the Name.json file for a full name."""
+        description = self.description(name)
+        names = [name, *(r["type_name"] for r in description["referenced_type_descriptions"])]
+        return {
+            "type_description_msg": description,
+            "type_hashes": [{"type_name": n, "hash_string": self.hash(n)} for n in names],
+        }

@@ -1,0 +1,1 @@
+"""Syntax: one file's lossless lines, and the literals in them."""

@@ -1,0 +1,1 @@
+"""Text: what a file is and how a problem in it is shown."""

@@ -1,0 +1,64 @@
+"""Source text and places in it.
+
+In: decoded text and the name a person knows it by. Out: spans that can be pointed at.
+Never reads a file and never changes the text: line ends, tabs and a byte order mark stay.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from functools import cached_property
+from typing import NamedTuple
+
+
+class Source:
+    """One file's exact text. Compared by identity; `path` is what messages show."""
+
+    def __init__(self, path: str, text: str) -> None:
+        self.path = path
+        self.text = text
+
+    def __repr__(self) -> str:
+        return f"Source({self.path!r})"
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The lines with their ends, split as `str.splitlines` does (spec 1.1)."""
+        return tuple(self.text.splitlines(keepends=True))
+
+    @cached_property
+    def line_starts(self) -> tuple[int, ...]:
+        """Character offset of each line's first character; one entry at least."""
+        starts = [0]
+        for line in self.lines:
+            starts.append(starts[-1] + len(line))
+        return tuple(starts[:-1]) or (0,)
+
+    def position(self, offset: int) -> tuple[int, int]:
+        """Return the 1-based (line, column) of a character offset; columns count characters."""
+        line = bisect_right(self.line_starts, offset)
+        return line, offset - self.line_starts[line - 1] + 1
+
+    def line_text(self, line: int) -> str:
+        """Return line `line` (1-based) without its end; empty past the last line."""
+        if line > len(self.lines):
+            return ""
+        text = self.lines[line - 1]
+        return text.splitlines()[0] if text else ""
+
+
+class Span(NamedTuple):
+    """A half-open range of character offsets in a source."""
+
+    source: Source
+    start: int
+    end: int
+
+    @property
+    def text(self) -> str:
+        """The characters covered."""
+        return self.source.text[self.start : self.end]
+
+    def at(self, start: int, end: int) -> Span:
+        """Return the part from `start` to `end`, counted from this span's start."""
+        return Span(self.source, self.start + start, self.start + end)
