@@ -2,11 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
+from typing import Protocol
 
 from idlc.model import derive, ir
 from idlc.model.describe import Describer
+from idlc.text.source import Source
+
+
+class Library(Protocol):
+    """Where other packages' interfaces come from, in order of precedence."""
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if there is none of that name."""
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of a package's messages; empty for an unknown package."""
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of all packages, for suggestions."""
 
 
 class Model:
