@@ -1,1 +1,28 @@
-"""Checks: rules over a linked model."""
+"""Checks: rules over a linked model, each a function of the model and a report."""
+
+from __future__ import annotations
+
+from idlc.checks import names, reserved
+from idlc.model.link import Model
+from idlc.text.diagnostics import Report
+
+#: In the order in which their messages help most.
+RULES = (
+    names.package_name,
+    names.interface_names,
+    names.unique_fields,
+    names.unique_constants,
+    names.unique_modules,
+    reserved.field_names,
+    reserved.constant_names,
+    reserved.interface_names,
+    reserved.package_name,
+    reserved.derived_suffixes,
+    reserved.values,
+)
+
+
+def check(model: Model, report: Report) -> None:
+    """Report what every rule finds in the model's own interfaces."""
+    for rule in RULES:
+        rule(model, report)

@@ -119,7 +119,7 @@ class Describer:
 
     def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
         self._interfaces = interfaces
-        self._closures: dict[str, frozenset[str]] = {}
+        self._closures: dict[str, list[str]] = {}
         self._hashes: dict[str, str] = {}
         self._texts: dict[str, str] = {}
 
@@ -134,17 +134,26 @@ class Describer:
                 found[str(message.name)] = individual(message)
         return found
 
-    def _closure(self, name: str) -> frozenset[str]:
-        """Return all names that `name` refers to, itself excluded."""
+    @cached_property
+    def _direct(self) -> dict[str, frozenset[str]]:
+        return {
+            name: frozenset(
+                nested for f in own["fields"] if (nested := f["type"]["nested_type_name"])
+            )
+            for name, own in self._individuals.items()
+        }
+
+    def _closure(self, name: str) -> list[str]:
+        """Return all names that `name` refers to, itself excluded, in code-point order."""
         known = self._closures.get(name)
         if known is None:
-            direct = {
-                nested
-                for field in self._individuals[name]["fields"]
-                if (nested := field["type"]["nested_type_name"])
-            }
-            known = frozenset(direct.union(*(self._closure(nested) for nested in direct)))
-            self._closures[name] = known
+            reached: set[str] = set()
+            queue = [name]
+            while queue:
+                found = self._direct[queue.pop()] - reached
+                reached |= found
+                queue.extend(found)
+            known = self._closures[name] = sorted(reached)
         return known
 
     def description(self, name: str) -> DescriptionDict:
@@ -152,7 +161,7 @@ class Describer:
         return {
             "type_description": self._individuals[name],
             "referenced_type_descriptions": [
-                self._individuals[nested] for nested in sorted(self._closure(name))
+                self._individuals[nested] for nested in self._closure(name)
             ],
         }
 
@@ -160,7 +169,7 @@ class Describer:
         """Return RIHS01_ and 64 hexadecimal digits for a full name."""
         known = self._hashes.get(name)
         if known is None:
-            references = ", ".join(self._hashed_text(n) for n in sorted(self._closure(name)))
+            references = ", ".join(self._hashed_text(n) for n in self._closure(name))
             text = (
                 f'{{"type_description": {self._hashed_text(name)}, '
                 f'"referenced_type_descriptions": [{references}]}}'

@@ -7,13 +7,14 @@ References are names, never pointers; "no bound" is `None`, never 0; a type that
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, cast
 
 import msgspec
 
 from idlc.text.source import Source, Span
 
 Kind: TypeAlias = Literal["msg", "srv", "action"]
+KINDS: tuple[Kind, ...] = ("msg", "srv", "action")
 Scalar: TypeAlias = bool | int | float | str
 Value: TypeAlias = Scalar | tuple[Scalar, ...]
 
@@ -35,9 +36,9 @@ class TypeName(NamedTuple):
     def parse(cls, text: str) -> TypeName:
         """Return the name that `text` spells as package/kind/Name; raise ValueError otherwise."""
         package, kind, name = text.split("/")
-        if kind == "msg" or kind == "srv" or kind == "action":
-            return cls(package, kind, name)
-        raise ValueError(f"not an interface kind: {kind!r}")
+        if kind not in KINDS:
+            raise ValueError(f"not an interface kind: {kind!r}")
+        return cls(package, cast("Kind", kind), name)
 
 
 class PrimitiveInfo(NamedTuple):

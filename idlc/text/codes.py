@@ -42,6 +42,51 @@ class Code(NamedTuple):
         )
 
 
+# syntax
+MISSING_NAME = Code("IDL101", "missing-name", ERROR)
+INDENTED_DEFINITION = Code("IDL102", "indented-definition", ERROR)
+MALFORMED_TYPE = Code("IDL103", "malformed-type", ERROR)
+SEPARATOR_COUNT = Code("IDL104", "separator-count", ERROR)
+MALFORMED_SEPARATOR = Code("IDL105", "malformed-separator", ERROR)
+BYTE_ORDER_MARK = Code("IDL106", "byte-order-mark", ERROR)
+BAD_ESCAPE = Code("IDL107", "bad-escape", ERROR)
+UNIT_ACROSS_LINES = Code("IDL108", "unit-across-lines", ERROR)
+HASH_IN_QUOTES = Code("IDL109", "hash-in-quotes", WARNING)
+UNUSUAL_LINE_END = Code("IDL110", "unusual-line-end", WARNING)
+
+# names and references
+UNKNOWN_TYPE = Code("IDL201", "unknown-type", ERROR)
+UNKNOWN_PACKAGE = Code("IDL202", "unknown-package", ERROR)
+FIELD_NAME = Code("IDL203", "invalid-field-name", ERROR)
+CONSTANT_NAME = Code("IDL204", "invalid-constant-name", ERROR)
+TYPE_NAME = Code("IDL205", "invalid-type-name", ERROR)
+INTERFACE_NAME = Code("IDL206", "invalid-interface-name", ERROR)
+PACKAGE_NAME = Code("IDL207", "invalid-package-name", ERROR)
+DUPLICATE_FIELD = Code("IDL208", "duplicate-field", ERROR)
+DUPLICATE_CONSTANT = Code("IDL209", "duplicate-constant", ERROR)
+RECURSIVE_TYPE = Code("IDL210", "recursive-type", ERROR)
+ROS1_TYPE = Code("IDL211", "ros1-type", ERROR)
+BREAKS_PYTHON = Code("IDL220", "breaks-rosidl-python", WARNING)
+BREAKS_C = Code("IDL221", "breaks-c", WARNING)
+BREAKS_CPP = Code("IDL222", "breaks-cpp", WARNING)
+SAME_MODULE = Code("IDL223", "same-python-module", WARNING)
+
+# types, bounds and values
+BAD_BOUND = Code("IDL301", "bad-bound", ERROR)
+BOUND_ON_NON_STRING = Code("IDL302", "bound-on-non-string", ERROR)
+CONSTANT_TYPE = Code("IDL303", "constant-type", ERROR)
+BAD_VALUE = Code("IDL304", "bad-value", ERROR)
+OUT_OF_RANGE = Code("IDL305", "out-of-range", ERROR)
+STRING_TOO_LONG = Code("IDL306", "string-too-long", ERROR)
+MESSAGE_DEFAULT = Code("IDL307", "default-on-message", ERROR)
+ARRAY_VALUE = Code("IDL308", "array-value", ERROR)
+ARRAY_LENGTH = Code("IDL309", "array-length", ERROR)
+NON_FINITE = Code("IDL310", "non-finite-value", WARNING)
+MANGLED_TEXT = Code("IDL311", "mangled-text", WARNING)
+WSTRING_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
+CONSTANT_MOVED = Code("IDL313", "repeated-section-constant", WARNING)
+FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
+
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
 

@@ -39,6 +39,11 @@ class Source:
         line = bisect_right(self.line_starts, offset)
         return line, offset - self.line_starts[line - 1] + 1
 
+    def line_starts_after(self, offset: int) -> int:
+        """Return where the line behind the one at `offset` starts; the text's end at the last."""
+        line = bisect_right(self.line_starts, offset)
+        return self.line_starts[line] if line < len(self.line_starts) else len(self.text)
+
     def line_text(self, line: int) -> str:
         """Return line `line` (1-based) without its end; empty past the last line."""
         if line > len(self.lines):

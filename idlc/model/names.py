@@ -1,0 +1,50 @@
+"""Which names ROS 2 allows (spec section 2.2)."""
+
+from __future__ import annotations
+
+import re
+
+_LOWER = re.compile(r"[a-z](_?[a-z0-9])*")
+_UPPER = re.compile(r"[A-Z](_?[A-Z0-9])*")
+_MESSAGE = re.compile(r"[A-Z][A-Za-z0-9]*")
+_MESSAGE_SUFFIXES = ("_Request", "_Response", "_Goal", "_Result", "_Feedback")
+
+PACKAGE_HINT = "use lower-case letters, digits and single underscores, a letter first"
+FIELD_HINT = PACKAGE_HINT
+CONSTANT_HINT = "use capitals, digits and single underscores, a letter first"
+MESSAGE_HINT = "use letters and digits, a capital letter first"
+
+
+def is_package_name(name: str) -> bool:
+    """Tell whether a package may be called so."""
+    return _LOWER.fullmatch(name) is not None
+
+
+def is_field_name(name: str) -> bool:
+    """Tell whether a field may be called so."""
+    return _LOWER.fullmatch(name) is not None
+
+
+def is_constant_name(name: str) -> bool:
+    """Tell whether a constant may be called so."""
+    return _UPPER.fullmatch(name) is not None
+
+
+def is_message_name(name: str) -> bool:
+    """Tell whether a message may be called so; each derived suffix counts once, in this order."""
+    name = name.removeprefix("Sample_")
+    for suffix in _MESSAGE_SUFFIXES:
+        name = name.removesuffix(suffix)
+    return _MESSAGE.fullmatch(name) is not None
+
+
+def field_name_like(name: str) -> str:
+    """Return the nearest valid field name, for hints; empty if nothing is left."""
+    spaced = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
+    return re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_").lstrip("0123456789_")
+
+
+def snake_case(name: str) -> str:
+    """Return the module name that rosidl derives from an interface's name (spec section 7.1)."""
+    name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()

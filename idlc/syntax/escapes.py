@@ -1,0 +1,129 @@
+r"""What happens to text on its way through ROS 2's pipeline (spec section 1.5).
+
+rosidl writes each comment line, unit, string constant and string default into an .idl file and
+reads it back. On the way escapes are interpreted twice or three times, and some text breaks the
+build. `through_idl` does the same to text that idlc keeps, so that the verdict and the value
+are those of a robot on the other side.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_WRITTEN = re.compile(
+    r"""\\(?:
+        (?P<simple>[\\'"abfnrtv\n]) | (?P<octal>[0-7]{1,3})
+        | x(?P<x>[0-9a-fA-F]{2}) | u(?P<u>[0-9a-fA-F]{4}) | U(?P<U>[0-9a-fA-F]{8})
+        | N\{(?P<N>[^}]+)\} | (?P<truncated>[xuUN]|$) | (?P<unknown>.)
+    )""",
+    re.VERBOSE | re.DOTALL,
+)
+_READ = re.compile(r"""\\(?:([ntvbrfa\\'"])|(\?)|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))""")
+_CLOSING_QUOTE = re.compile(r'(?<!\\)(?:\\\\)*"')
+_SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v", "\n": ""}
+
+
+class EscapeError(ValueError):
+    """Text that breaks ROS 2's pipeline: why, and the guilty characters in the text."""
+
+    def __init__(self, message: str, start: int, end: int) -> None:
+        super().__init__(message)
+        self.start = start
+        self.end = end
+
+
+def through_idl(text: str) -> str:
+    """Return what rosidl's parser sees of `text` after rosidl's adapter wrote it.
+
+    Raises EscapeError for text that the pipeline refuses. Source: spec 1.5, steps B to F.
+    """
+    if "\\" not in text and "\n" not in text:
+        return text
+    # B: the escapes are interpreted over the UTF-8 bytes
+    written = _WRITTEN.sub(_interpret, text.encode().decode("latin-1"))
+    return read_back(written.replace('"', '\\"'), text)
+
+
+def read_back(literal: str, text: str) -> str:
+    """Return what rosidl's parser makes of the inside of a string literal (steps D to F).
+
+    `text` is what the user wrote, for the error's place.
+    """
+    if "\n" in literal or "\r" in literal:
+        place = _place(text, r"\\[nr]|\\0?1[25]|\\x0[ad]")
+        raise EscapeError("a line break inside a string", *place)
+    try:
+        literal = literal.encode("latin-1").decode("utf-8")
+    except UnicodeError:
+        place = _place(text, r"\\[xuUN0-7]|[^\x00-\x7f]")
+        raise EscapeError("a character that they cannot write", *place) from None
+    if _end_of_literal(literal) != len(literal):
+        raise EscapeError("a backslash that swallows the closing quote", *_place(text, r"\\+"))
+    try:
+        once = _READ.sub(_reread, literal)
+    except ValueError:
+        raise EscapeError(r"an incomplete `\x` escape", *_place(text, r"\\+x")) from None
+    return re.sub(r'\\(["\\])', r"\1", once)
+
+
+def plain_meaning(text: str) -> str:
+    """Return what a reader would take `text` to mean: each escape interpreted once."""
+    return _READ.sub(_reread, text)
+
+
+def _interpret(match: re.Match[str]) -> str:
+    kind, value = match.lastgroup, match.group(match.lastgroup or 0)
+    if kind == "simple":
+        return _SIMPLE.get(value, value)
+    if kind == "octal":
+        return chr(int(value, 8))
+    if kind == "unknown":
+        return match.group()
+    if kind == "N":
+        return _named(match, value)
+    if kind == "truncated" or int(value, 16) > 0x10FFFF:
+        raise _error(match, f"an incomplete escape `{match.group()}`")
+    return chr(int(value, 16))
+
+
+def _named(match: re.Match[str], name: str) -> str:
+    try:
+        character = unicodedata.lookup(name)
+    except KeyError:
+        character = ""
+    if len(character) != 1:
+        raise _error(match, f"an unknown character name `{name}`")
+    return character
+
+
+def _error(match: re.Match[str], message: str) -> EscapeError:
+    """Return an error at a match in UTF-8 bytes, its place counted in characters."""
+
+    def characters(byte_offset: int) -> int:
+        return len(match.string[:byte_offset].encode("latin-1").decode("utf-8", "ignore"))
+
+    return EscapeError(message, characters(match.start()), characters(match.end()))
+
+
+def _reread(match: re.Match[str]) -> str:
+    simple, question, octal, hexadecimal = match.groups()
+    if simple:
+        return _SIMPLE.get(simple, simple)
+    if question:
+        return match.group()
+    if octal:
+        return chr(int(octal, 8))
+    if len(hexadecimal) != 2:
+        raise ValueError("one digit")
+    return chr(int(hexadecimal, 16))
+
+
+def _end_of_literal(literal: str) -> int:
+    found = _CLOSING_QUOTE.search(literal + '"')
+    return found.end() - 1 if found else -1
+
+
+def _place(text: str, pattern: str) -> tuple[int, int]:
+    found = re.search(pattern, text)
+    return found.span() if found else (0, len(text))

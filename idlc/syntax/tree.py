@@ -1,0 +1,101 @@
+"""One file's lossless syntax: every character of the text belongs to one line of the tree.
+
+Offsets inside a definition count from the start of its line, so that the parse of equal lines
+can be shared; `File.span` turns them into places in the file.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypeAlias
+
+from idlc.text.source import Source, Span
+
+
+class Piece(NamedTuple):
+    """Some text and where it stands in its line; TABs are spaces here."""
+
+    text: str
+    start: int
+
+    @property
+    def end(self) -> int:
+        """The offset behind the last character."""
+        return self.start + len(self.text)
+
+
+class Type(NamedTuple):
+    """A type as written. `size` is `None` for `[]`; `brackets` is `None` without an array part."""
+
+    whole: Piece
+    name: Piece
+    bound: Piece | None = None
+    brackets: Piece | None = None
+    at_most: bool = False
+    size: Piece | None = None
+
+
+class Field(NamedTuple):
+    """`TYPE NAME [DEFAULT]`."""
+
+    type: Type
+    name: Piece
+    default: Piece | None
+
+
+class Constant(NamedTuple):
+    """`TYPE NAME=VALUE`; name and value may be empty pieces."""
+
+    type: Type
+    name: Piece
+    value: Piece
+
+
+class Broken(NamedTuple):
+    """Code that is no definition: the guilty piece, a code's slug and words for the reader."""
+
+    slug: str
+    piece: Piece
+    message: str
+    hint: str
+
+
+Body: TypeAlias = Field | Constant | Broken
+
+
+class Line(NamedTuple):
+    """One line. `code` is what stands before the comment, `comment` starts with its `#`."""
+
+    start: int
+    code: str = ""
+    comment: str = ""
+    newline: str = ""
+
+    @property
+    def is_indented_comment(self) -> bool:
+        """Whether the line is a comment with white space before it."""
+        return bool(self.comment) and bool(self.code) and not self.code.strip()
+
+    @property
+    def definition(self) -> str:
+        """The code as a definition: TABs as spaces, nothing behind it; may be empty."""
+        return self.code.replace("\t", " ").rstrip()
+
+
+class Section(NamedTuple):
+    """The lines between two separators; `start` is the offset of the first."""
+
+    start: int
+    lines: tuple[Line, ...]
+
+
+class File(NamedTuple):
+    """A file: its sections and the offsets of the separators between them."""
+
+    source: Source
+    sections: tuple[Section, ...]
+    separators: tuple[int, ...]
+
+    def span(self, line: Line, piece: Piece) -> Span:
+        """Return the place of a piece of a line; at least one character wide if there is one."""
+        start = line.start + piece.start
+        return Span(self.source, start, max(start + len(piece.text), start))
