@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from idlc.checks import names, reserved
+from idlc.checks import names, reserved, values
 from idlc.model.link import Model
 from idlc.text.diagnostics import Report
 
@@ -18,7 +18,7 @@ RULES = (
     reserved.interface_names,
     reserved.package_name,
     reserved.derived_suffixes,
-    reserved.values,
+    values.constants_and_defaults,
 )
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
+from idlc.checks.scope import sections
 from idlc.model import derive, ir, names
 from idlc.model.link import Model
 from idlc.text import codes
@@ -42,7 +41,7 @@ def interface_names(model: Model, report: Report) -> None:
 
 def unique_fields(model: Model, report: Report) -> None:
     """No structure has two fields of one name."""
-    for message in _sections(model):
+    for message in sections(model):
         first: dict[str, ir.Field] = {}
         for field in message.fields:
             earlier = first.setdefault(field.name, field)
@@ -59,7 +58,7 @@ def unique_fields(model: Model, report: Report) -> None:
 
 def unique_constants(model: Model, report: Report) -> None:
     """No structure has two constants of one name."""
-    for message in _sections(model):
+    for message in sections(model):
         first: dict[str, ir.Constant] = {}
         for constant in message.constants:
             earlier = first.setdefault(constant.name, constant)
@@ -89,7 +88,3 @@ def unique_modules(model: Model, report: Report) -> None:
                     hint="give them names that differ in more than capitals",
                 )
             )
-
-
-def _sections(model: Model) -> Iterable[ir.Message]:
-    return (part for interface in model.own for part in derive.sections(interface))

@@ -1,4 +1,4 @@
-"""Names and values that ROS 2 accepts and that then break somebody's code (spec section 2.3).
+"""Names that ROS 2 accepts and that then break somebody's code (spec section 2.3).
 
 The verdict stays "accepted": a warning says who will suffer. idlc's own Python code copes with
 all of them.
@@ -7,13 +7,12 @@ all of them.
 from __future__ import annotations
 
 import keyword
-from collections.abc import Iterable
 
-from idlc.model import derive, ir
+from idlc.checks.scope import sections
+from idlc.model import ir
 from idlc.model.link import Model
 from idlc.text import codes
 from idlc.text.diagnostics import Report
-from idlc.text.source import Span
 
 # C11's keywords and the macros of stdbool.h
 _C = frozenset(
@@ -47,7 +46,7 @@ _RENAME = "rename it if C or C++ code may ever use this package"
 
 def field_names(model: Model, report: Report) -> None:
     """Fields are not called like words of Python, C or C++."""
-    for message in _sections(model):
+    for message in sections(model):
         for field in message.fields:
             if field.name_span is None:
                 continue
@@ -82,7 +81,7 @@ def _native_clash(name: str) -> tuple[codes.Code, str] | None:
 
 def constant_names(model: Model, report: Report) -> None:
     """Constants are not called like macros of the C standard library."""
-    for message in _sections(model):
+    for message in sections(model):
         for constant in message.constants:
             if constant.name in _MACROS and constant.name_span:
                 text = f"`{constant.name}` is a macro; what rosidl generates does not compile"
@@ -115,7 +114,7 @@ def package_name(model: Model, report: Report) -> None:
 
 def derived_suffixes(model: Model, report: Report) -> None:
     """Messages whose names look derived are not used as the type of a field."""
-    for message in _sections(model):
+    for message in sections(model):
         for field in message.fields:
             element = ir.element_of(field.type)
             if not isinstance(element, ir.Ref) or field.type_span is None:
@@ -131,36 +130,3 @@ def derived_suffixes(model: Model, report: Report) -> None:
             elif name.endswith("_Request"):
                 text = f"a field of type `{name}` breaks the C code that rosidl generates"
                 report.add(codes.BREAKS_C.at(field.type_span, text, hint="rename that message"))
-
-
-def values(model: Model, report: Report) -> None:
-    """Values survive in the Python source that rosidl generates."""
-    for message in _sections(model):
-        for constant in message.constants:
-            _value(constant.value, constant.type, constant.value_span, report)
-        for field in message.fields:
-            if field.default is not None:
-                _value(field.default.value, field.type, field.default_span, report)
-
-
-def _value(value: ir.Value, type_: ir.FieldType, span: Span | None, report: Report) -> None:
-    if span is None:
-        return
-    texts = value if isinstance(value, tuple) else (value,)
-    if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in texts):
-        what, hint = "a line break or NUL in a value", "set the value in code"
-    elif isinstance(value, tuple) and not value and _is_numeric(ir.element_of(type_)):
-        what = "an empty default of a numeric sequence"
-        hint = "remove the default; the sequence is empty anyway"
-    else:
-        return
-    text = f"{what} breaks the Python code that rosidl generates"
-    report.add(codes.BREAKS_PYTHON.at(span, text, hint=hint))
-
-
-def _is_numeric(element: ir.Element) -> bool:
-    return isinstance(element, ir.Primitive) and element.name not in ("bool", "byte")
-
-
-def _sections(model: Model) -> Iterable[ir.Message]:
-    return (part for interface in model.own for part in derive.sections(interface))

@@ -7,7 +7,7 @@ References are names, never pointers; "no bound" is `None`, never 0; a type that
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, TypeAlias, cast
+from typing import Literal, NamedTuple, TypeAlias
 
 import msgspec
 
@@ -38,7 +38,7 @@ class TypeName(NamedTuple):
         package, kind, name = text.split("/")
         if kind not in KINDS:
             raise ValueError(f"not an interface kind: {kind!r}")
-        return cls(package, cast("Kind", kind), name)
+        return cls(package, kind, name)
 
 
 class PrimitiveInfo(NamedTuple):

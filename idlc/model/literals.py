@@ -165,10 +165,8 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
         hint = "write `[1, 2, 3]`"
         return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
     inside = text[1:-1]
-    if isinstance(type_.element, ir.String):
-        pieces = _string_elements(inside)
-    else:
-        pieces = _elements(inside)
+    split = _string_elements if isinstance(type_.element, ir.String) else _elements
+    pieces = split(inside)
     if isinstance(pieces, Fault):
         return pieces.moved(1)
     if (wrong := _wrong_length(type_, len(pieces), text)) is not None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
+from itertools import takewhile
 from typing import NamedTuple
 
 from idlc.model import ir, names
-from idlc.model.comments import Comment, condense
-from idlc.model.literals import BACKSLASH_HINT, FLOAT32_MAX, Fault, Text, default, scalar
+from idlc.model.comments import Comment, condense, problem
+from idlc.model.literals import Fault, Text, default, scalar
 from idlc.model.types import STRINGS, as_parsed, lower_type
 from idlc.syntax import tree
-from idlc.syntax.escapes import EscapeError, plain_meaning, through_idl
 from idlc.syntax.parse import parse_definition
 from idlc.text import codes
 from idlc.text.diagnostics import Report
@@ -35,11 +34,11 @@ def lower_section(
 
 
 class _Element(NamedTuple):
-    """A definition with the comment lines that belong to it."""
+    """A definition with the lines whose comments belong to it."""
 
     line: tree.Line
     body: tree.Field | tree.Constant
-    comments: list[str]
+    comments: list[tree.Line]
 
 
 class _Section:
@@ -55,19 +54,17 @@ class _Section:
 
     def lower(self) -> ir.Message:
         head = self._head()
-        comment = condense(head)
-        self._check_comment(comment._replace(unit=None), self.lines[: len(head)])
+        comment = self._condense([_head_text(line) for line in head], head, has_unit=False)
         fields: list[ir.Field] = []
         constants: list[ir.Constant] = []
-        for element in self._elements(len(head)):
-            about = condense(element.comments)
-            if isinstance(element.body, tree.Field):
-                self._check_comment(about, (element.line,))
-                fields.append(self._field(element.line, element.body, about))
+        for line, body, lines in self._elements(len(head)):
+            texts = [_comment_text(commented) for commented in lines]
+            if isinstance(body, tree.Field):
+                about = self._condense(texts, lines, has_unit=True)
+                fields.append(self._field(line, body, about))
             else:
-                # rosidl writes no unit for a constant, so a bad one does no harm
-                self._check_comment(about._replace(unit=None), (element.line,))
-                constant = self._constant(element.line, element.body, about)
+                about = self._condense(texts, lines, has_unit=False)
+                constant = self._constant(line, body, about)
                 if constant is not None:
                     constants.append(constant)
         return ir.Message(
@@ -79,27 +76,21 @@ class _Section:
             source=self.file.source,
         )
 
-    def _head(self) -> list[str]:
+    def _head(self) -> list[tree.Line]:
         """Return the comment lines at the very start, which describe the whole structure."""
-        head: list[str] = []
-        for line in self.lines:
-            if line.code or not line.comment:
-                break
-            head.append(line.comment.replace("\t", " ").lstrip("#"))
-        return head
+        return list(takewhile(lambda line: line.comment and not line.code, self.lines))
 
     def _elements(self, first: int) -> list[_Element]:
         """Return the sound definitions with their comments; report the broken ones."""
         elements: list[_Element] = []
-        pending: list[str] = []
+        pending: list[tree.Line] = []
         for line in self.lines[first:]:
-            comment = line.comment.replace("\t", " ").rstrip().lstrip("#")
             if line.is_indented_comment:
                 if elements:
-                    elements[-1].comments.append(comment)
+                    elements[-1].comments.append(line)
                 continue
             if line.comment:
-                pending.append(comment)
+                pending.append(line)
             text = line.definition
             if not text:
                 continue
@@ -111,6 +102,23 @@ class _Section:
                 elements.append(_Element(line, body, pending))
             pending = []
         return elements
+
+    def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
+        """Return an element's comment; `has_unit` is whether rosidl writes its unit anywhere."""
+        comment = condense(texts)
+        found = problem(comment if has_unit else comment._replace(unit=None))
+        if found is not None:
+            span = self._find(found.text, lines)
+            self.report.add(found.code.at(span, found.message, hint=found.hint))
+        return comment
+
+    def _find(self, text: str, lines: list[tree.Line]) -> Span:
+        """Return where `text` stands in the comments of these lines, or the first of them."""
+        line, at = next(
+            ((line, at) for line in lines if (at := line.comment.find(text)) >= 0), (lines[0], 0)
+        )
+        start = line.start + len(line.code) + at
+        return Span(self.file.source, start, start + (len(text) if at else len(line.comment)))
 
     def _broken(self, line: tree.Line, body: tree.Broken) -> None:
         span = self.file.span(line, body.piece)
@@ -190,7 +198,6 @@ class _Section:
         if isinstance(found, Fault):
             self._add(line, piece.start, found)
             return None
-        self._warn_value(self.file.span(line, piece), element, found.value, piece.text)
         return found
 
     def _constant(self, line: tree.Line, body: tree.Constant, about: Comment) -> ir.Constant | None:
@@ -211,12 +218,10 @@ class _Section:
         if isinstance(value, Fault):
             self._add(line, body.value.start, value)
             return None
-        plain = value.value if isinstance(value, Text) else value
-        self._warn_value(self.file.span(line, body.value), type_, plain, body.value.text)
         return ir.Constant(
             name=body.name.text,
             type=type_,
-            value=plain,
+            value=value.value if isinstance(value, Text) else value,
             comment=about.lines,
             unit=about.unit,
             name_span=self.file.span(line, body.name),
@@ -238,79 +243,11 @@ class _Section:
         )
         return None
 
-    def _warn_value(self, span: Span, type_: ir.Element, value: ir.Value, text: str) -> None:
-        values = value if isinstance(value, tuple) else (value,)
-        numbers = [number for number in values if isinstance(number, float)]
-        if any(not math.isfinite(number) for number in numbers):
-            self.report.add(
-                codes.NON_FINITE.at(
-                    span,
-                    f"`{text}` is not finite; what rosidl generates for it does not compile",
-                    hint="use a large finite number, or set the value in code",
-                )
-            )
-        elif type_ == ir.Primitive("float32") and any(abs(n) > FLOAT32_MAX for n in numbers):
-            self.report.add(
-                codes.FLOAT32_RANGE.at(
-                    span, f"`{text}` is beyond what a float32 holds", hint="use float64"
-                )
-            )
-        elif isinstance(value, str) and "\\" in text and value != plain_meaning(_unquoted(text)):
-            self.report.add(
-                codes.MANGLED_TEXT.at(
-                    span,
-                    f"ROS 2 interprets the backslashes more than once and reads {value!r}",
-                    hint=BACKSLASH_HINT,
-                )
-            )
 
-    def _check_comment(self, comment: Comment, lines: tuple[tree.Line, ...]) -> None:
-        """Report comments and units that break the pipeline (spec 1.4, 1.5)."""
-        if comment.unit is not None and "\n" in comment.unit:
-            self._comment_fault(
-                codes.UNIT_ACROSS_LINES,
-                "[",
-                lines,
-                "a bracket that closes in another line becomes a unit with a line break, "
-                "on which ROS 2's tools fail",
-                "close the bracket in the same line",
-            )
-            return
-        for text in (*comment.lines, *([comment.unit] if comment.unit else [])):
-            try:
-                through_idl(text)
-            except EscapeError as error:
-                self._comment_fault(
-                    codes.BAD_ESCAPE,
-                    text[error.start : error.end],
-                    lines,
-                    f"ROS 2's tools fail on {error} in a comment",
-                    "write the path or formula without backslashes",
-                )
-                return
-
-    def _comment_fault(
-        self, code: codes.Code, text: str, lines: tuple[tree.Line, ...], message: str, hint: str
-    ) -> None:
-        span = self._find_in_comments(text, lines)
-        self.report.add(code.at(span, message, hint=hint))
-
-    def _find_in_comments(self, text: str, lines: tuple[tree.Line, ...]) -> Span:
-        """Return where `text` stands in these comments or in those before them."""
-        source = self.file.source
-        end = self.lines.index(lines[-1]) if lines else 0
-        candidates = (*lines, *reversed(self.lines[:end]), *self.lines[end:])
-        for line in candidates:
-            at = line.comment.replace("\t", " ").find(text)
-            if text and at >= 0:
-                start = line.start + len(line.code) + at
-                return Span(source, start, start + len(text))
-        line = candidates[0]
-        start = line.start + len(line.code)
-        return Span(source, start, start + len(line.comment))
+def _head_text(line: tree.Line) -> str:
+    return line.comment.replace("\t", " ").lstrip("#")
 
 
-def _unquoted(text: str) -> str:
-    if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
-        return text[1:-1]
-    return text
+def _comment_text(line: tree.Line) -> str:
+    # only the comments at the head of a section keep the blanks at their ends
+    return line.comment.replace("\t", " ").rstrip().lstrip("#")

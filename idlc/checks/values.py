@@ -1,0 +1,70 @@
+"""Values that ROS 2 accepts and that then mean something else, or break somebody's code."""
+
+from __future__ import annotations
+
+import math
+
+from idlc.checks.scope import sections
+from idlc.model import ir
+from idlc.model.link import Model
+from idlc.model.literals import BACKSLASH_HINT, FLOAT32_MAX
+from idlc.syntax.escapes import plain_meaning
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.source import Span
+
+
+def constants_and_defaults(model: Model, report: Report) -> None:
+    """Values reach every language as they are written."""
+    for message in sections(model):
+        for constant in message.constants:
+            if constant.value_span is not None:
+                report.extend(_problems(constant.value, constant.type, constant.value_span))
+        for field in message.fields:
+            if field.default is not None and field.default_span is not None:
+                report.extend(_problems(field.default.value, field.type, field.default_span))
+
+
+def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> list[Diagnostic]:
+    element = ir.element_of(type_)
+    if isinstance(value, tuple):
+        if not value and isinstance(element, ir.Primitive) and element.name not in ("bool", "byte"):
+            return [_breaks_python(span, "an empty default of a numeric sequence")]
+        return _broken_text(value, span)
+    if isinstance(value, str):
+        return [*_broken_text((value,), span), *_mangled_text(value, span)]
+    if isinstance(value, float):
+        return _number(value, element, span)
+    return []
+
+
+def _number(value: float, element: ir.Element, span: Span) -> list[Diagnostic]:
+    if not math.isfinite(value):
+        message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
+        hint = "use a large finite number, or set the value in code"
+        return [codes.NON_FINITE.at(span, message, hint=hint)]
+    if element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
+        message = f"`{span.text}` is beyond what a float32 holds"
+        return [codes.FLOAT32_RANGE.at(span, message, hint="use float64")]
+    return []
+
+
+def _broken_text(values: tuple[ir.Scalar, ...], span: Span) -> list[Diagnostic]:
+    if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in values):
+        return [_breaks_python(span, "a line break or NUL in a value")]
+    return []
+
+
+def _mangled_text(value: str, span: Span) -> list[Diagnostic]:
+    text = span.text
+    if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
+        text = text[1:-1]
+    if "\\" not in text or value == plain_meaning(text):
+        return []
+    message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
+    return [codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)]
+
+
+def _breaks_python(span: Span, what: str) -> Diagnostic:
+    message = f"{what} breaks the Python code that rosidl generates"
+    return codes.BREAKS_PYTHON.at(span, message, hint="remove it, and set the value in code")
