@@ -28,13 +28,16 @@ def interface_names(model: Model, report: Report) -> None:
         if all(names.is_message_name(part.name.name) for part in derive.sections(interface)):
             continue
         name, kind = interface.name.name, interface.name.kind
-        reserved = kind != "msg" and names.is_message_name(name)
-        hint = "this ending is kept for the parts of services and actions; choose another name"
+        like = "".join(part[:1].upper() + part[1:] for part in name.replace("-", "_").split("_"))
+        if kind != "msg" and names.is_message_name(name):
+            hint = "this ending is kept for the parts of services and actions"
+        else:
+            hint = f"call it `{like}.{kind}`" if names.is_message_name(like) else names.MESSAGE_HINT
         report.add(
             codes.INTERFACE_NAME.of(
                 interface.source.path if interface.source else str(interface.name),
                 f"`{name}` cannot be the name of a .{kind} file",
-                hint=hint if reserved or "_" in name else names.MESSAGE_HINT,
+                hint=hint,
             )
         )
 

@@ -19,6 +19,9 @@ SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
 }
 
 
+_NUMBERS = ("no", "one", "two")
+
+
 def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
     """Return the interface that a file defines; missing sections count as empty.
 
@@ -44,7 +47,7 @@ def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
 
 def _check_reading(file: tree.File, report: Report) -> None:
     source = file.source
-    if source.text.startswith("\ufeff"):
+    if source.text.startswith(tree.BYTE_ORDER_MARK):
         report.add(
             codes.BYTE_ORDER_MARK.at(
                 Span(source, 0, 1),
@@ -68,9 +71,9 @@ def _check_reading(file: tree.File, report: Report) -> None:
 def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Report) -> None:
     count = len(file.separators)
     needed = expected - 1
-    if count == needed:
+    if count == needed or _has_near_separator(file):
         return
-    rule = f"a .{kind} file has {needed or 'no'} `---` line{'s' * (needed > 1)}"
+    rule = f"a .{kind} file has {_NUMBERS[needed]} `---` line{'s' * (needed > 1)}"
     if count > needed:
         at = file.separators[needed]
         span = Span(file.source, at, at + 3)
@@ -81,10 +84,18 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
         report.add(
             codes.SEPARATOR_COUNT.at(
                 Span(file.source, end, end),
-                f"{rule}, this one has {count or 'none'}",
+                f"{rule}, this one has {_NUMBERS[count]}",
                 hint="write `---` on a line of its own between the parts",
             )
         )
+
+
+def _has_near_separator(file: tree.File) -> bool:
+    """Tell whether some line was meant as a separator and is reported as such."""
+    if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
+        return True
+    lines = (line for section in file.sections for line in section.lines)
+    return any(text and set(text) == {"-"} for line in lines if (text := line.definition))
 
 
 def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir.Message]:

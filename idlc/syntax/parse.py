@@ -155,11 +155,14 @@ def _broken(text: str, error: UnexpectedInput) -> tree.Broken:
     type_, space, _ = text.partition(" ")
     whole = tree.Piece(type_, 0)
     if set(type_) == {"-"} and not space:
+        alone = type_ == "---"
         return tree.Broken(
             "malformed-separator",
             whole,
-            f"`{type_}` is not a separator",
-            "a separator is a line of exactly three dashes, `---`",
+            "a separator must be alone on its line" if alone else f"`{type_}` is not a separator",
+            "remove the blanks or the comment behind it"
+            if alone
+            else "a separator is a line of exactly three dashes, `---`",
         )
     if not space:
         return tree.Broken(
