@@ -92,7 +92,7 @@ class _Section:
             if line.comment:
                 pending.append(line)
             text = line.definition
-            if not text or text.startswith(tree.BYTE_ORDER_MARK):
+            if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
             body = parse_definition(text)
             if isinstance(body, tree.Broken):
