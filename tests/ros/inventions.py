@@ -2,46 +2,15 @@
 
 import random
 
-PRIMITIVES = [
-    "bool",
-    "byte",
-    "char",
-    "int8",
-    "uint8",
-    "int16",
-    "uint16",
-    "int32",
-    "uint32",
-    "int64",
-    "uint64",
-    "float32",
-    "float64",
-    "string",
-    "wstring",
-    "string<=5",
-    "wstring<=5",
-]
+PRIMITIVES = (
+    "bool byte char int8 uint8 int16 uint16 int32 uint32 int64 uint64 float32 float64 "
+    "string wstring string<=5 wstring<=5"
+).split()
 MESSAGES = ["std_msgs/Header", "geometry_msgs/Point", "builtin_interfaces/Time", "Other"]
 #: Types that are wrong, each for another reason.
 BAD_TYPES = ["flot64", "time", "std_msgs/msg/Header", "string<=0", "int32<=4", "Nowhere", "a/b/C"]
 ARRAYS = ["", "", "", "[]", "[2]", "[<=3]", "[<=0]", "[+2]", "[0x2]", "[2][2]"]
-NAMES = [
-    "a",
-    "b",
-    "c",
-    "d",
-    "e",
-    "f",
-    "x1",
-    "long_name",
-    "value",
-    "class",
-    "int",
-    "self",
-    "print",
-    "module",
-    "data_2",
-]
+NAMES = "a b c d e f x1 long_name value class int self print module data_2".split()
 BAD_NAMES = ["A", "a__b", "a_", "_a", "1a", "camelCase", "é"]
 CONSTANTS = ["A", "B", "C", "MAX", "A_1", "X2Y", "TRUE", "NULL"]
 COMMENTS = [
@@ -64,22 +33,7 @@ COMMENTS = [
     r"# \\theta",
     r"# ends \\",
 ]
-NUMBERS = [
-    "0",
-    "1",
-    "-1",
-    "127",
-    "255",
-    "-129",
-    "3.5",
-    "1e3",
-    "0x1F",
-    "017",
-    "1_0",
-    "+2",
-    "1e400",
-    "x",
-]
+NUMBERS = "0 1 5 127 -1 255 -129 3.5 1e3 0x1F 017 1_0 +2 1e400 x".split()
 BOOLS = ["true", "FALSE", "0", "1", "yes"]
 STRINGS = [
     '"text"',
@@ -155,7 +109,7 @@ class Inventor:
             "kind": kind,
             "pkg": "invented",
             "name": "Case",
-            "hex": text.encode("utf-8", "surrogatepass").hex(),
+            "bytes_hex": text.encode("utf-8", "surrogatepass").hex(),
             "siblings": {"msg/Other.msg": "int32 x\n"},
         }
 

@@ -1,8 +1,8 @@
 """The real rosidl as a process: rosidl_side.py CASES OUTCOMES, two JSON-lines files.
 
-A case has `kind`, `pkg`, `name`, `hex` (the file's bytes) and `siblings` (path to text). An outcome
-has `stage` (where rosidl gave up: adapter, parser, type_description or generator_py; null if it
-did not), `parsed` (the structures as its parser sees them) and `hash`, as golden/spec has them.
+A case has `kind`, `pkg`, `name`, `bytes_hex` (the file's bytes) and `siblings` (path to text). An
+outcome has `stage` (where rosidl gave up: adapter, parser, type_description or generator_py; null
+if it did not), `parsed` (the structures as its parser sees them) and `hash`, as in golden/spec.
 """
 
 import json
@@ -85,7 +85,7 @@ class Pipeline:
         own = f"{case['kind']}/{case['name']}.{case['kind']}"
         self.files = [own, *case.get("siblings", {})]
         texts = {path: text.encode() for path, text in case.get("siblings", {}).items()}
-        for path, data in {**texts, own: bytes.fromhex(case["hex"])}.items():
+        for path, data in {**texts, own: bytes.fromhex(case["bytes_hex"])}.items():
             (self.sources / path).parent.mkdir(parents=True, exist_ok=True)
             (self.sources / path).write_bytes(data)
 
