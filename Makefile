@@ -1,0 +1,72 @@
+# Everything that a developer does. Needs Python 3.10 or newer, make and a package index.
+#
+#   PYTHON=python3.12   the interpreter to use
+#   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
+#   ARGS='-k name'      more words for pytest
+
+PYTHON ?= python3
+ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
+INTERPRETERS ?= 3.10 3.11 3.12 3.13
+ARGS ?=
+
+TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+TEST_ENV := .venv/test-$(TAG)$(if $(filter no,$(ROS)),-without-ros)
+DEMO_ENV := .venv/demo-$(TAG)
+DEMO_OUT := build/demo
+TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
+SELECTION := $(if $(filter no,$(ROS)),-m "not ros")
+
+PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
+# Nothing that we run leaves this machine.
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test test-all lint bench clean
+
+help: ## show this list
+	@echo 'make TARGET, where TARGET is'
+	@sed -n 's/^\([a-z-]*\):.*## /  \1 \t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 14
+
+demo: $(DEMO_ENV)/installed ## compile the example and send its messages through the real rclpy
+	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
+	@$(DEMO_ENV)/bin/idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller
+	@PYTHONPATH=$(DEMO_OUT) $(DEMO_ENV)/bin/python examples/demo.py
+
+test: $(TEST_ENV)/installed ## run the tests
+ifeq ($(ROS),no)
+	@echo 'without the ROS 2 wheels: the tests marked "ros" are left out'
+endif
+	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
+
+test-all: ## run the tests on every interpreter in INTERPRETERS that is present
+	@PYTHON=$(PYTHON) sh tests/every_python.sh $(INTERPRETERS)
+
+lint: $(TEST_ENV)/installed ## check style and types
+	$(TEST_ENV)/bin/ruff check .
+	$(TEST_ENV)/bin/ruff format --check .
+	$(TEST_ENV)/bin/mypy
+
+bench: $(TEST_ENV)/installed ## measure against rosbags, rclpy and rosidl
+	@for script in benchmarks/[a-z]*.py; do $(TEST_ENV)/bin/python $$script || exit 1; done
+
+clean: ## remove environments and everything that was built
+	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
+$(DEMO_ENV)/installed: EXTRA := ros
+
+# One pip call per environment: the resolver sees everything at once.
+.venv/%/installed: pyproject.toml idlc/__init__.py
+	@echo 'preparing .venv/$* ...'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "idlc needs Python 3.10 or newer, $(PYTHON) is " + sys.version)'
+	@rm -rf .venv/$*
+	@$(PYTHON) -m venv .venv/$*
+	@.venv/$*/bin/python $(PIP_INSTALL) --editable '.[$(EXTRA)]' || { \
+	    echo >&2; \
+	    echo 'The environment could not be made. If pip found no ros-jazzy-* build for this' >&2; \
+	    echo 'interpreter ($(PYTHON), $(TAG)), name another one with PYTHON=..., or say ROS=no' >&2; \
+	    echo 'to run the tests that need no ROS.' >&2; \
+	    exit 1; }
+	@touch $@

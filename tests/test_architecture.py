@@ -1,0 +1,149 @@
+"""The invariants of docs/architecture.md that can be read off the source."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "idlc"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+RUNTIME = [path for path in MODULES if path.parent.name == "runtime"]
+
+#: Each stage may import those before it; `runtime` stands apart and imports none.
+STAGES = ("text", "syntax", "model", "checks", "emit", "disk", "driver", "cli")
+#: The outermost modules, which belong to the command line.
+OUTERMOST = {"__main__": "cli", "__init__": "text"}
+
+#: Only these stages may touch files, the environment or the terminal.
+MAY_DO_IO = {"disk", "cli"}
+IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
+IO_CALLS = {"open", "print", "input"}
+
+#: What runtime modules may import besides the standard library and each other, and only inside
+#: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
+RUNTIME_ON_DEMAND = {"numpy", "rclpy", "rosidl_parser"}
+
+MODULE_BUDGET = 300
+FUNCTION_BUDGET = 40
+#: path, or path:function, that is over budget -> why it stays so.
+OVER_BUDGET: dict[str, str] = {}
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+def stage_of(path: Path) -> str:
+    first = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return OUTERMOST.get(first, first)
+
+
+def imports_of(path: Path) -> Iterator[tuple[str, ast.stmt, bool]]:
+    """Yield each absolute module name, its statement, and whether it runs at import."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    inner = {
+        id(node)
+        for function in ast.walk(tree)
+        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
+        for node in ast.walk(function)
+    }
+    package = [*path.relative_to(ROOT).parts[:-1]]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node, id(node) not in inner
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            names = [f"{module}.{alias.name}" for alias in node.names]
+            for name in names if module == "idlc" or node.level else [module]:
+                yield name, node, id(node) not in inner
+
+
+def test_every_module_belongs_to_a_stage():
+    assert {stage_of(path) for path in MODULES} <= {*STAGES, "runtime", "scaffold"}
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_imports_point_one_way(path):
+    own = stage_of(path)
+    allowed = {"runtime"} if own == "runtime" else {*STAGES[: STAGES.index(own) + 1], "__version__"}
+    for name, node, _ in imports_of(path):
+        parts = name.split(".")
+        if parts[0] == "idlc":
+            assert len(parts) > 1, f"line {node.lineno}: name the module of idlc that is meant"
+            assert parts[1] in allowed, f"line {node.lineno}: {own} imports {name}"
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in MODULES if stage_of(p) not in {*MAY_DO_IO, "runtime"}], ids=name_of
+)
+def test_the_core_does_no_io(path):
+    for name, node, _ in imports_of(path):
+        assert name.split(".")[0] not in IO_MODULES, f"line {node.lineno}: imports {name}"
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id not in IO_CALLS, f"line {node.lineno}: calls {node.func.id}"
+
+
+@pytest.mark.parametrize("path", RUNTIME, ids=name_of)
+def test_the_runtime_stands_alone(path):
+    for name, node, at_import in imports_of(path):
+        top = name.split(".")[0]
+        if top in sys.stdlib_module_names:
+            continue
+        relative = isinstance(node, ast.ImportFrom) and node.level == 1
+        assert relative or top in RUNTIME_ON_DEMAND, f"line {node.lineno}: imports {name}"
+        assert relative or not at_import, f"line {node.lineno}: imports {name} at once"
+
+
+def over_budget() -> Iterator[tuple[str, int]]:
+    for path in MODULES:
+        text = path.read_text(encoding="utf-8")
+        if (lines := len(text.splitlines())) > MODULE_BUDGET:
+            yield name_of(path), lines
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                assert node.end_lineno is not None
+                if (lines := node.end_lineno - node.lineno + 1) > FUNCTION_BUDGET:
+                    yield f"{name_of(path)}:{node.name}", lines
+
+
+def test_modules_and_functions_stay_small():
+    breaches = dict(over_budget())
+    unexplained = {name: lines for name, lines in breaches.items() if name not in OVER_BUDGET}
+    assert not unexplained, "over budget (split by idea, or say why not in OVER_BUDGET)"
+    assert set(OVER_BUDGET) <= set(breaches), "entries of OVER_BUDGET that are no longer needed"
+
+
+def project_files() -> Iterator[Path]:
+    generated = {".git", ".venv", "build", "dist", "__pycache__", ".hypothesis"}
+    for path in ROOT.rglob("*"):
+        parts = path.relative_to(ROOT).parts
+        if path.is_file() and not generated.intersection(parts) and "cache" not in parts[0]:
+            yield path
+
+
+def test_nothing_reaches_outside_the_clone():
+    neighbour = "/".join(["..", "shared"]).encode()  # in two pieces, or this file would be found
+    assert [name_of(path) for path in project_files() if neighbour in path.read_bytes()] == []
+
+
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_starting_up_imports_nothing_heavy(option, tmp_path):
+    heavy = {"jinja2", "lark", "msgspec", "numpy", "rich"}
+    code = (
+        "import runpy, sys\n"
+        f"sys.argv = ['idlc', {option!r}]\n"
+        "try:\n    runpy.run_module('idlc', run_name='__main__')\n"
+        "except SystemExit as done:\n    assert not done.code, done.code\n"
+        f"print('imported', sorted({heavy!r}.intersection(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "imported []"
