@@ -31,6 +31,7 @@ help: ## show this list
 demo: $(DEMO_ENV)/installed ## compile the example and send its messages through the real rclpy
 	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
 	@$(DEMO_ENV)/bin/idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller
+	@$(DEMO_ENV)/bin/idlc gen $(DEMO_ENV)/share/std_msgs --package std_msgs_by_idlc -o $(DEMO_OUT)/std_msgs_by_idlc
 	@PYTHONPATH=$(DEMO_OUT) $(DEMO_ENV)/bin/python examples/demo.py
 
 test: $(TEST_ENV)/installed ## run the tests
