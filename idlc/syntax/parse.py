@@ -21,8 +21,8 @@ def _piece(token: Token) -> tree.Piece:
 
 
 def _start(token: Token) -> int:
-    # lark 0.12 and 1.x both have the attribute; its type says Optional
-    return cast("int", token.start_pos)
+    position: Any = token.start_pos  # Optional in lark 1.x, an int in the stubs of 0.12
+    return int(position)
 
 
 class _Array(NamedTuple):
