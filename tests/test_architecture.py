@@ -1,6 +1,7 @@
 """The invariants of docs/architecture.md that can be read off the source."""
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -131,6 +132,18 @@ def project_files() -> Iterator[Path]:
 def test_nothing_reaches_outside_the_clone():
     neighbour = "/".join(["..", "shared"]).encode()  # in two pieces, or this file would be found
     assert [name_of(path) for path in project_files() if neighbour in path.read_bytes()] == []
+
+
+def test_this_document_names_real_tests():
+    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)
+    assert len(named) >= 8
+    for path, function in named:
+        source = ROOT / path
+        assert source.exists(), path
+        assert f"def {function}" in source.read_text(encoding="utf-8"), f"{path}::{function}"
+    assert text.count("\n1. ") == 1
+    assert "\n13. " not in text, "more invariants than anyone remembers"
 
 
 @pytest.mark.parametrize("option", ["--version", "--help"])
