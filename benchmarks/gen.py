@@ -47,7 +47,8 @@ def run_idlc(inputs: Path, out: Path) -> int:
     packages = sorted({path.parts[-3] for path in interface_files(inputs)})
     for package in packages:
         arguments = ["gen", str(inputs / package), "-o", str(out / package), "-I", str(inputs)]
-        main([*arguments, "--package", package], standalone_mode=False)
+        status = main([*arguments, "--package", package])
+        assert status == 0, f"idlc gen failed on {package}"
     return len(interface_files(inputs))
 
 
