@@ -8,10 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from jinja2 import Environment, nodes
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "idlc"
 MODULES = sorted(PACKAGE.rglob("*.py"))
+TEMPLATES = sorted((ROOT / "templates").glob("*.jinja"))
 RUNTIME = [path for path in MODULES if path.parent.name == "runtime"]
 
 #: Each stage may import those before it; `runtime` stands apart and imports none.
@@ -147,6 +149,33 @@ def test_modules_and_functions_stay_small():
     unexplained = {name: lines for name, lines in breaches.items() if name not in OVER_BUDGET}
     assert not unexplained, "over budget (split by idea, or say why not in OVER_BUDGET)"
     assert set(OVER_BUDGET) <= set(breaches), "entries of OVER_BUDGET that are no longer needed"
+
+
+def template_sins(node: nodes.Node, within_if: bool = False) -> Iterator[str]:
+    """Yield what a template does besides laying out: templates place finished strings."""
+    match node:
+        case nodes.Filter():
+            if node.name != "indent":
+                yield f"line {node.lineno}: filter {node.name}"
+        case nodes.Call():
+            if not isinstance(node.node, (nodes.Name, nodes.Getattr)):
+                yield f"line {node.lineno}: computed call"
+        case nodes.If():
+            if within_if or not isinstance(node.test, (nodes.Name, nodes.Getattr)):
+                yield f"line {node.lineno}: a condition that is not one flag"
+        case nodes.BinExpr() | nodes.UnaryExpr() | nodes.Compare() | nodes.Concat():
+            yield f"line {node.lineno}: computes"
+        case nodes.Assign() | nodes.AssignBlock() | nodes.CondExpr() | nodes.Test():
+            yield f"line {node.lineno}: {type(node).__name__}"
+    for child in node.iter_child_nodes():
+        yield from template_sins(child, within_if or isinstance(node, nodes.If))
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=name_of)
+def test_templates_only_lay_out(path):
+    text = path.read_text(encoding="utf-8")
+    assert list(template_sins(Environment(autoescape=True).parse(text))) == []
+    assert len(text.splitlines()) <= 80
 
 
 def project_files() -> Iterator[Path]:
