@@ -253,7 +253,8 @@ def _string_elements(inside: str) -> list[tuple[str, int]] | Fault:
                     )
                     return Fault(codes.BAD_VALUE, message, at, len(inside), hint)
                 element = rest[1 : end + 1].replace(f"\\{quote}", quote)
-                found.append((element, len(inside) - len(rest)))
+                # upstream strips every element, also what stood in quotes
+                found.append((element.strip(), len(inside) - len(rest)))
                 rest = rest[end + 2 :]
         if not quoted:
             element, comma, behind = rest.partition(",")
