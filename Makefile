@@ -58,11 +58,11 @@ clean: ## remove environments and everything that was built
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(DEMO_ENV)/installed: EXTRA := ros
 
-# One pip call per environment: the resolver sees everything at once.
-.venv/%/installed: pyproject.toml idlc/__init__.py
+# One pip call per environment: the resolver sees everything at once. An environment that is
+# there already is brought up to date.
+.venv/%/installed: pyproject.toml
 	@echo 'preparing .venv/$* ...'
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "idlc needs Python 3.10 or newer, $(PYTHON) is " + sys.version)'
-	@rm -rf .venv/$*
 	@$(PYTHON) -m venv .venv/$*
 	@.venv/$*/bin/python $(PIP_INSTALL) --editable '.[$(EXTRA)]' || { \
 	    echo >&2; \
