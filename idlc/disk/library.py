@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from idlc.model import catalog, ir
 from idlc.disk.find import KIND_FOLDERS, KINDS, walk
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import read_source, shown
 
 if TYPE_CHECKING:
-    from idlc.model import ir, link
     from idlc.text.diagnostics import Report
     from idlc.text.source import Source
 
@@ -31,7 +31,7 @@ def ament_prefixes() -> tuple[Path, ...]:
 class Folder:
     """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: str | Path) -> None:
         self._path = Path(os.path.abspath(path))
 
     def roots(self, package: str) -> Iterator[Path]:
@@ -96,23 +96,15 @@ class Library:
 
     def __init__(
         self,
-        folders: Iterable[Path],
+        folders: Iterable[str],
         report: Report,
         *,
-        own: dict[str, list[Path]] | None = None,
-        catalog: link.Library | None = None,
+        own: Mapping[str, Sequence[Path]] | None = None,
     ) -> None:
         places = [Folder(path) for path in folders]
         self._places: tuple[Folder | Prefix, ...] = (*places, *map(Prefix, ament_prefixes()))
         self._own = own or {}
         self._report = report
-        self._given = catalog
-
-    @cached_property
-    def _catalog(self) -> link.Library:
-        from idlc.model import catalog
-
-        return self._given or catalog
 
     def _roots(self, package: str) -> Iterator[Path]:
         yield from self._own.get(package, ())
@@ -135,17 +127,15 @@ class Library:
         path = self.path(name)
         if path is not None:
             return read_source(path, shown(path), self._report)
-        return self._catalog.source(name)
+        return catalog.source(name)
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
-        return on_disk or self._catalog.names(package)
+        return on_disk or catalog.names(package)
 
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
-        from idlc.model import catalog, ir
-
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
         return tuple(sorted(on_disk or catalog.interfaces(package)))
 
@@ -166,7 +156,7 @@ class Library:
 
     def packages(self) -> Iterable[str]:
         """Return the names of all packages, for suggestions."""
-        found = set(self._catalog.packages()) | set(self._own)
+        found = set(catalog.packages()) | set(self._own)
         return sorted(found.union(*(place.packages() for place in self._places)))
 
 

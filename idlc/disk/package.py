@@ -12,7 +12,7 @@ from idlc.text import codes
 from idlc.text.source import Source, Span
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Report
+    from idlc.text.diagnostics import Diagnostic, Report
 
 MANIFEST = "package.xml"
 
@@ -69,7 +69,7 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
     return declared
 
 
-def _broken(data: bytes, name: str, error: expat.ExpatError | ValueError) -> codes.Diagnostic:
+def _broken(data: bytes, name: str, error: expat.ExpatError | ValueError) -> Diagnostic:
     message = f"not well-formed XML: {str(error).partition(':')[0]}"
     hint = "mend the file, or give --package NAME"
     if not isinstance(error, expat.ExpatError):

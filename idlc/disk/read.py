@@ -15,7 +15,7 @@ from idlc.text import codes
 from idlc.text.source import Source, Span
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Report
+    from idlc.text.diagnostics import Diagnostic, Report
 
 #: Bytes; the largest interface file that is read. Real ones stay below 64 KiB.
 MAX_SIZE = 16 << 20
@@ -76,7 +76,7 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
     return None
 
 
-def unreadable(name: str, error: OSError | ValueError) -> codes.Diagnostic:
+def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
     """Return the problem with a path that cannot be read."""
     if isinstance(error, OSError) and error.errno == errno.ENOENT:
         return codes.NO_SUCH_PATH.of(name, f"no such file or folder: `{name}`")
@@ -92,7 +92,7 @@ def decode(data: bytes, name: str, report: Report) -> Source | None:
         return None
 
 
-def _not_text(data: bytes, name: str, offset: int) -> codes.Diagnostic:
+def _not_text(data: bytes, name: str, offset: int) -> Diagnostic:
     for mark, encoding in _BYTE_ORDER_MARKS:
         if data.startswith(mark):
             return codes.NOT_TEXT.of(

@@ -161,7 +161,8 @@ class _Transaction:
             if change.new is None:
                 target = self._out / change.path
                 for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
-                    cached.unlink(missing_ok=True)
+                    with contextlib.suppress(OSError):
+                        cached.unlink()
         for folder in emptied(changes):
             for path in (self._out / folder / "__pycache__", self._out / folder):
                 with contextlib.suppress(OSError):

@@ -1,0 +1,138 @@
+"""The folder that a generated package is written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from importlib.machinery import PathFinder
+from pathlib import Path
+
+from idlc import __version__
+from idlc.disk import fresh, lock, write
+from idlc.disk.inputs import Inputs
+from idlc.disk.library import Library
+from idlc.disk.plan import Change, Obstacle, Plan, plan, state
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic, Report
+
+
+class Target:
+    """A package folder, existing or not; `name` is how messages call it."""
+
+    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+        self.name = name
+        self.package = package
+        self._path = Path(os.path.abspath(name))
+        self._report = report
+        self._force = force
+
+    def beside(self, package: str) -> Target:
+        """Return the folder of another package next to this one."""
+        name = (Path(self.name).parent / package).as_posix()
+        return Target(name, package, self._report, force=self._force)
+
+    @cached_property
+    def lock(self) -> lock.Lock | None:
+        """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
+        return lock.load(self._path, self.name, Report() if self._force else self._report)
+
+    def usable(self) -> bool:
+        """Whether this is or can become a folder; reports IDL612."""
+        for path in (self._path, *self._path.parents):
+            if path.is_dir():
+                return True
+            if os.path.lexists(path):
+                message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
+                self._report.add(codes.CANNOT_WRITE.of(self.name, message))
+                return False
+        return False
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Whether what is here is what compiling the inputs would write."""
+        return fresh.unchanged(
+            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
+        )
+
+    def plan(self, files: Mapping[str, str]) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not."""
+        content = {path: text.encode("utf-8") for path, text in files.items()}
+        owned = write.owned(self._path, self.lock)
+        return plan(self._path, self.name, content, owned, self._report, force=self._force)
+
+    def apply(self, changes: Plan, record: lock.Lock) -> bool:
+        """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        return write.apply(changes, lock.encode(record), self.name, self._report)
+
+    def drift(self, changes: Plan, record: lock.Lock) -> None:
+        """Report IDL616 for each file that is not what a run would write."""
+        why = _reasons(self.lock, record)
+        for change in changes.changes:
+            self._report.add(self._drifted(change, why))
+        if not changes.changes and (self.lock is None or why):
+            self._report.add(
+                codes.DRIFT.of(
+                    f"{self.name}/{lock.FILE}", f"`{self.name}/{lock.FILE}` is out of date: {why}"
+                )
+            )
+
+    def _drifted(self, change: Change, why: str) -> Diagnostic:
+        path = f"{self.name}/{change.path}"
+        wrote = self.lock.outputs.get(change.path) if self.lock else None
+        if change.new is None:
+            message = f"`{path}` is no longer generated: {why}"
+        elif change.old is None:
+            message = f"`{path}` is missing" + (f": {why}" if wrote is None and why else "")
+        elif wrote is not None and lock.digest(change.old) != wrote:
+            message = f"`{path}` was edited since idlc wrote it"
+        elif wrote is None:
+            message = f"`{path}` was not written by idlc"
+        else:
+            message = f"`{path}` is out of date: {why}"
+        return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
+
+
+def record(
+    inputs: Mapping[str, str],
+    dependencies: Mapping[str, str],
+    types: Mapping[str, str],
+    changes: Plan,
+    package: str,
+    *,
+    vendor_deps: bool,
+    vendored: tuple[str, ...],
+) -> lock.Lock:
+    """Return the lock of a run."""
+    return lock.Lock(
+        idlc=__version__,
+        package=package,
+        vendor_deps=vendor_deps,
+        vendored=vendored,
+        inputs=dict(inputs),
+        dependencies=dict(dependencies),
+        types=dict(types),
+        outputs=changes.outputs,
+    )
+
+
+def _reasons(old: lock.Lock | None, new: lock.Lock) -> str:
+    """Say what differs between the last run and one now; empty if nothing does."""
+    if old is None:
+        return f"there is no {lock.FILE}"
+    found = []
+    if old.idlc != new.idlc:
+        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.package != new.package:
+        found.append(f"the package was called `{old.package}`")
+    for what, before, after in (
+        ("", old.inputs, new.inputs),
+        ("", old.dependencies, new.dependencies),
+    ):
+        found += [f"{what}`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        found += [f"{what}`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        common = sorted(before.keys() & after.keys())
+        found += [f"{what}`{name}` changed" for name in common if before[name] != after[name]]
+    shown = ", ".join(found[:3])
+    return f"{shown} and {len(found) - 3} more" if len(found) > 3 else shown
