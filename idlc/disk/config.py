@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from idlc.disk.read import decode, read_bytes, shown
 from idlc.text import codes
 from idlc.text.source import Source, Span
+from idlc.text.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from idlc.text.diagnostics import Diagnostic, Report
@@ -116,12 +117,8 @@ def _fits(value: object, shape: str) -> bool:
 
 
 def _close(key: str) -> str:
-    from difflib import get_close_matches
-
-    close = get_close_matches(str(key), _SHAPES, n=1)
-    if close:
-        return f"did you mean `{close[0]}`?"
-    return f"the settings are {', '.join(f'`{known}`' for known in _SHAPES)}"
+    settings = ", ".join(f"`{known}`" for known in _SHAPES)
+    return did_you_mean(str(key), _SHAPES) or f"the settings are {settings}"
 
 
 def _typed(folder: Path, path: str) -> str:

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from idlc.disk.read import kind_of, unreadable
+from idlc.disk.read import absolute, kind_of, unreadable
 from idlc.text import codes
+from idlc.text.suggest import closest
 
 if TYPE_CHECKING:
     from idlc.model.ir import Kind
@@ -35,7 +36,7 @@ class InterfaceFile(NamedTuple):
     @property
     def root(self) -> Path:
         """The folder that holds the msg/, srv/ and action/ folders, or the file's own folder."""
-        folder = Path(os.path.abspath(self.path)).parent
+        folder = absolute(self.path).parent
         return folder.parent if folder.name in KIND_FOLDERS else folder
 
     @property
@@ -44,12 +45,17 @@ class InterfaceFile(NamedTuple):
         return f"{self.kind}/{self.name}.{self.kind}"
 
 
+def is_path(text: str) -> bool:
+    """Whether a word on the command line means a path rather than a type."""
+    return Path(text).suffix in KINDS or text.count("/") not in (1, 2) or os.path.lexists(text)
+
+
 def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
     """Return the interface files that paths mean, each once, sorted.
 
     A folder means every interface file below it. Reports IDL601, IDL602, IDL605 and IDL606.
     """
-    found: dict[str, InterfaceFile] = {}
+    found: dict[Path, InterfaceFile] = {}
     for given in paths:
         known = len(found)
         mute = False
@@ -57,7 +63,7 @@ def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
             if file is None:
                 mute = True
             else:
-                found.setdefault(os.path.abspath(file.path), file)
+                found.setdefault(absolute(file.path), file)
         if len(found) == known and not mute:
             report.add(
                 codes.NO_INTERFACES.of(
@@ -98,14 +104,12 @@ def _interface(path: Path, given: str) -> InterfaceFile:
 
 
 def _similar(path: Path) -> str | None:
-    from difflib import get_close_matches
-
     try:
-        names = [entry.name for entry in path.parent.iterdir()]
+        names = sorted(entry.name for entry in path.parent.iterdir())
     except (OSError, ValueError):
         return None
-    close = get_close_matches(path.name, names, n=1)
-    return f"did you mean `{(path.parent / close[0]).as_posix()}`?" if close else None
+    close = closest(path.name, names)
+    return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
 
 
 def walk(folder: Path, report: Report) -> Iterator[Path]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from idlc import __version__
@@ -43,7 +43,7 @@ def unchanged(
     )
 
 
-def dependencies(names: list[TypeName], library: Library) -> dict[str, str]:
+def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
     """Return the digests by which interfaces of other packages are recorded."""
     return {str(name): _dependency(str(name), library) for name in names}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import keyword
 import os
-import re
 from collections.abc import Iterable, Mapping
 from importlib.machinery import BuiltinImporter, FrozenImporter
 from pathlib import Path
@@ -14,11 +13,10 @@ from idlc.disk.find import InterfaceFile
 from idlc.disk.lock import digest
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import decode, read_bytes, shown
+from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 from idlc.text.source import Source
-
-_NAME = re.compile(r"[a-z](_?[a-z0-9])*")
 
 
 class Input(NamedTuple):
@@ -45,9 +43,9 @@ class Inputs(NamedTuple):
         return {one.file.key: digest(one.data) for one in self.files}
 
     @property
-    def own(self) -> dict[str, list[Path]]:
+    def own(self) -> dict[str, tuple[Path, ...]]:
         """Where a library finds the package's other files."""
-        return {self.package: list(self.folders)}
+        return {self.package: self.folders}
 
 
 def _home(file: InterfaceFile) -> Path:
@@ -95,17 +93,21 @@ def packages(
     if package is not None:
         return (_load(package, files, report),)
     return tuple(
-        _load(_name(home, report) or home.name, own, report) for home, own in _by_home(files).items()
+        _load(_name(home, report) or home.name, own, report)
+        for home, own in _by_home(files).items()
     )
 
 
 def one_package(
     files: tuple[InterfaceFile, ...], package: str | None, out: str, report: Report
-) -> Inputs:
+) -> Inputs | None:
     """Return all files as one package, named by `package`, the package.xml or OUT's folder.
 
-    Reports IDL607 for a name that cannot be imported and IDL608 for several packages.
+    Returns `None` without files, and after IDL607 for a name that cannot be imported.
+    Reports IDL608 for several packages.
     """
+    if not files:
+        return None
     homes = _by_home(files)
     origin = "--package"
     if package is None:
@@ -115,7 +117,8 @@ def one_package(
     if package is None:
         package = Path(os.path.abspath(out)).name
         origin = "the folder given with -o"
-    _reject_name(package, origin, report)
+    if not _accept_name(package, origin, report):
+        return None
     return _load(package, files, report)
 
 
@@ -141,14 +144,15 @@ def _reject_several(homes: Mapping[Path, list[InterfaceFile]], report: Report) -
     )
 
 
-def _reject_name(name: str, origin: str, report: Report) -> None:
-    if not _NAME.fullmatch(name):
+def _accept_name(name: str, origin: str, report: Report) -> bool:
+    if not is_package_name(name):
         what = "is not a package name: lower-case letters, digits and single underscores"
     elif keyword.iskeyword(name):
         what = "is a keyword of Python and cannot be imported"
     elif FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
         what = "is a module of Python itself, which would be imported instead"
     else:
-        return
+        return True
     hint = "choose another name with --package NAME"
-    report.add(codes.PACKAGE_NAME.of("", f"`{name}` (from {origin}) {what}", hint=hint))
+    report.add(codes.UNIMPORTABLE.of("", f"`{name}` (from {origin}) {what}", hint=hint))
+    return False

@@ -137,7 +137,7 @@ class Library:
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
-        return tuple(sorted(on_disk or catalog.interfaces(package)))
+        return tuple(sorted(on_disk or [n for n in catalog.interfaces() if n.package == package]))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, in the first place that has any."""

@@ -30,8 +30,8 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
 
     `inputs` are the compiled files by name within the package, `dependencies` the other
     interfaces that were read, by full name, `outputs` the files written, by path below the
-    lock: each with a SHA-256. `types` are the package's type hashes. `vendored` are the
-    packages written beside this one.
+    lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
+    other packages that the generated code needs, `vendored` the packages written beside it.
     """
 
     format: int = FORMAT
@@ -39,6 +39,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     package: str
     vendor_deps: bool = False
     vendored: tuple[str, ...] = ()
+    imports: tuple[str, ...] = ()
     inputs: dict[str, str]
     dependencies: dict[str, str]
     types: dict[str, str]

@@ -7,6 +7,7 @@ are opened, so that no pipe or device can hold the run up.
 from __future__ import annotations
 
 import errno
+import os
 import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,11 @@ _SPECIAL = {
 }
 
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"))
+
+
+def absolute(path: str | Path) -> Path:
+    """Return a path from the root, without `..` and with links as they are."""
+    return Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
 
 
 def shown(path: Path) -> str:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from functools import cached_property
 from importlib.machinery import PathFinder
 from pathlib import Path
 
-from idlc import __version__
 from idlc.disk import fresh, lock, write
-from idlc.disk.inputs import Inputs
 from idlc.disk.library import Library
 from idlc.disk.plan import Change, Obstacle, Plan, plan, state
 from idlc.text import codes
@@ -56,6 +55,17 @@ class Target:
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
 
+    def missing(self) -> list[str]:
+        """Return the packages that the generated code needs and this Python cannot import."""
+        modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
+        return sorted({package for package, kind in modules if not self._finds(package, kind)})
+
+    def _finds(self, package: str, kind: str) -> bool:
+        """Whether a package can be imported, found without importing, or lies next to this one."""
+        spec = PathFinder.find_spec(package, sys.path)
+        places = [*((spec and spec.submodule_search_locations) or ()), self._path.parent / package]
+        return any((Path(place) / kind / "__init__.py").is_file() for place in places)
+
     def plan(self, files: Mapping[str, str]) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not."""
         content = {path: text.encode("utf-8") for path, text in files.items()}
@@ -64,6 +74,7 @@ class Target:
 
     def apply(self, changes: Plan, record: lock.Lock) -> bool:
         """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        self.lock = record
         return write.apply(changes, lock.encode(record), self.name, self._report)
 
     def drift(self, changes: Plan, record: lock.Lock) -> None:
@@ -92,29 +103,6 @@ class Target:
         else:
             message = f"`{path}` is out of date: {why}"
         return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
-
-
-def record(
-    inputs: Mapping[str, str],
-    dependencies: Mapping[str, str],
-    types: Mapping[str, str],
-    changes: Plan,
-    package: str,
-    *,
-    vendor_deps: bool,
-    vendored: tuple[str, ...],
-) -> lock.Lock:
-    """Return the lock of a run."""
-    return lock.Lock(
-        idlc=__version__,
-        package=package,
-        vendor_deps=vendor_deps,
-        vendored=vendored,
-        inputs=dict(inputs),
-        dependencies=dict(dependencies),
-        types=dict(types),
-        outputs=changes.outputs,
-    )
 
 
 def _reasons(old: lock.Lock | None, new: lock.Lock) -> str:

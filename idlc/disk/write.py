@@ -197,5 +197,3 @@ def _suffixes() -> Iterator[str]:
     while True:
         yield f".bak{number}"
         number += 1
-
-

@@ -101,7 +101,7 @@ NOT_TEXT = Code("IDL603", "not-text", ERROR)
 TOO_LARGE = Code("IDL604", "too-large", ERROR)
 NOT_AN_INTERFACE = Code("IDL605", "not-an-interface", ERROR)
 NO_INTERFACES = Code("IDL606", "no-interfaces", ERROR)
-PACKAGE_NAME = Code("IDL607", "package-name", ERROR)
+UNIMPORTABLE = Code("IDL607", "unimportable-package", ERROR)
 SEVERAL_PACKAGES = Code("IDL608", "several-packages", ERROR)
 DUPLICATE_INTERFACE = Code("IDL609", "duplicate-interface", ERROR)
 BAD_PACKAGE_XML = Code("IDL610", "bad-package-xml", ERROR)
@@ -124,7 +124,7 @@ USAGE: frozenset[str] = frozenset(
         NO_SUCH_PATH,
         NOT_AN_INTERFACE,
         NO_INTERFACES,
-        PACKAGE_NAME,
+        UNIMPORTABLE,
         SEVERAL_PACKAGES,
         BAD_PACKAGE_XML,
         BAD_CONFIG,

@@ -8,6 +8,7 @@ from __future__ import annotations
 from importlib.resources import files
 
 from idlc.text.codes import CODES
+from idlc.text.suggest import closest
 
 SECTIONS = ("## Why", "## Bad", "## Good")
 
@@ -21,10 +22,10 @@ def page(code: str) -> str | None:
     return path.read_text(encoding="utf-8") if path.is_file() else None
 
 
-def close_codes(code: str) -> list[str]:
-    """Return codes that `code` may stand for: a slug, digits alone, or a near miss."""
-    from difflib import get_close_matches
-
+def close_code(code: str) -> str | None:
+    """Return the code that `code` may stand for: a slug, digits alone, or a near miss."""
     word = code.lower().removeprefix("idl").strip("-_ ")
-    exact = [known.id for known in CODES.values() if word in (known.slug, known.id[3:])]
-    return exact or get_close_matches(code.upper(), sorted(CODES), n=3, cutoff=0.6)
+    for known in CODES.values():
+        if word in (known.slug, known.id[3:]):
+            return known.id
+    return closest(code.upper(), CODES) or closest(word, (known.slug for known in CODES.values()))
