@@ -24,8 +24,7 @@ def colours(stream: TextIO) -> bool:
 def show(report: Report, style: str, stream: TextIO) -> None:
     """Write every problem to a stream, as text or as JSON lines."""
     blocks = present.json_lines(report) if style == "json" else _spaced(report, stream)
-    for block in blocks:
-        stream.write(block)
+    stream.writelines(blocks)
 
 
 def _spaced(report: Report, stream: TextIO) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import keyword
-import os
 from collections.abc import Iterable, Mapping
 from importlib.machinery import BuiltinImporter, FrozenImporter
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import NamedTuple
 from idlc.disk.find import InterfaceFile
 from idlc.disk.lock import digest
 from idlc.disk.package import declared_name, manifest
-from idlc.disk.read import decode, read_bytes, shown
+from idlc.disk.read import absolute, decode, read_bytes, shown
 from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Report
@@ -115,7 +114,7 @@ def one_package(
         package = next((name for home in homes if (name := _name(home, report))), None)
         origin = "package.xml"
     if package is None:
-        package = Path(os.path.abspath(out)).name
+        package = absolute(out).name
         origin = "the folder given with -o"
     if not _accept_name(package, origin, report):
         return None

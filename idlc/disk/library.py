@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idlc.model import catalog, ir
+from idlc.disk import surroundings
 from idlc.disk.find import KIND_FOLDERS, KINDS, walk
 from idlc.disk.package import declared_name, manifest
-from idlc.disk.read import read_source, shown
+from idlc.disk.read import absolute, read_source, shown
+from idlc.model import catalog, ir
 
 if TYPE_CHECKING:
     from idlc.text.diagnostics import Report
@@ -22,17 +21,11 @@ if TYPE_CHECKING:
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
-def ament_prefixes() -> tuple[Path, ...]:
-    """Return the folders that ROS packages are installed in, in order of precedence."""
-    listed = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
-    return tuple(dict.fromkeys(Path(prefix) for prefix in (*listed, sys.prefix) if prefix))
-
-
 class Folder:
     """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
 
     def __init__(self, path: str | Path) -> None:
-        self._path = Path(os.path.abspath(path))
+        self._path = absolute(path)
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
@@ -41,7 +34,7 @@ class Folder:
             for root in (self._path / package, self._path / "share" / package)
             if _has_interfaces(root)
         ]
-        yield from direct or self._packages.get(package, ())
+        yield from direct or self._packages.get(package, [])
 
     def packages(self) -> Iterable[str]:
         """Return the names of the packages found in it."""
@@ -102,7 +95,10 @@ class Library:
         own: Mapping[str, Sequence[Path]] | None = None,
     ) -> None:
         places = [Folder(path) for path in folders]
-        self._places: tuple[Folder | Prefix, ...] = (*places, *map(Prefix, ament_prefixes()))
+        self._places: tuple[Folder | Prefix, ...] = (
+            *places,
+            *map(Prefix, surroundings.ament_prefixes()),
+        )
         self._own = own or {}
         self._report = report
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from functools import cached_property
-from importlib.machinery import PathFinder
 from pathlib import Path
 
-from idlc.disk import fresh, lock, write
+from idlc.disk import fresh, surroundings, write
 from idlc.disk.library import Library
-from idlc.disk.plan import Change, Obstacle, Plan, plan, state
+from idlc.disk.lock import FILE, Lock, digest, encode, load
+from idlc.disk.plan import Change, Plan, plan
+from idlc.disk.read import absolute
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 
@@ -22,19 +22,19 @@ class Target:
     def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
         self.name = name
         self.package = package
-        self._path = Path(os.path.abspath(name))
-        self._report = report
+        self._path = absolute(name)
+        self.report = report
         self._force = force
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(name, package, self._report, force=self._force)
+        return Target(name, package, self.report, force=self._force)
 
     @cached_property
-    def lock(self) -> lock.Lock | None:
+    def lock(self) -> Lock | None:
         """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
-        return lock.load(self._path, self.name, Report() if self._force else self._report)
+        return load(self._path, self.name, Report() if self._force else self.report)
 
     def usable(self) -> bool:
         """Whether this is or can become a folder; reports IDL612."""
@@ -43,7 +43,7 @@ class Target:
                 return True
             if os.path.lexists(path):
                 message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
-                self._report.add(codes.CANNOT_WRITE.of(self.name, message))
+                self.report.add(codes.CANNOT_WRITE.of(self.name, message))
                 return False
         return False
 
@@ -62,31 +62,31 @@ class Target:
 
     def _finds(self, package: str, kind: str) -> bool:
         """Whether a package can be imported, found without importing, or lies next to this one."""
-        spec = PathFinder.find_spec(package, sys.path)
-        places = [*((spec and spec.submodule_search_locations) or ()), self._path.parent / package]
-        return any((Path(place) / kind / "__init__.py").is_file() for place in places)
+        places = [*surroundings.python_folders(package), self._path.parent / package]
+        return any((place / kind / "__init__.py").is_file() for place in places)
 
-    def plan(self, files: Mapping[str, str]) -> Plan | None:
-        """Return the changes that make the folder hold `files`; `None` if it must not."""
+    def plan(self, files: Mapping[str, str], *, check: bool = False) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not.
+
+        With `check` the changes are only to be looked at, and edited files are among them.
+        """
         content = {path: text.encode("utf-8") for path, text in files.items()}
         owned = write.owned(self._path, self.lock)
-        return plan(self._path, self.name, content, owned, self._report, force=self._force)
+        return plan(self._path, self.name, content, owned, self.report, force=check or self._force)
 
-    def apply(self, changes: Plan, record: lock.Lock) -> bool:
+    def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
         self.lock = record
-        return write.apply(changes, lock.encode(record), self.name, self._report)
+        return write.apply(changes, encode(record), self.name, self.report)
 
-    def drift(self, changes: Plan, record: lock.Lock) -> None:
+    def drift(self, changes: Plan, record: Lock) -> None:
         """Report IDL616 for each file that is not what a run would write."""
         why = _reasons(self.lock, record)
         for change in changes.changes:
-            self._report.add(self._drifted(change, why))
+            self.report.add(self._drifted(change, why))
         if not changes.changes and (self.lock is None or why):
-            self._report.add(
-                codes.DRIFT.of(
-                    f"{self.name}/{lock.FILE}", f"`{self.name}/{lock.FILE}` is out of date: {why}"
-                )
+            self.report.add(
+                codes.DRIFT.of(f"{self.name}/{FILE}", f"`{self.name}/{FILE}` is out of date: {why}")
             )
 
     def _drifted(self, change: Change, why: str) -> Diagnostic:
@@ -96,7 +96,7 @@ class Target:
             message = f"`{path}` is no longer generated: {why}"
         elif change.old is None:
             message = f"`{path}` is missing" + (f": {why}" if wrote is None and why else "")
-        elif wrote is not None and lock.digest(change.old) != wrote:
+        elif wrote is not None and digest(change.old) != wrote:
             message = f"`{path}` was edited since idlc wrote it"
         elif wrote is None:
             message = f"`{path}` was not written by idlc"
@@ -105,10 +105,10 @@ class Target:
         return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
 
 
-def _reasons(old: lock.Lock | None, new: lock.Lock) -> str:
+def _reasons(old: Lock | None, new: Lock) -> str:
     """Say what differs between the last run and one now; empty if nothing does."""
     if old is None:
-        return f"there is no {lock.FILE}"
+        return f"there is no {FILE}"
     found = []
     if old.idlc != new.idlc:
         found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")

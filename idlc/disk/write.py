@@ -140,7 +140,7 @@ class _Transaction:
                 target.unlink()
             else:
                 self._make_folder(target.parent)
-                os.replace(self._stage / str(number), target)
+                (self._stage / str(number)).replace(target)
             self._done.append((change.path, change.old))
         self.current = ""
         self._remove_empty(changes)
@@ -180,7 +180,7 @@ class _Transaction:
                     spare = self._stage / "old"
                     spare.write_bytes(old)
                     target.parent.mkdir(parents=True, exist_ok=True)
-                    os.replace(spare, target)
+                    spare.replace(target)
             except OSError:
                 torn.append(path)
         if not torn:

@@ -15,7 +15,7 @@ from idlc.disk.target import Target
 from idlc.driver.stages import compile_package, derived_names, sources_of, stage
 from idlc.model import derive, ir
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Report, Severity
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -68,20 +68,25 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
             _note_missing(target, report)
             return current
     model = compile_package(given.package, sources_of(given, report), library, report)
-    if report.had_errors:
-        return ()
-    vendored = _vendored(model, target, library, report) if options.vendor_deps else []
-    own = _package(model, target, given.digests, library, options.vendor_deps, vendored)
-    packages = [one for one in (own, *vendored) if one]
-    if report.had_errors:
-        return ()
+    packages = [] if report.had_errors else _planned(model, target, given, library, options)
     if options.check:
         for one in packages:
             one.target.drift(one.plan, one.lock)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
-    _note_missing(target, report)
+    if packages:
+        _note_missing(target, report)
     return tuple(_generated(one) for one in packages)
+
+
+def _planned(
+    model: Model, target: Target, given: inputs.Inputs, library: Library, options: GenOptions
+) -> list[Package]:
+    """Return a sound model, and what it vendors, ready to be written; empty if any must not be."""
+    vendored = _vendored(model, target, library, options) if options.vendor_deps else []
+    own = _package(model, target, given.digests, library, options, vendored)
+    found = [own, *vendored]
+    return [] if None in found else [one for one in found if one]
 
 
 def _current(
@@ -114,8 +119,8 @@ def _package(
     target: Target,
     digests: dict[str, str],
     library: Library,
-    vendor_deps: bool = False,
-    vendored: Sequence[Package] = (),
+    options: GenOptions,
+    vendored: Sequence[Package | None] | None = None,
 ) -> Package | None:
     """Return a sound model rendered and compared with what is on disk."""
     from idlc.emit.render import render_package
@@ -126,7 +131,7 @@ def _package(
         if path.endswith(".py"):
             with stage("compile", f"{target.name}/{path}"):
                 compile(text, path, "exec", dont_inherit=True)
-    plan = target.plan(files)
+    plan = target.plan(files, check=options.check)
     if plan is None:
         return None
     others = [n for n in model.interfaces if f"{n.kind}/{n.name}.{n.kind}" not in digests]
@@ -136,8 +141,8 @@ def _package(
         lock.Lock(
             idlc=__version__,
             package=model.package,
-            vendor_deps=vendor_deps,
-            vendored=tuple(one.target.package for one in vendored),
+            vendor_deps=options.vendor_deps and vendored is not None,
+            vendored=tuple(one.target.package for one in vendored or () if one),
             imports=_imports(model),
             inputs=digests,
             dependencies=dependencies(others, library),
@@ -159,21 +164,32 @@ def _imports(model: Model) -> tuple[str, ...]:
     return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))
 
 
-def _vendored(model: Model, target: Target, library: Library, report: Report) -> list[Package]:
-    """Return every package that a model depends on, whole, ready to be written beside it."""
-    found: dict[str, Package | None] = {model.package: None}
-    waiting = {name.package for name in model.interfaces}
-    while waiting := waiting - found.keys():
+def _vendored(
+    model: Model, target: Target, library: Library, options: GenOptions
+) -> list[Package | None]:
+    """Return every package that a model depends on, whole, to be written beside it."""
+    found: dict[str, Package | None] = {}
+    waiting = _needed(model)
+    while waiting := waiting - found.keys() - {model.package}:
         package = min(waiting)
         names = library.interfaces(package)
         sources = [(name, source) for name in names if (source := library.source(name))]
+        report = Report()
         whole = compile_package(package, sources, library, report)
-        if report.had_errors:
-            return []
+        target.report.extend(one for one in report if one.severity is Severity.ERROR)
         digests = _as_inputs(names, library)
-        found[package] = _package(whole, target.beside(package), digests, library)
-        waiting |= {name.package for name in whole.interfaces}
-    return [found[package] for package in sorted(found) if found[package]]
+        beside = target.beside(package)
+        if report.had_errors:
+            return [None]
+        found[package] = _package(whole, beside, digests, library, options)
+        waiting |= _needed(whole)
+    return [found[package] for package in sorted(found)]
+
+
+def _needed(model: Model) -> set[str]:
+    """Return the packages that a model's generated code may import, its own included."""
+    implied = {package for own in model.own for package in derive.IMPLICIT_PACKAGES[own.name.kind]}
+    return implied | {name.package for name in model.interfaces}
 
 
 def _note_missing(target: Target, report: Report) -> None:

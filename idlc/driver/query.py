@@ -63,7 +63,9 @@ def _wanted(
     library = Library(include, report)
     for one in wanted:
         if one not in paths:
-            yield from _named(one, library, report)
+            found = Report()
+            yield from _named(one, library, found)
+            report.extend(found)
     if paths:
         files = find(paths, report)
         for model, names in models_of(inputs.packages(files, package, report), include, report):

@@ -18,10 +18,8 @@ def visible(text: str, column: int = 0) -> str:
         return text
     parts: list[str] = []
     for character in text:
-        if character == "\t":
-            part = " " * (TAB_STOP - column % TAB_STOP)
-        else:
-            part = _spelled(character)
+        tab = " " * (TAB_STOP - column % TAB_STOP)
+        part = tab if character == "\t" else _spelled(character)
         parts.append(part)
         column += display_width(part)
     return "".join(parts)
