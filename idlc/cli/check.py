@@ -6,11 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options, terminal
-from idlc.disk import config
-from idlc.driver.query import check
-from idlc.text.diagnostics import Report
-from idlc.text.present import counted, summary
+from idlc.cli import options
 
 EPILOG = """\
 Example:
@@ -35,6 +31,12 @@ def command(
     PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
     or .action file; without it, `paths` in pyproject.toml, or the working folder.
     """
+    from idlc.cli import terminal
+    from idlc.disk import config
+    from idlc.driver.query import check
+    from idlc.text.diagnostics import Report
+    from idlc.text.present import counted, summary
+
     report = Report()
     settings = config.load(report)
     files = 0

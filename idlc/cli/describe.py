@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 
 import click
 
-from idlc.cli import options, terminal
-from idlc.driver.query import describe
-from idlc.text.diagnostics import Report
+from idlc.cli import options
 
 EPILOG = """\
 Example:
@@ -25,6 +22,12 @@ Example:
 @options.include
 def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:
     """Print a type description with its hashes: the JSON that ROS 2 installs."""
+    import json
+
+    from idlc.cli import terminal
+    from idlc.driver.query import describe
+    from idlc.text.diagnostics import Report
+
     report = Report()
     content = describe(wanted, package, include, report)
     if content is not None:

@@ -6,10 +6,6 @@ import sys
 
 import click
 
-from idlc.cli import terminal
-from idlc.text.codes import CODES
-from idlc.text.pages import close_code, page
-
 EPILOG = """\
 Example:
 
@@ -22,6 +18,10 @@ Example:
 @click.argument("code", metavar="CODE")
 def command(code: str) -> int:
     """Explain a code: what it means, why, an example that triggers it and one that is right."""
+    from idlc.cli import terminal
+    from idlc.text.codes import CODES
+    from idlc.text.pages import close_code, page
+
     text = page(code)
     if text is None:
         close = close_code(code)

@@ -6,9 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options, terminal
-from idlc.driver.query import hashes
-from idlc.text.diagnostics import Report
+from idlc.cli import options
 
 EPILOG = """\
 Example:
@@ -27,6 +25,10 @@ def command(wanted: tuple[str, ...], package: str | None, include: tuple[str, ..
 
     TYPE is a name such as std_msgs/msg/Header, PATH a file or folder as for `idlc gen`.
     """
+    from idlc.cli import terminal
+    from idlc.driver.query import hashes
+    from idlc.text.diagnostics import Report
+
     report = Report()
     for value, name in hashes(wanted, package, include, report):
         sys.stdout.write(f"{value}  {name}\n")

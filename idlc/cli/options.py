@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
-from idlc.cli.terminal import FORMATS
+FORMATS = ("text", "json")
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

@@ -9,8 +9,6 @@ from typing import TextIO
 from idlc.text import codes, present
 from idlc.text.diagnostics import Report, Severity
 
-FORMATS = ("text", "json")
-
 
 def colours(stream: TextIO) -> bool:
     """Whether to colour what goes to a stream: on a terminal, unless the user says otherwise."""

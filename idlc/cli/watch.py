@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 
+from idlc.cli.generate import once
 from idlc.disk.watch import snapshot
 from idlc.driver.gen import GenOptions
 
 INTERVAL = 0.25
 
 
-def watch(wanted: GenOptions, run: Callable[[], int]) -> int:
+def run_again(wanted: GenOptions, style: str) -> int:
     """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
     try:
         seen = snapshot(wanted.paths, wanted.include)
-        run()
+        once(wanted, style)
         sys.stderr.write(f"watching {', '.join(wanted.paths)}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
@@ -28,7 +28,7 @@ def watch(wanted: GenOptions, run: Callable[[], int]) -> int:
             while (later := _after(wanted)) != now:
                 now = later
             seen = now
-            run()
+            once(wanted, style)
     except KeyboardInterrupt:
         sys.stderr.write("\n")
         return 0

@@ -57,13 +57,10 @@ def _dependency(name: str, library: Library) -> str:
 
 
 def _outputs_stand(out: Path, lock: Lock) -> bool:
-    try:
-        for path, expected in lock.outputs.items():
-            content = state(out, path)
-            if content is None or isinstance(content, Obstacle) or digest(content) != expected:
-                return False
-    except OSError:
-        return False
+    for path, expected in lock.outputs.items():
+        content = state(out, path)
+        if content is None or isinstance(content, Obstacle) or digest(content) != expected:
+            return False
     return True
 
 

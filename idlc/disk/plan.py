@@ -42,7 +42,7 @@ class Plan(NamedTuple):
 
 
 class Obstacle(NamedTuple):
-    """Something in the way of a file: a link, or a folder where the file belongs."""
+    """Something in the way of a file: a link, a folder where it belongs, what cannot be read."""
 
     what: str
 
@@ -50,7 +50,7 @@ class Obstacle(NamedTuple):
 def state(out: Path, path: str) -> bytes | Obstacle | None:
     """Return a file's content, what else is there, or `None` for nothing.
 
-    Links are never followed below `out`. Raises OSError if it cannot be read.
+    Links are never followed below `out`.
     """
     here = out
     parts = PurePosixPath(path).parts
@@ -60,13 +60,18 @@ def state(out: Path, path: str) -> bytes | Obstacle | None:
             mode = here.lstat().st_mode
         except FileNotFoundError:
             return None
+        except OSError as error:
+            return Obstacle(f"`{path}` cannot be read: {reason(error)}")
         if stat.S_ISLNK(mode):
             return Obstacle(f"`{PurePosixPath(*parts[:number])}` is a symbolic link")
         wanted = stat.S_ISREG if number == len(parts) else stat.S_ISDIR
         if not wanted(mode):
             what = "a file" if stat.S_ISREG(mode) else kind_of(mode)
             return Obstacle(f"`{PurePosixPath(*parts[:number])}` is {what}")
-    return here.read_bytes()
+    try:
+        return here.read_bytes()
+    except OSError as error:
+        return Obstacle(f"`{path}` cannot be read: {reason(error)}")
 
 
 def plan(
@@ -82,7 +87,7 @@ def plan(
 
     `owned` are the files that idlc wrote and the digests that it gave them. A file that is not
     owned, or was edited since, is only replaced with `force`. `name` is how messages call `out`.
-    Reports IDL612, IDL613 and IDL614.
+    Reports IDL613 and IDL614.
     """
     changes: list[Change] = []
     refused: list[Diagnostic] = []
@@ -90,12 +95,7 @@ def plan(
     stale = [path for path in owned if path not in files and path != FILE]
     for path in (*files, *sorted(stale)):
         new = files.get(path)
-        try:
-            old = state(out, path)
-        except OSError as error:
-            message = f"cannot read `{name}/{path}`: {reason(error)}"
-            refused.append(codes.CANNOT_WRITE.of(f"{name}/{path}", message))
-            continue
+        old = state(out, path)
         if isinstance(old, Obstacle):
             if new is not None:
                 refused.append(_in_the_way(name, path, old))
@@ -117,7 +117,7 @@ def plan(
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
     return codes.FOREIGN_FILE.of(
         f"{name}/{path}",
-        f"cannot write `{name}/{path}`: {obstacle.what}, which idlc did not make",
+        f"cannot write `{name}/{path}`: {obstacle.what}",
         hint="move it away, or choose another folder with -o",
     )
 

@@ -81,21 +81,26 @@ class Target:
 
     def drift(self, changes: Plan, record: Lock) -> None:
         """Report IDL616 for each file that is not what a run would write."""
-        why = _reasons(self.lock, record)
+        if self.lock is None:
+            message = f"there is no {FILE} in `{self.name}`, so nothing can be compared"
+            self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
+            return
+        why = _reasons(self.lock, record) or "idlc itself changed"
         for change in changes.changes:
-            self.report.add(self._drifted(change, why))
-        if not changes.changes and (self.lock is None or why):
+            self.report.add(self._drifted(change, self.lock, why))
+        # a dependency found elsewhere that compiles to the same is no drift
+        if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
             self.report.add(
                 codes.DRIFT.of(f"{self.name}/{FILE}", f"`{self.name}/{FILE}` is out of date: {why}")
             )
 
-    def _drifted(self, change: Change, why: str) -> Diagnostic:
+    def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
         path = f"{self.name}/{change.path}"
-        wrote = self.lock.outputs.get(change.path) if self.lock else None
+        wrote = old.outputs.get(change.path)
         if change.new is None:
             message = f"`{path}` is no longer generated: {why}"
         elif change.old is None:
-            message = f"`{path}` is missing" + (f": {why}" if wrote is None and why else "")
+            message = f"`{path}` is missing" + ("" if wrote else f": {why}")
         elif wrote is not None and digest(change.old) != wrote:
             message = f"`{path}` was edited since idlc wrote it"
         elif wrote is None:
@@ -105,22 +110,20 @@ class Target:
         return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
 
 
-def _reasons(old: Lock | None, new: Lock) -> str:
+def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     """Say what differs between the last run and one now; empty if nothing does."""
-    if old is None:
-        return f"there is no {FILE}"
+    pairs = [(old.inputs, new.inputs)]
+    if dependencies:
+        pairs.append((old.dependencies, new.dependencies))
     found = []
     if old.idlc != new.idlc:
         found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
     if old.package != new.package:
         found.append(f"the package was called `{old.package}`")
-    for what, before, after in (
-        ("", old.inputs, new.inputs),
-        ("", old.dependencies, new.dependencies),
-    ):
-        found += [f"{what}`{name}` was added" for name in sorted(after.keys() - before.keys())]
-        found += [f"{what}`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+    for before, after in pairs:
+        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
         common = sorted(before.keys() & after.keys())
-        found += [f"{what}`{name}` changed" for name in common if before[name] != after[name]]
+        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
     shown = ", ".join(found[:3])
     return f"{shown} and {len(found) - 3} more" if len(found) > 3 else shown
