@@ -17,6 +17,11 @@ from idlc.text import codes
 from idlc.text.diagnostics import Report
 from idlc.text.source import Source
 
+#: Modules that a starting Python has loaded, frozen or not, before it looks anywhere else.
+_LOADED = frozenset(
+    ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
+)
+
 
 class Input(NamedTuple):
     """An input file and its bytes."""
@@ -148,7 +153,7 @@ def _accept_name(name: str, origin: str, report: Report) -> bool:
         what = "is not a package name: lower-case letters, digits and single underscores"
     elif keyword.iskeyword(name):
         what = "is a keyword of Python and cannot be imported"
-    elif FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
+    elif name in _LOADED or FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
         what = "is a module of Python itself, which would be imported instead"
     else:
         return True

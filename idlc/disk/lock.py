@@ -109,7 +109,7 @@ def _bad(shown: str, why: str) -> Diagnostic:
     newer = "newer" in why
     return codes.BAD_LOCK.of(
         shown,
-        f"`{shown}` cannot be used: {one_line(why[:1].lower() + why[1:])}",
+        f"`{shown}` cannot be used: {one_line(why)}",
         hint="upgrade idlc"
         if newer
         else "restore it from version control, or run again with --force, which keeps a copy "

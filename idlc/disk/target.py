@@ -82,6 +82,8 @@ class Target:
     def drift(self, changes: Plan, record: Lock) -> None:
         """Report IDL616 for each file that is not what a run would write."""
         if self.lock is None:
+            if self.report.had_errors:
+                return
             message = f"there is no {FILE} in `{self.name}`, so nothing can be compared"
             self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
             return
