@@ -76,7 +76,7 @@ def tried(code: str, title: str, tmp_path: Path) -> str:
 
 
 @pytest.mark.parametrize("code", sorted(set(CODES) - NOT_ON_DEMAND))
-def test_every_page_shows_how_to_get_the_code_and_how_to_avoid_it(code, tmp_path, monkeypatch):
+def test_every_page_shows_how_to_get_the_code_and_how_to_avoid_it(code, tmp_path):
     (tmp_path / "bad").mkdir()
     (tmp_path / "good").mkdir()
     bad = tried(code, "Bad", tmp_path / "bad")

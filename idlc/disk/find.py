@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from idlc.disk.package import manifest
 from idlc.disk.read import absolute, kind_of, unreadable
 from idlc.text import codes
 from idlc.text.suggest import closest
@@ -55,16 +56,15 @@ def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
 
     A folder means every interface file below it. Reports IDL601, IDL602, IDL605 and IDL606.
     """
+    manifest.cache_clear()
     found: dict[Path, InterfaceFile] = {}
     for given in paths:
-        known = len(found)
-        mute = False
+        empty = True
         for file in _under(given, report):
-            if file is None:
-                mute = True
-            else:
+            empty = False
+            if file is not None:
                 found.setdefault(absolute(file.path), file)
-        if len(found) == known and not mute:
+        if empty:
             report.add(
                 codes.NO_INTERFACES.of(
                     given,

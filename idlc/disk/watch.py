@@ -6,13 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from idlc.disk.find import find
-from idlc.disk.package import MANIFEST, manifest
+from idlc.disk.package import MANIFEST
 from idlc.text.diagnostics import Report
 
 
 def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[int, int]]:
     """Return time and size of each input file, of its package.xml and of files along -I."""
-    manifest.cache_clear()
     files = [file.path for file in find((*paths, *include), Report())]
     manifests = {path.parent.parent / MANIFEST for path in files}
     found = {}
