@@ -35,10 +35,17 @@ class Code(NamedTuple):
             labels=labels,
         )
 
-    def of(self, path: str, message: str, *, hint: str | None = None) -> Diagnostic:
+    def of(
+        self, path: str, message: str, *, hint: str | None = None, detail: str = ""
+    ) -> Diagnostic:
         """Return a problem of this kind with a whole file or folder."""
         return Diagnostic(
-            code=self.id, severity=self.severity, message=message, path=path, hint=hint
+            code=self.id,
+            severity=self.severity,
+            message=message,
+            path=path,
+            hint=hint,
+            detail=detail,
         )
 
 
@@ -89,9 +96,43 @@ FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
+NO_SUCH_PATH = Code("IDL602", "no-such-path", ERROR)
+NOT_TEXT = Code("IDL603", "not-text", ERROR)
+TOO_LARGE = Code("IDL604", "too-large", ERROR)
+NOT_AN_INTERFACE = Code("IDL605", "not-an-interface", ERROR)
+NO_INTERFACES = Code("IDL606", "no-interfaces", ERROR)
+UNIMPORTABLE = Code("IDL607", "unimportable-package", ERROR)
+SEVERAL_PACKAGES = Code("IDL608", "several-packages", ERROR)
+DUPLICATE_INTERFACE = Code("IDL609", "duplicate-interface", ERROR)
+BAD_PACKAGE_XML = Code("IDL610", "bad-package-xml", ERROR)
+BAD_CONFIG = Code("IDL611", "bad-config", ERROR)
+CANNOT_WRITE = Code("IDL612", "cannot-write", ERROR)
+EDITED_FILE = Code("IDL613", "edited-file", ERROR)
+FOREIGN_FILE = Code("IDL614", "foreign-file", ERROR)
+BAD_LOCK = Code("IDL615", "bad-lock", ERROR)
+DRIFT = Code("IDL616", "drift", ERROR)
+NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
+NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
+
+#: Codes that blame the call or its surroundings rather than an interface file: exit status 2.
+USAGE: frozenset[str] = frozenset(
+    code.id
+    for code in (
+        NO_SUCH_PATH,
+        NOT_AN_INTERFACE,
+        NO_INTERFACES,
+        UNIMPORTABLE,
+        SEVERAL_PACKAGES,
+        BAD_PACKAGE_XML,
+        BAD_CONFIG,
+        CANNOT_WRITE,
+        BAD_LOCK,
+        NO_SUCH_TYPE,
+    )
+)
 
 #: All codes by id.
 CODES: dict[str, Code] = {

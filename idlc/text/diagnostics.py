@@ -33,6 +33,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
 
     `span` is the smallest guilty piece; a problem with a whole file or folder has none
     and names it in `path`. `hint` is something to do, in the imperative or as a question.
+    `detail` is preformatted text of several lines, such as a diff.
     """
 
     code: str
@@ -42,6 +43,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     path: str = ""
     labels: tuple[Label, ...] = ()
     hint: str | None = None
+    detail: str = ""
 
     @property
     def where(self) -> tuple[str, int]:

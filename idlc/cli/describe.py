@@ -1,0 +1,36 @@
+"""`idlc describe`."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from idlc.cli import options
+
+EPILOG = """\
+Example:
+
+\b
+  idlc describe std_msgs/msg/Header
+"""
+
+
+@click.command("describe", epilog=EPILOG)
+@click.argument("wanted", metavar="TYPE|PATH", type=click.Path())
+@options.package
+@options.include
+def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:
+    """Print a type description with its hashes: the JSON that ROS 2 installs."""
+    import json
+
+    from idlc.cli import terminal
+    from idlc.driver.query import describe
+    from idlc.text.diagnostics import Report
+
+    report = Report()
+    content = describe(wanted, package, include, report)
+    if content is not None:
+        sys.stdout.write(json.dumps(content, indent=2) + "\n")
+    terminal.show(report, "text", sys.stderr)
+    return terminal.status(report)

@@ -1,0 +1,68 @@
+"""`idlc gen`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import click
+
+from idlc.cli import options
+
+EPILOG = """\
+Example:
+
+\b
+  mkdir -p demo/msg
+  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
+  idlc gen demo -o out/demo
+
+All options can be kept in pyproject.toml:
+
+\b
+  [tool.idlc]
+  paths = ["demo"]
+  out = "out/demo"
+"""
+
+
+@click.command("gen", epilog=EPILOG)
+@click.argument("paths", metavar="PATH...", nargs=-1, type=click.Path())
+@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The package folder to write.")
+@options.package
+@options.include
+@click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
+@click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
+@click.option(
+    "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
+)
+@click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
+@options.style
+def command(style: str, watch: bool, **given: Any) -> int:
+    """Compile interface files into a Python package.
+
+    PATH is a package folder, a folder of interface files, or a .msg, .srv or .action file.
+    """
+    from idlc.cli import generate, terminal
+    from idlc.disk import config
+    from idlc.driver.gen import GenOptions
+    from idlc.text.diagnostics import Report
+
+    report = Report()
+    settings = config.load(report)
+    if report.had_errors:
+        terminal.show(report, style, sys.stdout if style == "json" else sys.stderr)
+        return terminal.status(report)
+    wanted = generate.completed(GenOptions(**given), settings)
+    if not wanted.paths or not wanted.out:
+        missing = "-o OUT" if wanted.paths else "PATH"
+        raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
+    if wanted.check and (watch or wanted.force):
+        raise click.UsageError(
+            "--check writes nothing, so it goes with neither --watch nor --force"
+        )
+    if watch:
+        from idlc.cli.watch import run_again
+
+        return run_again(wanted, style)
+    return generate.once(wanted, style)

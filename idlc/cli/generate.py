@@ -1,0 +1,59 @@
+"""One run of `idlc gen`: what it says and the status that it ends with."""
+
+from __future__ import annotations
+
+import sys
+
+from idlc.cli import terminal
+from idlc.disk.config import Config
+from idlc.driver.gen import Generated, GenOptions, gen
+from idlc.text.diagnostics import Report
+from idlc.text.present import counted, summary
+
+
+def completed(wanted: GenOptions, settings: Config) -> GenOptions:
+    """Return what was typed, with what pyproject.toml says where nothing was."""
+    return wanted._replace(
+        paths=wanted.paths or settings.paths,
+        out=wanted.out or settings.out or "",
+        package=wanted.package or settings.package,
+        include=(*wanted.include, *settings.include),
+        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+    )
+
+
+def once(wanted: GenOptions, style: str) -> int:
+    """Run once, show what happened and return the exit status."""
+    report = Report()
+    packages = gen(wanted, report)
+    if style == "json":
+        terminal.show(report, style, sys.stdout)
+        for package in packages:
+            terminal.fact(sys.stdout, "package", **package._asdict(), check=wanted.check)
+        terminal.fact(sys.stdout, "summary", **terminal.counts(report))
+        return terminal.status(report)
+    terminal.show(report, style, sys.stderr)
+    if report.had_errors:
+        outcome = "" if wanted.check else "; nothing was written"
+        sys.stderr.write(f"{summary(report)}{outcome}\n")
+    else:
+        for package in packages:
+            sys.stdout.write(_line(package, wanted.check))
+    return terminal.status(report)
+
+
+def _line(package: Generated, check: bool) -> str:
+    """Return what is said of a package: what it is, and what was done if that is not all of it."""
+    done = []
+    if check:
+        done.append("up to date")
+    elif not package.written and not package.removed:
+        done.append("unchanged")
+    elif package.written < package.files or package.removed:
+        done += [f"{package.written} written"] if package.written else []
+        done += [f"{package.removed} removed"] if package.removed else []
+    note = f" ({', '.join(done)})" if done else ""
+    return (
+        f"{package.package}: {counted(package.interfaces, 'interface')} → "
+        f"{counted(package.files, 'file')} in {package.out}{note}\n"
+    )

@@ -1,0 +1,36 @@
+"""`idlc hash`."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from idlc.cli import options
+
+EPILOG = """\
+Example:
+
+\b
+  idlc hash std_msgs/msg/Header std_srvs/srv/SetBool
+"""
+
+
+@click.command("hash", epilog=EPILOG)
+@click.argument("wanted", metavar="PATH|TYPE...", nargs=-1, required=True, type=click.Path())
+@options.package
+@options.include
+def command(wanted: tuple[str, ...], package: str | None, include: tuple[str, ...]) -> int:
+    """Print type hashes (RIHS01), derived types of services and actions included.
+
+    TYPE is a name such as std_msgs/msg/Header, PATH a file or folder as for `idlc gen`.
+    """
+    from idlc.cli import terminal
+    from idlc.driver.query import hashes
+    from idlc.text.diagnostics import Report
+
+    report = Report()
+    for value, name in hashes(wanted, package, include, report):
+        sys.stdout.write(f"{value}  {name}\n")
+    terminal.show(report, "text", sys.stderr)
+    return terminal.status(report)

@@ -1,0 +1,46 @@
+"""Options that several commands have, and what pyproject.toml says instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+FORMATS = ("text", "json")
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def package(command: Command) -> Command:
+    """Add --package."""
+    return click.option(
+        "--package",
+        metavar="NAME",
+        help="The package's name. Otherwise that of the nearest package.xml, or the folder's.",
+    )(command)
+
+
+def include(command: Command) -> Command:
+    """Add -I."""
+    return click.option(
+        "-I",
+        "--include",
+        metavar="DIR",
+        multiple=True,
+        type=click.Path(file_okay=False),
+        help="Look for other packages here first: a package, a source tree or an install prefix. "
+        "May be repeated.",
+    )(command)
+
+
+def style(command: Command) -> Command:
+    """Add --format."""
+    return click.option(
+        "--format",
+        "style",
+        type=click.Choice(FORMATS),
+        default="text",
+        show_default=True,
+        help="For people, or one JSON object per line.",
+    )(command)

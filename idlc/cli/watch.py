@@ -1,0 +1,40 @@
+"""`idlc gen --watch`: run again after every change, until Ctrl-C."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from idlc.cli.generate import once
+from idlc.disk.watch import snapshot
+from idlc.driver.gen import GenOptions
+
+INTERVAL = 0.25
+
+
+def run_again(wanted: GenOptions, style: str) -> int:
+    """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
+    try:
+        seen = snapshot(wanted.paths, wanted.include)
+        once(wanted, style)
+        sys.stderr.write(f"watching {', '.join(wanted.paths)}; Ctrl-C ends\n")
+        while True:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            time.sleep(INTERVAL)
+            now = snapshot(wanted.paths, wanted.include)
+            if now == seen:
+                continue
+            while (later := _after(wanted)) != now:
+                now = later
+            seen = now
+            once(wanted, style)
+    except KeyboardInterrupt:
+        sys.stderr.write("\n")
+        return 0
+
+
+def _after(wanted: GenOptions) -> dict[str, tuple[int, int]]:
+    """Return a snapshot from a moment later, so that a burst of changes counts as one."""
+    time.sleep(INTERVAL)
+    return snapshot(wanted.paths, wanted.include)

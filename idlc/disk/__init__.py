@@ -1,0 +1,1 @@
+"""Disk: the only package that touches files, folders and the environment."""

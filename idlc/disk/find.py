@@ -1,0 +1,149 @@
+"""Finding interface files: which files the paths on the command line mean, in a fixed order."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from idlc.disk.package import manifest
+from idlc.disk.read import absolute, kind_of, unreadable
+from idlc.text import codes
+from idlc.text.suggest import closest
+
+if TYPE_CHECKING:
+    from idlc.model.ir import Kind
+    from idlc.text.diagnostics import Report
+
+KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
+KIND_FOLDERS = frozenset(KINDS.values())
+#: Folders that hold copies or no sources: what colcon and Python tools write.
+SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
+#: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
+CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
+
+
+class InterfaceFile(NamedTuple):
+    """An interface file; `given` is the path on the command line that led to it."""
+
+    path: Path
+    shown: str
+    kind: Kind
+    name: str
+    given: str
+
+    @property
+    def root(self) -> Path:
+        """The folder that holds the msg/, srv/ and action/ folders, or the file's own folder."""
+        folder = absolute(self.path).parent
+        return folder.parent if folder.name in KIND_FOLDERS else folder
+
+    @property
+    def key(self) -> str:
+        """The name within the package, such as `msg/RobotCommand.msg`."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
+
+def is_path(text: str) -> bool:
+    """Whether a word on the command line means a path rather than a type."""
+    return Path(text).suffix in KINDS or text.count("/") not in (1, 2) or os.path.lexists(text)
+
+
+def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
+    """Return the interface files that paths mean, each once, sorted.
+
+    A folder means every interface file below it. Reports IDL601, IDL602, IDL605 and IDL606.
+    """
+    manifest.cache_clear()
+    found: dict[Path, InterfaceFile] = {}
+    for given in paths:
+        empty = True
+        for file in _under(given, report):
+            empty = False
+            if file is not None:
+                found.setdefault(absolute(file.path), file)
+        if empty:
+            report.add(
+                codes.NO_INTERFACES.of(
+                    given,
+                    f"no .msg, .srv or .action file in `{given}`",
+                    hint="interfaces are looked for in msg/, srv/ and action/ folders and in the "
+                    "folder itself",
+                )
+            )
+    return tuple(sorted(found.values(), key=lambda file: (file.shown, file.given)))
+
+
+def _under(given: str, report: Report) -> Iterator[InterfaceFile | None]:
+    """Yield the files that one path means; `None` where a problem explains their absence."""
+    path = Path(given)
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        problem = unreadable(given, error)
+        report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
+        yield None
+        return
+    if stat.S_ISDIR(mode):
+        for file in walk(path, report):
+            yield _interface(file, given)
+    elif path.suffix not in KINDS or not stat.S_ISREG(mode):
+        what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
+        report.add(
+            codes.NOT_AN_INTERFACE.of(given, f"`{given}` is {what}not a .msg, .srv or .action file")
+        )
+        yield None
+    else:
+        yield _interface(path, given)
+
+
+def _interface(path: Path, given: str) -> InterfaceFile:
+    return InterfaceFile(path, path.as_posix(), KINDS[path.suffix], path.stem, given)
+
+
+def _similar(path: Path) -> str | None:
+    try:
+        names = sorted(entry.name for entry in path.parent.iterdir())
+    except (OSError, ValueError):
+        return None
+    close = closest(path.name, names)
+    return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+
+
+def walk(folder: Path, report: Report) -> Iterator[Path]:
+    """Yield each interface file below a folder, in no particular order.
+
+    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
+    one excepted; links to folders are followed, each folder once.
+    """
+    waiting = [folder]
+    seen: set[tuple[int, int]] = set()
+    while waiting:
+        here = waiting.pop()
+        try:
+            status = here.stat()
+            entries = sorted(os.scandir(here), key=lambda entry: entry.name)
+        except OSError as error:
+            report.add(unreadable(here.as_posix(), error))
+            continue
+        identity = (status.st_dev, status.st_ino)
+        if (identity in seen and status.st_ino) or (
+            here != folder and any(entry.name in CLOSING for entry in entries)
+        ):
+            continue
+        seen.add(identity)
+        for entry in entries:
+            if _is_folder(entry):
+                if not entry.name.startswith(".") and entry.name not in SKIPPED:
+                    waiting.append(here / entry.name)
+            elif not entry.name.startswith(".") and Path(entry.name).suffix in KINDS:
+                yield here / entry.name
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False

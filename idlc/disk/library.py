@@ -1,0 +1,163 @@
+"""Where other packages' interfaces are: along -I, in the ament prefixes, in the catalogue."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from idlc.disk import surroundings
+from idlc.disk.find import KIND_FOLDERS, KINDS, walk
+from idlc.disk.package import declared_name, manifest
+from idlc.disk.read import absolute, read_source, shown
+from idlc.model import catalog, ir
+
+if TYPE_CHECKING:
+    from idlc.text.diagnostics import Report
+    from idlc.text.source import Source
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+class Folder:
+    """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = absolute(path)
+
+    def roots(self, package: str) -> Iterator[Path]:
+        """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
+        direct = [
+            root
+            for root in (self._path / package, self._path / "share" / package)
+            if _has_interfaces(root)
+        ]
+        yield from direct or self._packages.get(package, [])
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of the packages found in it."""
+        return self._packages
+
+    @cached_property
+    def _packages(self) -> dict[str, list[Path]]:
+        """Every package at any depth, by name; made only when the direct look-up fails."""
+        from idlc.text.diagnostics import Report
+
+        unheard = Report()
+        found: dict[str, list[Path]] = {}
+        for root in sorted({_root(file) for file in walk(self._path, unheard)}):
+            declared = manifest(root)
+            name = declared_name(declared, "", unheard) if declared else None
+            found.setdefault(name or root.name, []).append(root)
+        return found
+
+
+class Prefix:
+    """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg."""
+
+    def __init__(self, path: Path) -> None:
+        self._share = path / "share"
+
+    def roots(self, package: str) -> Iterator[Path]:
+        """Yield the folder of an installed package."""
+        yield self._share / package
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of installed packages that have interfaces."""
+        try:
+            return [path.name for path in self._share.iterdir() if _has_interfaces(path)]
+        except OSError:
+            return []
+
+
+def _root(file: Path) -> Path:
+    return file.parent.parent if file.parent.name in KIND_FOLDERS else file.parent
+
+
+def _has_interfaces(root: Path) -> bool:
+    return any((root / kind).is_dir() for kind in KIND_FOLDERS)
+
+
+class Library:
+    """Interfaces of all packages that can be found, as `link.Library`.
+
+    `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
+    a single file finds its neighbours. Files that cannot be read are reported.
+    """
+
+    def __init__(
+        self,
+        folders: Iterable[str],
+        report: Report,
+        *,
+        own: Mapping[str, Sequence[Path]] | None = None,
+    ) -> None:
+        places = [Folder(path) for path in folders]
+        self._places: tuple[Folder | Prefix, ...] = (
+            *places,
+            *map(Prefix, surroundings.ament_prefixes()),
+        )
+        self._own = own or {}
+        self._report = report
+
+    def _roots(self, package: str) -> Iterator[Path]:
+        yield from self._own.get(package, ())
+        for place in self._places:
+            yield from place.roots(package)
+
+    def path(self, name: ir.TypeName) -> Path | None:
+        """Return the file of an interface on disk, or `None`."""
+        if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
+            return None
+        file = f"{name.name}.{name.kind}"
+        for root in self._roots(name.package):
+            for path in (root / name.kind / file, root / file):
+                if path.is_file():
+                    return path
+        return None
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if there is none of that name."""
+        path = self.path(name)
+        if path is not None:
+            return read_source(path, shown(path), self._report)
+        return catalog.source(name)
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of a package's messages; empty for an unknown package."""
+        on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
+        return on_disk or catalog.names(package)
+
+    def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
+        """Return every interface of a package, sorted."""
+        on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
+        return tuple(sorted(on_disk or [n for n in catalog.interfaces() if n.package == package]))
+
+    def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
+        """Return kind and name of each file of a package, in the first place that has any."""
+        if not _NAME.fullmatch(package):
+            return []
+        for root in self._roots(package):
+            found = [
+                (KINDS[path.suffix], path.stem)
+                for folder in (root, *(root / kind for kind in sorted(KIND_FOLDERS)))
+                for path in _files(folder)
+                if path.suffix in KINDS
+            ]
+            if found:
+                return sorted(set(found))
+        return []
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of all packages, for suggestions."""
+        found = set(catalog.packages()) | set(self._own)
+        return sorted(found.union(*(place.packages() for place in self._places)))
+
+
+def _files(folder: Path) -> list[Path]:
+    try:
+        return [path for path in folder.iterdir() if path.is_file()]
+    except OSError:
+        return []

@@ -1,0 +1,117 @@
+"""idlc.lock: what a run was given and what it wrote, so that the next one knows what is its own.
+
+The file is JSON, sorted and indented, and names nothing of the machine that it was made on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path, PurePosixPath
+
+import msgspec
+
+from idlc.disk.read import read_bytes
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.visible import one_line
+
+FILE = "idlc.lock"
+#: Raised when an older idlc could not read what a newer one writes.
+FORMAT = 1
+
+
+class _Header(msgspec.Struct):
+    format: int
+    idlc: str
+
+
+class Lock(msgspec.Struct, frozen=True, kw_only=True):
+    """The record of one generated package.
+
+    `inputs` are the compiled files by name within the package, `dependencies` the other
+    interfaces that were read, by full name, `outputs` the files written, by path below the
+    lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
+    other packages that the generated code needs, `vendored` the packages written beside it.
+    """
+
+    format: int = FORMAT
+    idlc: str
+    package: str
+    vendor_deps: bool = False
+    vendored: tuple[str, ...] = ()
+    imports: tuple[str, ...] = ()
+    inputs: dict[str, str]
+    dependencies: dict[str, str]
+    types: dict[str, str]
+    outputs: dict[str, str]
+
+
+def digest(data: bytes) -> str:
+    """Return the SHA-256 of bytes."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def meaning(text: str) -> str:
+    """Return a SHA-256 of an interface's text that ignores its comments and spacing.
+
+    Dependencies are recorded by it: the built-in catalogue has no comments, an installed
+    package has, and both compile to the same.
+    """
+    lines = []
+    for line in text.splitlines():
+        code = line.partition("#")[0].replace("\t", " ").rstrip()
+        if code:
+            kind, _, rest = code.partition(" ")
+            name, sign, value = rest.lstrip(" ").partition("=")
+            if sign:
+                lines.append(f"{kind} {name.rstrip(' ')}={value.lstrip(' ')}")
+            else:
+                name, _, value = name.partition(" ")
+                lines.append(f"{kind} {name} {value.lstrip(' ')}".rstrip())
+    return digest("\n".join(lines).encode())
+
+
+def encode(lock: Lock) -> bytes:
+    """Return the content of the file."""
+    return msgspec.json.format(msgspec.json.encode(lock, order="sorted"), indent=2) + b"\n"
+
+
+def load(out: Path, name: str, report: Report) -> Lock | None:
+    """Return the lock of a generated package, `None` if it has none; report IDL615."""
+    path = out / FILE
+    if not path.is_file():
+        return None
+    shown = f"{name}/{FILE}"
+    data = read_bytes(path, shown, report)
+    if data is None:
+        return None
+    try:
+        return decode(data)
+    except (msgspec.MsgspecError, UnicodeDecodeError, ValueError) as error:
+        report.add(_bad(shown, str(error)))
+        return None
+
+
+def decode(data: bytes) -> Lock:
+    """Return a lock from a file's content; raise ValueError for one that cannot be used."""
+    header = msgspec.json.decode(data, type=_Header)
+    if header.format > FORMAT:
+        raise ValueError(f"it was written by idlc {header.idlc}, which is newer than this one")
+    lock = msgspec.json.decode(data, type=Lock)
+    for path in lock.outputs:
+        parts = PurePosixPath(path).parts
+        if not parts or path.startswith("/") or ".." in parts or "\\" in path or ":" in path:
+            raise ValueError(f"it lists a file outside of its folder: {path}")
+    return lock
+
+
+def _bad(shown: str, why: str) -> Diagnostic:
+    newer = "newer" in why
+    return codes.BAD_LOCK.of(
+        shown,
+        f"`{shown}` cannot be used: {one_line(why)}",
+        hint="upgrade idlc"
+        if newer
+        else "restore it from version control, or run again with --force, which keeps a copy "
+        "of every file that it replaces",
+    )

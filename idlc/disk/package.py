@@ -1,0 +1,80 @@
+"""Which package files belong to: the nearest package.xml, and the name in it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.parsers import expat
+
+from idlc.disk.read import read_bytes
+from idlc.text import codes
+from idlc.text.source import Source, Span
+
+if TYPE_CHECKING:
+    from idlc.text.diagnostics import Diagnostic, Report
+
+MANIFEST = "package.xml"
+
+
+@lru_cache(maxsize=1024)
+def manifest(folder: Path) -> Path | None:
+    """Return the nearest package.xml at or above an absolute folder, within its repository."""
+    path = folder / MANIFEST
+    if path.is_file():
+        return path
+    if folder.parent == folder or (folder / ".git").exists():
+        return None
+    return manifest(folder.parent)
+
+
+def declared_name(path: Path, name: str, report: Report) -> str | None:
+    """Return the package name in a package.xml; report IDL610 and return `None` without one."""
+    data = read_bytes(path, name, report)
+    if data is None:
+        return None
+    found: list[str] = []
+    stack: list[str] = []
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+
+    def start(tag: str, _: dict[str, str]) -> None:
+        stack.append(tag)
+
+    def end(_: str) -> None:
+        stack.pop()
+
+    def text(content: str) -> None:
+        if stack == ["package", "name"]:
+            found.append(content)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text
+    try:
+        parser.Parse(data, True)
+    except (expat.ExpatError, ValueError) as error:
+        report.add(_broken(data, name, error))
+        return None
+    declared = "".join(found).strip()
+    if not declared:
+        report.add(
+            codes.BAD_PACKAGE_XML.of(
+                name,
+                "no package name in this file",
+                hint="add `<name>my_package</name>` within `<package>`, or give --package NAME",
+            )
+        )
+        return None
+    return declared
+
+
+def _broken(data: bytes, name: str, error: expat.ExpatError | ValueError) -> Diagnostic:
+    message = f"not well-formed XML: {str(error).partition(':')[0]}"
+    hint = "mend the file, or give --package NAME"
+    if not isinstance(error, expat.ExpatError):
+        return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
+    source = Source(name, data.decode("utf-8", errors="replace"))
+    line = min(error.lineno, len(source.line_starts))
+    start = min(source.line_starts[line - 1] + error.offset, len(source.text))
+    return codes.BAD_PACKAGE_XML.at(Span(source, start, start + 1), message, hint=hint)

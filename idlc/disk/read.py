@@ -1,0 +1,124 @@
+"""Reading one file: bytes within a limit, and bytes as source text.
+
+A problem with a file is reported and `None` returned; nothing is raised. Only regular files
+are opened, so that no pipe or device can hold the run up.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from idlc.text import codes
+from idlc.text.source import Source, Span
+
+if TYPE_CHECKING:
+    from idlc.text.diagnostics import Diagnostic, Report
+
+#: Bytes; the largest interface file that is read. Real ones stay below 64 KiB.
+MAX_SIZE = 16 << 20
+
+_SPECIAL = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFDIR: "a folder",
+}
+
+_BYTE_ORDER_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"))
+
+
+def absolute(path: str | Path) -> Path:
+    """Return a path from the root, without `..` and with links as they are."""
+    return Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
+
+
+def shown(path: Path) -> str:
+    """Return a path as a person knows it: relative to the working folder where that is below."""
+    try:
+        return path.relative_to(Path.cwd()).as_posix()
+    except (ValueError, OSError):
+        return path.as_posix()
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Return what the operating system says, without number and path."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror[:1].lower() + error.strerror[1:]
+    return str(error)
+
+
+def kind_of(mode: int) -> str:
+    """Return what a file that is not regular is, such as `a named pipe`."""
+    return _SPECIAL.get(stat.S_IFMT(mode), "a special file")
+
+
+def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
+    """Return a regular file's bytes; report IDL601, IDL604 or IDL605 and return `None` else."""
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            report.add(codes.NOT_AN_INTERFACE.of(name, f"`{name}` is {kind_of(status.st_mode)}"))
+            return None
+        if status.st_size <= MAX_SIZE:
+            with path.open("rb") as file:
+                data = file.read(MAX_SIZE + 1)
+            if len(data) <= MAX_SIZE:
+                return data
+    except (OSError, ValueError) as error:
+        report.add(unreadable(name, error))
+        return None
+    report.add(
+        codes.TOO_LARGE.of(
+            name,
+            f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is",
+            hint="is it another kind of file with this extension?",
+        )
+    )
+    return None
+
+
+def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
+    """Return the problem with a path that cannot be read."""
+    if isinstance(error, OSError) and error.errno == errno.ENOENT:
+        return codes.NO_SUCH_PATH.of(name, f"no such file or folder: `{name}`")
+    return codes.UNREADABLE.of(name, f"cannot read `{name}`: {reason(error)}")
+
+
+def decode(data: bytes, name: str, report: Report) -> Source | None:
+    """Return bytes as source text, unchanged; report IDL603 where they are not UTF-8."""
+    try:
+        return Source(name, data.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        report.add(_not_text(data, name, error.start))
+        return None
+
+
+def _not_text(data: bytes, name: str, offset: int) -> Diagnostic:
+    for mark, encoding in _BYTE_ORDER_MARKS:
+        if data.startswith(mark):
+            return codes.NOT_TEXT.of(
+                name, f"this is {encoding}, not UTF-8", hint="save the file as UTF-8"
+            )
+    if b"\0" in data[:4096]:
+        return codes.NOT_TEXT.of(
+            name,
+            f"this is a binary file: byte {offset + 1} is 0x{data[offset]:02X}, not UTF-8 text",
+        )
+    source = Source(name, data.decode("utf-8", errors="replace"))
+    start = len(data[:offset].decode("utf-8"))
+    return codes.NOT_TEXT.at(
+        Span(source, start, start + 1),
+        f"byte 0x{data[offset]:02X} is not UTF-8 (byte {offset + 1} of the file)",
+        hint="save the file as UTF-8",
+    )
+
+
+def read_source(path: Path, name: str, report: Report) -> Source | None:
+    """Return a file as source text; report what stands in the way and return `None` else."""
+    data = read_bytes(path, name, report)
+    return None if data is None else decode(data, name, report)

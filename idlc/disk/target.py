@@ -1,0 +1,131 @@
+"""The folder that a generated package is written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+
+from idlc.disk import fresh, surroundings, write
+from idlc.disk.library import Library
+from idlc.disk.lock import FILE, Lock, digest, encode, load
+from idlc.disk.plan import Change, Plan, plan
+from idlc.disk.read import absolute
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic, Report
+
+
+class Target:
+    """A package folder, existing or not; `name` is how messages call it."""
+
+    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+        self.name = name
+        self.package = package
+        self._path = absolute(name)
+        self.report = report
+        self._force = force
+
+    def beside(self, package: str) -> Target:
+        """Return the folder of another package next to this one."""
+        name = (Path(self.name).parent / package).as_posix()
+        return Target(name, package, self.report, force=self._force)
+
+    @cached_property
+    def lock(self) -> Lock | None:
+        """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
+        return load(self._path, self.name, Report() if self._force else self.report)
+
+    def usable(self) -> bool:
+        """Whether this is or can become a folder; reports IDL612."""
+        for path in (self._path, *self._path.parents):
+            if path.is_dir():
+                return True
+            if os.path.lexists(path):
+                message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
+                self.report.add(codes.CANNOT_WRITE.of(self.name, message))
+                return False
+        return False
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Whether what is here is what compiling the inputs would write."""
+        return fresh.unchanged(
+            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
+        )
+
+    def missing(self) -> list[str]:
+        """Return the packages that the generated code needs and this Python cannot import."""
+        modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
+        return sorted({package for package, kind in modules if not self._finds(package, kind)})
+
+    def _finds(self, package: str, kind: str) -> bool:
+        """Whether a package can be imported, found without importing, or lies next to this one."""
+        places = [*surroundings.python_folders(package), self._path.parent / package]
+        return any((place / kind / "__init__.py").is_file() for place in places)
+
+    def plan(self, files: Mapping[str, str], *, check: bool = False) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not.
+
+        With `check` the changes are only to be looked at, and edited files are among them.
+        """
+        content = {path: text.encode("utf-8") for path, text in files.items()}
+        owned = write.owned(self._path, self.lock)
+        return plan(self._path, self.name, content, owned, self.report, force=check or self._force)
+
+    def apply(self, changes: Plan, record: Lock) -> bool:
+        """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        self.lock = record
+        return write.apply(changes, encode(record), self.name, self.report)
+
+    def drift(self, changes: Plan, record: Lock) -> None:
+        """Report IDL616 for each file that is not what a run would write."""
+        if self.lock is None:
+            if self.report.had_errors:
+                return
+            message = f"there is no {FILE} in `{self.name}`, so nothing can be compared"
+            self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
+            return
+        why = _reasons(self.lock, record) or "idlc itself changed"
+        for change in changes.changes:
+            self.report.add(self._drifted(change, self.lock, why))
+        # a dependency found elsewhere that compiles to the same is no drift
+        if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
+            self.report.add(
+                codes.DRIFT.of(f"{self.name}/{FILE}", f"`{self.name}/{FILE}` is out of date: {why}")
+            )
+
+    def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
+        path = f"{self.name}/{change.path}"
+        wrote = old.outputs.get(change.path)
+        if change.new is None:
+            message = f"`{path}` is no longer generated: {why}"
+        elif change.old is None:
+            message = f"`{path}` is missing" + ("" if wrote else f": {why}")
+        elif wrote is not None and digest(change.old) != wrote:
+            message = f"`{path}` was edited since idlc wrote it"
+        elif wrote is None:
+            message = f"`{path}` was not written by idlc"
+        else:
+            message = f"`{path}` is out of date: {why}"
+        return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
+
+
+def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
+    """Say what differs between the last run and one now; empty if nothing does."""
+    pairs = [(old.inputs, new.inputs)]
+    if dependencies:
+        pairs.append((old.dependencies, new.dependencies))
+    found = []
+    if old.idlc != new.idlc:
+        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.package != new.package:
+        found.append(f"the package was called `{old.package}`")
+    for before, after in pairs:
+        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        common = sorted(before.keys() & after.keys())
+        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
+    shown = ", ".join(found[:3])
+    return f"{shown} and {len(found) - 3} more" if len(found) > 3 else shown

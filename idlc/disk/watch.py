@@ -1,0 +1,28 @@
+"""What a watched run depends on, as a value that differs when any of it changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from idlc.disk.find import find
+from idlc.disk.package import MANIFEST
+from idlc.text.diagnostics import Report
+
+
+def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[int, int]]:
+    """Return time and size of each input file, of its package.xml and of files along -I."""
+    files = [file.path for file in find((*paths, *include), Report())]
+    manifests = {path.parent.parent / MANIFEST for path in files}
+    found = {}
+    for path in (*files, *sorted(manifests)):
+        found[path.as_posix()] = _stamp(path)
+    return found
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    try:
+        status = path.stat()
+    except OSError:
+        return (0, 0)
+    return status.st_mtime_ns, status.st_size

@@ -1,0 +1,199 @@
+"""Carrying a plan out: all or nothing, each file whole at any moment, the lock last.
+
+Everything is first written into a staging folder, then moved into place file by file. When a
+move fails the earlier ones are undone. When the process is killed the staging folder stays; the
+next run reads from it which files are idlc's own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import msgspec
+
+from idlc.disk import lock
+from idlc.disk.plan import Change, Plan, emptied
+from idlc.disk.read import reason
+from idlc.text import codes
+from idlc.text.diagnostics import Report
+
+STAGE = ".idlc-stage-"
+#: Seconds after which a staging folder counts as abandoned where processes cannot be asked.
+ABANDONED = 3600
+
+
+def owned(out: Path, known: lock.Lock | None) -> dict[str, frozenset[str]]:
+    """Return the files that idlc wrote below `out`, each with the digests that it may have."""
+    found = {path: frozenset((one,)) for path, one in (known.outputs if known else {}).items()}
+    for stage in _abandoned(out):
+        with contextlib.suppress(OSError, ValueError, msgspec.MsgspecError):
+            for path, one in lock.decode((stage / lock.FILE).read_bytes()).outputs.items():
+                found[path] = found.get(path, frozenset()) | {one}
+    return found
+
+
+def _abandoned(out: Path) -> list[Path]:
+    try:
+        return [path for path in sorted(out.glob(f"{STAGE}*")) if not _in_use(path)]
+    except OSError:
+        return []
+
+
+def _in_use(stage: Path) -> bool:
+    """Whether the process that made a staging folder may still be running."""
+    number = stage.name.removeprefix(STAGE)
+    if not number.isdigit() or int(number) == os.getpid():
+        return False
+    if sys.platform == "win32":
+        return time.time() - stage.stat().st_mtime < ABANDONED
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
+    """Make the changes and write the lock; report IDL612 and return `False` on a failure.
+
+    After a failure every file is as it was, or the report says which are not.
+    """
+    lock_path = plan.out / lock.FILE
+    try:
+        old_lock = lock_path.read_bytes() if lock_path.is_file() else None
+        if not plan.changes and old_lock == new_lock:
+            os.utime(lock_path)
+            _sweep(plan.out)
+            return True
+        transaction = _Transaction(plan.out)
+    except OSError as error:
+        report.add(codes.CANNOT_WRITE.of(name, f"cannot write to `{name}`: {reason(error)}"))
+        return False
+    change = Change(lock.FILE, old_lock, new_lock)
+    try:
+        transaction.run((*plan.changes, change), new_lock)
+    except BaseException as error:
+        torn = transaction.undo()
+        if not isinstance(error, OSError):
+            raise
+        where = f"{name}/{transaction.current}" if transaction.current else name
+        message = f"cannot write `{where}`: {reason(error)}"
+        report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
+        return False
+    _sweep(plan.out)
+    return True
+
+
+def _outcome(torn: list[str], name: str) -> str:
+    if not torn:
+        return f"nothing in `{name}` was changed"
+    return "undoing failed as well; these files are new, the others as before: " + ", ".join(torn)
+
+
+def _sweep(out: Path) -> None:
+    for stage in _abandoned(out):
+        shutil.rmtree(stage, ignore_errors=True)
+
+
+class _Transaction:
+    """Moves staged files into place and remembers how to go back."""
+
+    def __init__(self, out: Path) -> None:
+        self._out = out
+        self._stage = out / f"{STAGE}{os.getpid()}"
+        self._made: list[Path] = []
+        self._done: list[tuple[str, bytes | None]] = []
+        self.current = ""
+        self._make_folder(out)
+
+    def _make_folder(self, folder: Path) -> None:
+        missing = []
+        while not folder.is_dir():
+            missing.append(folder)
+            folder = folder.parent
+        for path in reversed(missing):
+            path.mkdir()
+            self._made.append(path)
+
+    def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
+        """Make all changes, in order; raises what stopped it."""
+        self._make_folder(self._stage)
+        (self._stage / lock.FILE).write_bytes(journal)
+        for number, change in enumerate(changes):
+            if change.new is not None:
+                self.current = change.path
+                (self._stage / str(number)).write_bytes(change.new)
+        for number, change in enumerate(changes):
+            self.current = change.path
+            target = self._out / change.path
+            if change.backup and change.old is not None:
+                self._keep(change.path, change.old)
+            if change.new is None:
+                target.unlink()
+            else:
+                self._make_folder(target.parent)
+                (self._stage / str(number)).replace(target)
+            self._done.append((change.path, change.old))
+        self.current = ""
+        self._remove_empty(changes)
+        shutil.rmtree(self._stage, ignore_errors=True)
+
+    def _keep(self, path: str, content: bytes) -> None:
+        """Write a copy of a file beside it, under a name that is free."""
+        for suffix in _suffixes():
+            copy = self._out / (path + suffix)
+            with contextlib.suppress(FileExistsError):
+                with copy.open("xb") as file:
+                    file.write(content)
+                self._done.append((path + suffix, None))
+                return
+
+    def _remove_empty(self, changes: tuple[Change, ...]) -> None:
+        for change in changes:
+            if change.new is None:
+                target = self._out / change.path
+                for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
+                    with contextlib.suppress(OSError):
+                        cached.unlink()
+        for folder in emptied(changes):
+            for path in (self._out / folder / "__pycache__", self._out / folder):
+                with contextlib.suppress(OSError):
+                    path.rmdir()
+
+    def undo(self) -> list[str]:
+        """Go back to the state before; return the files for which that failed."""
+        torn = []
+        for path, old in reversed(self._done):
+            target = self._out / path
+            try:
+                if old is None:
+                    target.unlink(missing_ok=True)
+                else:
+                    spare = self._stage / "old"
+                    spare.write_bytes(old)
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    spare.replace(target)
+            except OSError:
+                torn.append(path)
+        if not torn:
+            shutil.rmtree(self._stage, ignore_errors=True)
+        for folder in reversed(self._made):
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        return torn
+
+
+def _suffixes() -> Iterator[str]:
+    yield ".bak"
+    number = 1
+    while True:
+        yield f".bak{number}"
+        number += 1

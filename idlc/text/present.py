@@ -1,0 +1,196 @@
+"""A report as text with source lines and carets, or as JSON lines.
+
+In: diagnostics. Out: strings. Nothing is looked up: colour and width are arguments. Text from
+files is made harmless first: no control character, terminal escape or invisible character of
+a file reaches the terminal as itself.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from idlc.text.codes import CODES
+from idlc.text.diagnostics import Diagnostic, Label, Severity
+from idlc.text.source import Source, Span
+from idlc.text.visible import display_width, one_line, visible
+
+LIMIT = 100
+LINE_WIDTH = 100
+BEFORE_CARET = 40
+
+_STYLES = {
+    "error": "1;31",
+    "warning": "1;33",
+    "hint": "1;36",
+    "frame": "1;34",
+    "bold": "1",
+}
+
+
+class _Paint:
+    """Puts ANSI styles around text, or does not."""
+
+    def __init__(self, colour: bool) -> None:
+        self._colour = colour
+
+    def __call__(self, style: str, text: str) -> str:
+        return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if self._colour and text else text
+
+
+class _Mark(NamedTuple):
+    """A stretch of one line to underline; `start` and `end` are characters from its start."""
+
+    source: Source
+    line: int
+    start: int
+    end: int
+    sign: str
+    text: str
+
+
+def text(
+    diagnostics: Iterable[Diagnostic], *, colour: bool = False, limit: int = LIMIT
+) -> Iterator[str]:
+    """Yield each problem as a block of lines, then a count of those beyond `limit`."""
+    paint = _Paint(colour)
+    left_out = 0
+    for number, diagnostic in enumerate(diagnostics):
+        if number < limit:
+            yield "\n".join(_block(diagnostic, paint)) + "\n"
+        else:
+            left_out += 1
+    if left_out:
+        yield f"… and {left_out} more; fix the first ones and run again\n"
+
+
+def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
+    level = diagnostic.severity.name.lower()
+    head = paint(level, f"{level}[{diagnostic.code}]")
+    yield f"{head}{paint('bold', ': ' + one_line(diagnostic.message))}"
+    marks = _marks(diagnostic)
+    margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
+    if diagnostic.span:
+        yield from _snippets(marks, margin, paint)
+    elif diagnostic.path:
+        yield f"{margin}{paint('frame', '-->')} {one_line(diagnostic.path)}"
+    if diagnostic.detail:
+        bar = f"{margin} {paint('frame', '|')}"
+        yield bar
+        yield from (f"{bar} {visible(line)}".rstrip() for line in diagnostic.detail.split("\n"))
+    if diagnostic.hint:
+        yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {one_line(diagnostic.hint)}"
+
+
+def _marks(diagnostic: Diagnostic) -> list[_Mark]:
+    if not diagnostic.span:
+        return []
+    others = [_mark(label.span, "-", label.text) for label in diagnostic.labels]
+    return [_mark(diagnostic.span, "^", ""), *others]
+
+
+def _mark(span: Span, sign: str, label: str) -> _Mark:
+    """Return the part of a span that lies on its first line; at least one column."""
+    line, column = span.source.position(span.start)
+    start = min(column - 1, len(span.source.line_text(line)))
+    end = min(start + span.end - span.start, len(span.source.line_text(line)))
+    return _Mark(span.source, line, start, max(end, start), sign, label)
+
+
+def _snippets(marks: list[_Mark], margin: str, paint: _Paint) -> Iterator[str]:
+    """Yield the lines of a problem, file by file, the file of the first mark first."""
+    bar = paint("frame", "|")
+    sources = list(dict.fromkeys(mark.source for mark in marks))
+    for source in sources:
+        own = [mark for mark in marks if mark.source is source]
+        arrow = "-->" if source is sources[0] else ":::"
+        yield f"{margin}{paint('frame', arrow)} {_place(own[0])}"
+        yield f"{margin} {bar}"
+        previous = 0
+        for mark in sorted(own, key=lambda mark: mark.line):
+            if previous and mark.line > previous + 1:
+                yield paint("frame", "...")
+            shown, lead, width = _cut(source.line_text(mark.line), mark.start, mark.end)
+            if mark.line != previous or len(source.line_text(mark.line)) > LINE_WIDTH:
+                number = str(mark.line).rjust(len(margin))
+                yield f"{paint('frame', number)} {bar} {shown}".rstrip()
+            sign = paint("error" if mark.sign == "^" else "frame", mark.sign * width)
+            label = f" {one_line(mark.text)}" if mark.text else ""
+            yield f"{margin} {bar} {' ' * lead}{sign}{label}"
+            previous = mark.line
+
+
+def _place(mark: _Mark) -> str:
+    return f"{one_line(mark.source.path)}:{mark.line}:{mark.start + 1}"
+
+
+def _cut(line: str, start: int, end: int) -> tuple[str, int, int]:
+    """Return a line fit for showing, the columns before the mark and the mark's columns."""
+    first, last = 0, len(line)
+    if last > LINE_WIDTH:
+        first = max(0, min(start - BEFORE_CARET, last - LINE_WIDTH))
+        last = min(last, first + LINE_WIDTH)
+    before = visible(("…" if first else "") + line[first:start])
+    lead = display_width(before)
+    marked = visible(line[start : min(end, last)], lead)
+    width = display_width(marked)
+    after = visible(line[min(end, last) : last], lead + width)
+    return before + marked + after + ("…" if last < len(line) else ""), lead, max(width, 1)
+
+
+def summary(diagnostics: Iterable[Diagnostic]) -> str:
+    """Return the closing line, such as `2 errors, 1 warning in 3 files`."""
+    found = list(diagnostics)
+    errors = sum(one.severity is Severity.ERROR for one in found)
+    parts = [
+        counted(number, noun)
+        for number, noun in ((errors, "error"), (len(found) - errors, "warning"))
+        if number
+    ]
+    files = len({one.where[0] for one in found})
+    return f"{', '.join(parts)} in {counted(files, 'file')}" if parts else "no problems"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural where needed."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
+    """Yield each problem as a JSON object on a line of its own, ASCII only."""
+    for diagnostic in diagnostics:
+        yield json.dumps(_facts(diagnostic)) + "\n"
+
+
+def _facts(diagnostic: Diagnostic) -> dict[str, object]:
+    code = CODES.get(diagnostic.code)
+    return {
+        "type": "diagnostic",
+        "code": diagnostic.code,
+        "slug": code.slug if code else "",
+        "severity": diagnostic.severity.name.lower(),
+        "message": diagnostic.message,
+        **_range(diagnostic.span, diagnostic.path),
+        "hint": diagnostic.hint,
+        "detail": diagnostic.detail or None,
+        "labels": [_label(label) for label in diagnostic.labels],
+    }
+
+
+def _label(label: Label) -> dict[str, object]:
+    return {"message": label.text, **_range(label.span, "")}
+
+
+def _range(span: Span | None, path: str) -> dict[str, object]:
+    if span is None:
+        return {"path": path, "line": None, "column": None, "end_line": None, "end_column": None}
+    line, column = span.source.position(span.start)
+    end_line, end_column = span.source.position(span.end)
+    return {
+        "path": span.source.path,
+        "line": line,
+        "column": column,
+        "end_line": end_line,
+        "end_column": end_column,
+    }

@@ -1,0 +1,98 @@
+"""Each golden/diag/*.txt says what it says; every code has a case and a page with examples.
+
+`IDLC_REFRESH='diag/IDL2*' pytest tests/test_golden_diag.py` rewrites the cases that match, and
+fails, so that the changes are looked at.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from fnmatch import fnmatch
+from pathlib import Path
+
+import golden_text
+import pytest
+
+from idlc.cli.main import main
+from idlc.text.codes import CODES
+from idlc.text.pages import page
+
+FOLDER = Path(__file__).parents[1] / "golden" / "diag"
+CASES = sorted(FOLDER.glob("*.txt"))
+REFRESH = os.environ.get("IDLC_REFRESH", "")
+
+#: Codes whose page cannot show how to trigger them.
+NOT_ON_DEMAND = {"IDL901"}
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_golden_case(path, tmp_path, capsys, monkeypatch):
+    text = path.read_text(encoding="utf-8")
+    case = golden_text.read(text)
+    found = golden_text.run(case, tmp_path, capsys, monkeypatch)
+    if REFRESH and fnmatch(f"diag/{path.stem}", REFRESH):
+        path.write_text(golden_text.write(case, found), encoding="utf-8")
+        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+    assert golden_text.write(case, found) == text
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_has_a_case(code):
+    named = [path for path in CASES if path.stem.startswith(code)]
+    assert any(f"[{code}]" in path.read_text(encoding="utf-8") for path in named)
+
+
+def parts(code: str, title: str) -> tuple[dict[str, str], str]:
+    """Return the files and the commands of a section of a code's page."""
+    text = page(code)
+    assert text is not None, f"idlc/text/explain/{code}.md is missing"
+    section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+    blocks = dict(re.findall(r"^```(\S+)\n(.*?)^```$", section, re.MULTILINE | re.DOTALL))
+    console = blocks.pop("console", "$ idlc check .\n")
+    commands = [line[2:] for line in console.splitlines() if line.startswith("$ ")]
+    assert blocks or commands
+    return blocks, "\n".join(commands)
+
+
+def tried(code: str, title: str, tmp_path: Path) -> str:
+    """Return what idlc says to the example of a page, pasted into a shell in an empty folder."""
+    files, commands = parts(code, title)
+    folder = tmp_path / "demo"
+    folder.mkdir()
+    for path, text in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    idlc = f"idlc() {{ '{sys.executable}' -m idlc \"$@\"; }}\n"
+    done = subprocess.run(
+        ["/bin/sh", "-c", idlc + commands],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "AMENT_PREFIX_PATH": "", "PYTHONUTF8": "1"},
+    )
+    return done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("code", sorted(set(CODES) - NOT_ON_DEMAND))
+def test_every_page_shows_how_to_get_the_code_and_how_to_avoid_it(code, tmp_path):
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "good").mkdir()
+    bad = tried(code, "Bad", tmp_path / "bad")
+    assert f"[{code}]" in bad, bad
+    good = tried(code, "Good", tmp_path / "good")
+    assert f"[{code}]" not in good, good
+    assert "error[" not in good, good
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_is_explained(code, capsys):
+    assert main(["explain", code.lower()]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith(f"# {code} {CODES[code].slug}\n\n")
+    assert [line for line in text.splitlines() if line.startswith("## ")] == [
+        "## Why",
+        "## Bad",
+        "## Good",
+    ]
