@@ -65,10 +65,10 @@ def test_folders_that_are_no_sources_are_left_out_unless_they_are_asked_for():
 
 
 def test_links_to_folders_are_followed_and_circles_end():
-    make("shared/A.msg")
+    make("common/A.msg")
     Path("pkg").mkdir()
-    Path("pkg/msg").symlink_to("../shared")
-    Path("shared/again").symlink_to("../pkg")
+    Path("pkg/msg").symlink_to("../common")
+    Path("common/again").symlink_to("../pkg")
     assert found("pkg") == ["pkg/msg/A.msg"]
 
 

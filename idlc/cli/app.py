@@ -18,6 +18,10 @@ COMMANDS = {
 }
 
 
+class PipeClosedError(Exception):
+    """Nobody reads what idlc writes any more; click would end the process itself."""
+
+
 class LazyGroup(click.Group):
     """A group that knows its commands by name only."""
 
@@ -31,6 +35,13 @@ class LazyGroup(click.Group):
             return None
         command: click.Command = import_module(f"idlc.cli.{cmd_name}").command
         return command
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command that was asked for."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError as error:
+            raise PipeClosedError from error
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from idlc.cli.app import app
+from idlc.cli.app import PipeClosedError, app
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
@@ -31,7 +31,7 @@ def run(words: list[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         sys.stderr.write("interrupted\n")
         return INTERRUPTED
-    except BrokenPipeError:
+    except (BrokenPipeError, PipeClosedError):
         # what is still buffered would fail again when Python closes the stream
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

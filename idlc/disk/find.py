@@ -26,19 +26,18 @@ CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 
 
 class InterfaceFile(NamedTuple):
-    """An interface file; `given` is the path on the command line that led to it."""
+    """An interface file.
+
+    `given` is the path on the command line that led to it, `root` the folder that holds the
+    msg/, srv/ and action/ folders, or the file's own.
+    """
 
     path: Path
     shown: str
     kind: Kind
     name: str
     given: str
-
-    @property
-    def root(self) -> Path:
-        """The folder that holds the msg/, srv/ and action/ folders, or the file's own folder."""
-        folder = absolute(self.path).parent
-        return folder.parent if folder.name in KIND_FOLDERS else folder
+    root: Path
 
     @property
     def key(self) -> str:
@@ -60,10 +59,11 @@ def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
     found: dict[Path, InterfaceFile] = {}
     for given in paths:
         empty = True
-        for file in _under(given, report):
+        for path in _under(given, report):
             empty = False
-            if file is not None:
-                found.setdefault(absolute(file.path), file)
+            if path is not None:
+                whole = absolute(path)
+                found.setdefault(whole, _interface(path, whole, given))
         if empty:
             report.add(
                 codes.NO_INTERFACES.of(
@@ -76,7 +76,7 @@ def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
     return tuple(sorted(found.values(), key=lambda file: (file.shown, file.given)))
 
 
-def _under(given: str, report: Report) -> Iterator[InterfaceFile | None]:
+def _under(given: str, report: Report) -> Iterator[Path | None]:
     """Yield the files that one path means; `None` where a problem explains their absence."""
     path = Path(given)
     try:
@@ -87,8 +87,7 @@ def _under(given: str, report: Report) -> Iterator[InterfaceFile | None]:
         yield None
         return
     if stat.S_ISDIR(mode):
-        for file in walk(path, report):
-            yield _interface(file, given)
+        yield from walk(path, report)
     elif path.suffix not in KINDS or not stat.S_ISREG(mode):
         what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
         report.add(
@@ -96,11 +95,13 @@ def _under(given: str, report: Report) -> Iterator[InterfaceFile | None]:
         )
         yield None
     else:
-        yield _interface(path, given)
+        yield path
 
 
-def _interface(path: Path, given: str) -> InterfaceFile:
-    return InterfaceFile(path, path.as_posix(), KINDS[path.suffix], path.stem, given)
+def _interface(path: Path, whole: Path, given: str) -> InterfaceFile:
+    folder = whole.parent
+    root = folder.parent if folder.name in KIND_FOLDERS else folder
+    return InterfaceFile(path, path.as_posix(), KINDS[path.suffix], path.stem, given, root)
 
 
 def _similar(path: Path) -> str | None:

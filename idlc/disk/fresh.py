@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
 
 from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.lock import FILE, Lock, digest, meaning
-from idlc.disk.plan import Obstacle, state
+from idlc.disk.tree import Obstacle, Tree
 from idlc.model.ir import TypeName
 
 _PACKAGE = Path(__file__).parents[1]
@@ -57,8 +59,9 @@ def _dependency(name: str, library: Library) -> str:
 
 
 def _outputs_stand(out: Path, lock: Lock) -> bool:
+    tree = Tree(out)
     for path, expected in lock.outputs.items():
-        content = state(out, path)
+        content = tree.read(path)
         if content is None or isinstance(content, Obstacle) or digest(content) != expected:
             return False
     return True
@@ -66,10 +69,10 @@ def _outputs_stand(out: Path, lock: Lock) -> bool:
 
 def _idlc_is_newer(path: Path) -> bool:
     """Whether idlc itself was changed after a lock was written: by a developer, or installed."""
-    written = path.stat().st_mtime_ns
-    return any(
-        file.stat().st_mtime_ns > written
-        for folder in _MAKERS
-        for file in folder.glob("*.*")
-        if file.is_file()
-    )
+    return _newest_maker() > path.stat().st_mtime_ns
+
+
+@lru_cache(maxsize=1)
+def _newest_maker() -> int:
+    found = (entry for folder in _MAKERS if folder.is_dir() for entry in os.scandir(folder))
+    return max(entry.stat().st_mtime_ns for entry in found if entry.is_file())

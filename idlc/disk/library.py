@@ -101,11 +101,16 @@ class Library:
         )
         self._own = own or {}
         self._report = report
+        self._known: dict[str, list[Path]] = {}
 
-    def _roots(self, package: str) -> Iterator[Path]:
-        yield from self._own.get(package, ())
-        for place in self._places:
-            yield from place.roots(package)
+    def _roots(self, package: str) -> list[Path]:
+        """Return the folders that may hold a package's interfaces, in order of precedence."""
+        known = self._known.get(package)
+        if known is None:
+            found = (root for place in self._places for root in place.roots(package))
+            known = [*self._own.get(package, ()), *(root for root in found if root.is_dir())]
+            self._known[package] = known
+        return known
 
     def path(self, name: ir.TypeName) -> Path | None:
         """Return the file of an interface on disk, or `None`."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
-import stat
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from idlc.disk.lock import FILE, digest
-from idlc.disk.read import kind_of, reason
+from idlc.disk.tree import Obstacle, Tree
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 
@@ -41,39 +39,6 @@ class Plan(NamedTuple):
     outputs: dict[str, str]
 
 
-class Obstacle(NamedTuple):
-    """Something in the way of a file: a link, a folder where it belongs, what cannot be read."""
-
-    what: str
-
-
-def state(out: Path, path: str) -> bytes | Obstacle | None:
-    """Return a file's content, what else is there, or `None` for nothing.
-
-    Links are never followed below `out`.
-    """
-    here = out
-    parts = PurePosixPath(path).parts
-    for number, part in enumerate(parts, start=1):
-        here = here / part
-        try:
-            mode = here.lstat().st_mode
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            return Obstacle(f"`{path}` cannot be read: {reason(error)}")
-        if stat.S_ISLNK(mode):
-            return Obstacle(f"`{PurePosixPath(*parts[:number])}` is a symbolic link")
-        wanted = stat.S_ISREG if number == len(parts) else stat.S_ISDIR
-        if not wanted(mode):
-            what = "a file" if stat.S_ISREG(mode) else kind_of(mode)
-            return Obstacle(f"`{PurePosixPath(*parts[:number])}` is {what}")
-    try:
-        return here.read_bytes()
-    except OSError as error:
-        return Obstacle(f"`{path}` cannot be read: {reason(error)}")
-
-
 def plan(
     out: Path,
     name: str,
@@ -89,13 +54,14 @@ def plan(
     owned, or was edited since, is only replaced with `force`. `name` is how messages call `out`.
     Reports IDL613 and IDL614.
     """
+    tree = Tree(out)
     changes: list[Change] = []
     refused: list[Diagnostic] = []
     outputs: dict[str, str] = {}
     stale = [path for path in owned if path not in files and path != FILE]
     for path in (*files, *sorted(stale)):
         new = files.get(path)
-        old = state(out, path)
+        old = tree.read(path)
         if isinstance(old, Obstacle):
             if new is not None:
                 refused.append(_in_the_way(name, path, old))
@@ -148,6 +114,8 @@ def _refusal(
 
 def difference(old: bytes, new: bytes) -> Iterator[str]:
     """Yield a unified diff from what is on disk to what idlc would write, cut when long."""
+    import difflib
+
     lines = list(
         difflib.unified_diff(_lines(old), _lines(new), "on disk", "from idlc", lineterm="", n=1)
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import sys
 import time
 from collections.abc import Iterator
@@ -100,7 +99,15 @@ def _outcome(torn: list[str], name: str) -> str:
 
 def _sweep(out: Path) -> None:
     for stage in _abandoned(out):
-        shutil.rmtree(stage, ignore_errors=True)
+        _remove(stage)
+
+
+def _remove(stage: Path) -> None:
+    """Remove a staging folder, which holds no folders."""
+    with contextlib.suppress(OSError):
+        for path in stage.iterdir():
+            path.unlink()
+        stage.rmdir()
 
 
 class _Transaction:
@@ -144,7 +151,7 @@ class _Transaction:
             self._done.append((change.path, change.old))
         self.current = ""
         self._remove_empty(changes)
-        shutil.rmtree(self._stage, ignore_errors=True)
+        _remove(self._stage)
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""
@@ -184,7 +191,7 @@ class _Transaction:
             except OSError:
                 torn.append(path)
         if not torn:
-            shutil.rmtree(self._stage, ignore_errors=True)
+            _remove(self._stage)
         for folder in reversed(self._made):
             with contextlib.suppress(OSError):
                 folder.rmdir()

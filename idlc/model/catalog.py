@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
-from importlib.resources import files
 from typing import Any
 
 import msgspec
@@ -19,6 +18,8 @@ from idlc.text.source import Source
 
 @lru_cache(maxsize=1)
 def _entries() -> dict[str, list[dict[str, list[list[Any]]]]]:
+    from importlib.resources import files
+
     data = files("idlc.model").joinpath("catalog.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, list[dict[str, list[list[Any]]]]])
 

@@ -1,0 +1,61 @@
+"""What lies in a package folder, seen without following links below it."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+from typing import NamedTuple
+
+from idlc.disk.read import kind_of, reason
+
+
+class Obstacle(NamedTuple):
+    """Something in the way of a file: a link, a folder where it belongs, what cannot be read."""
+
+    what: str
+
+
+class Tree:
+    """A folder's files by relative path. Folders in it are looked at once."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = str(root)
+        self._folders: dict[str, Obstacle | bool] = {"": True}
+
+    def read(self, path: str) -> bytes | Obstacle | None:
+        """Return a file's content, what else is there, or `None` for nothing."""
+        folder = self._folder(path.rpartition("/")[0])
+        if folder is not True:
+            return folder or None
+        here = Path(f"{self._root}/{path}")
+        try:
+            mode = here.lstat().st_mode
+            return here.read_bytes() if stat.S_ISREG(mode) else Obstacle(_is(path, mode))
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            return Obstacle(f"`{path}` cannot be read: {reason(error)}")
+
+    def _folder(self, path: str) -> Obstacle | bool:
+        """Return whether a folder is there, or what is there instead of it or above it."""
+        known = self._folders.get(path)
+        if known is None:
+            above = self._folder(path.rpartition("/")[0])
+            known = self._look(path) if above is True else above
+            self._folders[path] = known
+        return known
+
+    def _look(self, path: str) -> Obstacle | bool:
+        try:
+            mode = Path(f"{self._root}/{path}").lstat().st_mode
+        except FileNotFoundError:
+            return False
+        except OSError as error:
+            return Obstacle(f"`{path}` cannot be read: {reason(error)}")
+        return True if stat.S_ISDIR(mode) else Obstacle(_is(path, mode))
+
+
+def _is(path: str, mode: int) -> str:
+    if stat.S_ISLNK(mode):
+        return f"`{path}` is a symbolic link"
+    return f"`{path}` is {'a file' if stat.S_ISREG(mode) else kind_of(mode)}"
