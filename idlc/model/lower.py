@@ -9,7 +9,7 @@ from idlc.model.section import lower_section
 from idlc.syntax import tree
 from idlc.syntax.escapes import EscapeError, through_idl
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.source import Span
 
 SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
@@ -107,21 +107,26 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
     seen: set[tuple[object, ...]] = set()
     result: list[ir.Message] = []
     for part in parts:
+        names = [constant.name for constant in part.constants]
         keys = [_identity(constant) for constant in part.constants]
+        kept: list[ir.Constant] = []
         for key, constant in zip(keys, part.constants, strict=True):
-            if key in seen and constant.name_span is not None:
-                report.add(
-                    codes.CONSTANT_MOVED.at(
-                        constant.name_span,
-                        f"ROS 2 gives `{constant.name}` to the earlier section only, "
-                        "because it is the same there",
-                        hint="give it another name or comment",
-                    )
-                )
-        kept = tuple(c for key, c in zip(keys, part.constants, strict=True) if key not in seen)
-        result.append(msgspec.structs.replace(part, constants=kept))
+            # a name that occurs twice is an error, which a check will report
+            if key not in seen or names.count(constant.name) > 1:
+                kept.append(constant)
+            elif constant.name_span is not None:
+                report.add(_moved(constant, constant.name_span))
+        result.append(msgspec.structs.replace(part, constants=tuple(kept)))
         seen.update(keys)
     return result
+
+
+def _moved(constant: ir.Constant, span: Span) -> Diagnostic:
+    return codes.CONSTANT_MOVED.at(
+        span,
+        f"ROS 2 gives `{constant.name}` to the earlier section only, because it is the same there",
+        hint="give it another name or comment",
+    )
 
 
 def _identity(constant: ir.Constant) -> tuple[object, ...]:
