@@ -178,12 +178,13 @@ def test_templates_only_lay_out(path):
     assert len(text.splitlines()) <= 80
 
 
-def project_files() -> Iterator[Path]:
-    generated = {".git", ".venv", "build", "dist", "__pycache__", ".hypothesis"}
-    for path in ROOT.rglob("*"):
-        parts = path.relative_to(ROOT).parts
-        if path.is_file() and not generated.intersection(parts) and "cache" not in parts[0]:
+def project_files(folder: Path = ROOT) -> Iterator[Path]:
+    """Yield what a clone holds: no environments, caches or build results."""
+    for path in folder.iterdir():
+        if path.is_file():
             yield path
+        elif not (path.name in {".git", ".venv", "build", "dist"} or "cache" in path.name):
+            yield from project_files(path)
 
 
 def test_nothing_reaches_outside_the_clone():

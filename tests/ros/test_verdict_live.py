@@ -16,7 +16,7 @@ from inventions import Inventor
 HERE = Path(__file__).parent
 GOLDEN = HERE.parents[1] / "golden" / "spec" / "accept_reject.jsonl"
 SEED = int(os.environ.get("IDLC_LIVE_SEED", "1"))
-FILES = int(os.environ.get("IDLC_LIVE_FILES", "240"))  # rosidl takes about 50 ms for each
+FILES = int(os.environ.get("IDLC_LIVE_FILES", "160"))  # rosidl takes about 0.1 s for each
 
 
 def known_texts() -> dict[str, list[str]]:
