@@ -4,6 +4,7 @@ Needs the compiled packages on the path (the Makefile sees to it) and, from the 
 the real ROS 2 client library from the wheels.
 """
 
+import inspect
 import os
 import sys
 
@@ -16,6 +17,7 @@ from my_robot_controller.msg import RobotCommand
 from my_robot_controller.srv import AddTwoInts
 from rich.console import Console
 from rich.panel import Panel
+from rich.text import Text
 
 console = Console(highlight=False, width=min(100, Console().width))
 
@@ -27,13 +29,14 @@ def stop(title: str) -> None:
 
 def show(code: str, result: object) -> None:
     """Print an expression and what it gave."""
-    console.print(f"[cyan]>>> {code}", markup=True)
-    console.print(str(result), markup=False, soft_wrap=True)
+    console.print(Text(f">>> {code}", "cyan"))
+    console.print(Text(str(result)), soft_wrap=True)
 
 
 def a_class_with_documentation() -> None:
     stop("1  A message is a documented, typed dataclass")
-    console.print(Panel(RobotCommand.__doc__ or "", title="RobotCommand.__doc__", expand=False))
+    documentation = Text(inspect.getdoc(RobotCommand) or "")
+    console.print(Panel(documentation, title="RobotCommand.__doc__", expand=False))
     show("RobotCommand()", RobotCommand())
     show(
         "RobotCommand(command_type=RobotCommand.MOVE, linear_velocity_x=0.5)",
@@ -47,7 +50,7 @@ def the_wire_without_ros() -> None:
     stop("2  It reads and writes the wire format by itself")
     command = RobotCommand(command_type=RobotCommand.TURN, angular_velocity_z=1.5)
     data = command.serialize()
-    show("command.serialize()", data.hex(" ", 4))
+    show("command.serialize()", data.hex(" ", -4))
     show("RobotCommand.deserialize(data) == command", RobotCommand.deserialize(data) == command)
     show("'rclpy' in sys.modules", "rclpy" in sys.modules)
 
