@@ -6,6 +6,7 @@ median counts. Times include what a tool imports for the work, but not the inter
 
 import json
 import os
+import re
 import shutil
 import statistics
 import subprocess
@@ -60,7 +61,8 @@ def run_rosbags(inputs: Path, codecs: bool) -> int:
     types = {}
     for path in interface_files(inputs):
         text = path.read_text(encoding="utf-8")
-        if path.suffix == ".msg" and "wstring" not in text:  # which rosbags does not know
+        # rosbags knows neither services and actions nor wstring
+        if path.suffix == ".msg" and not re.search("^wstring", text, re.MULTILINE):
             types.update(get_types_from_msg(text, f"{path.parts[-3]}/msg/{path.stem}"))
     generate_python_code(types)
     store.register(types)
