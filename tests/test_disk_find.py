@@ -185,6 +185,17 @@ def test_names_that_would_leave_the_folder_are_not_looked_for(name):
         ("int8 A=1\n", "int8 A = 1  # one\n", True),
         ("int8 a 1\n", "int8 a   1\n", True),
         ("int8\ta\n", "int8 a\n", True),
+        ("pkg/A a\n", "A a\n", True),
+        ("pkg/A[<=3] a\n", "A[<=3] a\n", True),
+        ("float32 a 0\n", "float32 a 0.0\n", True),
+        ("float32 A=1e3\n", "float32 A=1000\n", True),
+        ("float32 a 0\n", "float32 a 1\n", False),
+        ("other/A a\n", "A a\n", False),
+        ("int8 a\nint8 B=1\n", "int8 B=1\nint8 a\n", True),
+        ("int8 A=1\n---\n", "---\nint8 A=1\n", False),
+        ("int8 a\n---\n", "---\nint8 a\n", False),
+        ("bool a true\n", "bool a True\n", True),
+        ("int8 a 0\n", "int8 a=0\n", False),
         ("int8 a\n", "int16 a\n", False),
         ("string A=x  y\n", "string A=x y\n", False),
         ("int8 a\nint8 b\n", "int8 b\nint8 a\n", False),
@@ -193,4 +204,4 @@ def test_names_that_would_leave_the_folder_are_not_looked_for(name):
     ],
 )
 def test_dependencies_are_compared_by_what_they_mean(one, other, same):
-    assert (meaning(one) == meaning(other)) is same
+    assert (meaning(one, "pkg") == meaning(other, "pkg")) is same

@@ -103,6 +103,9 @@ def test_a_failure_at_any_point_leaves_everything_as_it_was(operation, force, ou
         if fault.count < point:
             assert done
             break
+        if done and operation == "unlink":  # tidying up afterwards may fail
+            assert generated(out).items() >= NEW.items()
+            break
         assert not done, f"{operation} number {point} failed unnoticed"
         assert tree(out) == before, f"{operation} number {point}"
         assert {"IDL612", "IDL614"}.intersection(codes_of(report))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 
 import click
@@ -28,10 +29,16 @@ def command(code: str) -> int:
         hint = f"did you mean {close}?" if close else f"codes run from {min(CODES)} to {max(CODES)}"
         raise click.UsageError(f"no such code: {code}; {hint}")
     if terminal.colours(sys.stdout):
-        from rich.console import Console
-        from rich.markdown import Markdown
-
-        Console(width=min(100, Console().width)).print(Markdown(text))
+        _show(text)
     else:
         sys.stdout.write(text)
     return 0
+
+
+def _show(text: str) -> None:
+    """Write a page to a terminal, with the names of files, which Markdown would hide."""
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    named = re.sub(r"^```(\S*[./]\S*)$", r"`\1`\n```text", text, flags=re.MULTILINE)
+    Console(width=min(100, Console().width)).print(Markdown(named))

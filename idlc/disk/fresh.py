@@ -52,10 +52,11 @@ def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
 
 def _dependency(name: str, library: Library) -> str:
     try:
-        source = library.source(TypeName.parse(name))
+        parsed = TypeName.parse(name)
     except ValueError:
         return ""
-    return meaning(source.text) if source else ""
+    source = library.source(parsed)
+    return meaning(source.text, parsed.package) if source else ""
 
 
 def _outputs_stand(out: Path, lock: Lock) -> bool:

@@ -5,6 +5,7 @@ The file is JSON, sorted and indented, and names nothing of the machine that it 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from pathlib import Path, PurePosixPath
 
@@ -51,24 +52,33 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def meaning(text: str) -> str:
-    """Return a SHA-256 of an interface's text that ignores its comments and spacing.
+def meaning(text: str, package: str) -> str:
+    """Return a SHA-256 of an interface's text that ignores its comments and spelling.
 
-    Dependencies are recorded by it: the built-in catalogue has no comments, an installed
-    package has, and both compile to the same.
+    Dependencies are recorded by it: the built-in catalogue has no comments and spells out what
+    an installed package abbreviates, and both compile to the same.
     """
-    lines = []
+    constants: list[str] = []
+    fields: list[str] = []
     for line in text.splitlines():
         code = line.partition("#")[0].replace("\t", " ").rstrip()
-        if code:
-            kind, _, rest = code.partition(" ")
-            name, sign, value = rest.lstrip(" ").partition("=")
-            if sign:
-                lines.append(f"{kind} {name.rstrip(' ')}={value.lstrip(' ')}")
-            else:
-                name, _, value = name.partition(" ")
-                lines.append(f"{kind} {name} {value.lstrip(' ')}".rstrip())
-    return digest("\n".join(lines).encode())
+        kind, _, rest = code.removeprefix(f"{package}/").partition(" ")
+        name, sign, value = rest.lstrip(" ").partition("=")
+        if sign:
+            constants.append(f"{kind} {name.rstrip(' ')}={_value(kind, value.strip(' '))}")
+        elif code:
+            name, _, value = name.partition(" ")
+            fields.append(f"{kind} {name} {_value(kind, value.strip(' '))}")
+        if kind.startswith("---"):
+            constants.append(kind)
+    return digest("\n".join((*constants, *fields)).encode())
+
+
+def _value(kind: str, text: str) -> str:
+    if kind in ("float32", "float64"):
+        with contextlib.suppress(ValueError):
+            return repr(float(text))
+    return text.lower() if kind == "bool" else text
 
 
 def encode(lock: Lock) -> bytes:

@@ -127,13 +127,10 @@ def _package(
 
     with stage("render", model.package):
         files = {file.path: file.text for file in render_package(model)}
-    for path, text in files.items():
-        if path.endswith(".py"):
-            with stage("compile", f"{target.name}/{path}"):
-                compile(text, path, "exec", dont_inherit=True)
     plan = target.plan(files, check=options.check)
     if plan is None:
         return None
+    _check_syntax(plan, target)
     others = [n for n in model.interfaces if f"{n.kind}/{n.name}.{n.kind}" not in digests]
     return Package(
         target,
@@ -150,6 +147,14 @@ def _package(
             outputs=plan.outputs,
         ),
     )
+
+
+def _check_syntax(plan: Plan, target: Target) -> None:
+    """Fail on rendered code that Python cannot read; what is only copied was read in tests."""
+    for change in plan.changes:
+        if change.new and change.path.endswith(".py") and not change.path.startswith("_idlc/"):
+            with stage("compile", f"{target.name}/{change.path}"):
+                compile(change.new, change.path, "exec", dont_inherit=True)
 
 
 def _imports(model: Model) -> tuple[str, ...]:
