@@ -225,14 +225,11 @@ class _Decoder:
         self.number("size")
         start = self.start()
         self.line(f"{self.moved(-1)} + size", "end")
-        part = f"data[{start} : end + (data[end] > 0)]"
+        part = f"{start} : end + (data[end] > 0)"
         if self.bulk:
-            self.line(call("str", part, '"utf-8"', '"replace"'), target)
-        elif len(target) < 30:
-            self.line(f"{part}.decode()", target)
+            self.line(call("str", f"data[{part}]", '"utf-8"', '"replace"'), target)
         else:
-            self.line(f"{part}.decode()", "value")
-            self.line("value", target)
+            self.line(Group("data", (part,), ".decode()", "[]", ""), target)
         self.base, self.offset = "end", 1
         self.modulus, self.residue = 1, 0
 

@@ -10,7 +10,7 @@ remainder in `low`) only where somebody reads it.
 from __future__ import annotations
 
 from idlc.emit import code, layout
-from idlc.emit.position import Position, align_up
+from idlc.emit.position import Position, aligned_to_8
 from idlc.emit.pretty import Comprehension, Group, Node, call
 from idlc.emit.tables import Tables
 from idlc.model import ir
@@ -66,7 +66,8 @@ class _Encoder:
                 value = call(self.tables.block_writer(step), place.text)
                 self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
             case layout.Enter(place):
-                self.line(place.text, place.local)
+                if not step.empty:
+                    self.line(place.text, place.local)
             case layout.Text(place, wide):
                 if wide:
                     writer = self.tables.function("wide_text", "wide_text(order)")
@@ -111,7 +112,7 @@ class _Encoder:
             self.flush(4)
         size = self.tables.local(f"{place.local}_size")
         self.line(f"{place.text}.encode()", place.local)
-        self.line(f"len({place.local})", size)
+        self.line(call("len", place.local), size)
         self.field("I", 4, 4, f"{size} + 1")
         self.frame.fields.append("*")
         self.frame.values.append(place.local)
@@ -140,6 +141,9 @@ class _Encoder:
     def settle(self) -> None:
         """Note the position in `at` and `low`, and begin a new frame there."""
         here = self.here
+        for target, value in here.before:
+            self.note(target, value)
+        here.before.clear()
         if not here.constant:
             self.note("at", here.text)
             if not here.known(4):
@@ -149,6 +153,7 @@ class _Encoder:
 
     def note(self, target: str, value: str) -> None:
         """Note a position; dropped later unless it is read."""
+        value = without_parentheses(value)
         if target != value:
             words = value.replace("(", " ").split()
             self.body.append(code.Note(target, value, frozenset({"at", "low"} & set(words))))
@@ -269,7 +274,8 @@ class _Encoder:
             self.pad(repeat.align, local)
             self.put(part)
             outside, self.body = self.body, []
-            self.note("at", f"{align_up('at', repeat.align)} + {size}")
+            start = aligned_to_8("at") if repeat.align == 8 else "at"
+            self.note("at", f"{start} + {size}")
             self.note("low", size)
             outside.append(code.Block(f"if {local}:", tuple(self.body)))
             self.body = outside
@@ -306,6 +312,16 @@ class _Encoder:
         self.body = outside
         self.here = head
         self.frame = Frame(head)
+
+
+def without_parentheses(value: str) -> str:
+    """Return an expression without parentheses around all of it."""
+    depth = 0
+    for place, character in enumerate(value):
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and place < len(value) - 1:
+            return value
+    return value[1:-1] if value.startswith("(") else value
 
 
 def block_code(primitive: str) -> str:

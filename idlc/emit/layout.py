@@ -109,6 +109,7 @@ class Enter(msgspec.Struct, frozen=True):
 
     place: Place
     type: ir.TypeName
+    empty: bool
 
 
 class Items(msgspec.Struct, frozen=True):
@@ -133,22 +134,22 @@ def steps(
     message: ir.Message, messages: Messages, names: pynames.Locals
 ) -> tuple[Step, ...]:
     """Return the steps of a structure whose object is in the variable `message`."""
-    return tuple(_steps(message, messages, names, "message", ""))
+    return tuple(_steps(message, messages, names, "message", ()))
 
 
 def _steps(
-    message: ir.Message, messages: Messages, names: pynames.Locals, owner: str, prefix: str
+    message: ir.Message, messages: Messages, names: pynames.Locals, owner: str, path: tuple[str, ...]
 ) -> list[Step]:
     if not message.fields:
         return [Dummy()]
     found: list[Step] = []
     for field in message.fields:
-        wanted = f"{prefix}_{field.name}" if prefix else field.name
-        place = Place(owner, pynames.slot(field.name), names.new(wanted))
+        inner = (*path, field.name)
+        place = Place(owner, pynames.slot(field.name), names.shortest(inner))
         if isinstance(field.type, ir.Ref):
-            found.append(Enter(place, field.type.target))
             nested = messages[field.type.target]
-            found += _steps(nested, messages, names, place.local, place.local)
+            found.append(Enter(place, field.type.target, not nested.fields))
+            found += _steps(nested, messages, names, place.local, inner)
         else:
             found.append(_step(field.type, place, messages, names))
     return found
@@ -174,7 +175,7 @@ def _step(
                 return Texts(place, element.wide, size, bound)
             if isinstance(element, ir.Ref):
                 item = names.new("item")
-                body = _steps(messages[element.target], messages, names, item, item)
+                body = _steps(messages[element.target], messages, names, item, (item,))
                 return Items(place, element.target, item, tuple(body), size, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 

@@ -30,6 +30,10 @@ def exported(interface: ir.Interface) -> list[str]:
     return sorted(set(names))
 
 
+def _order(item: tuple[str, object]) -> list[tuple[int, str]]:
+    return pynames.natural(item[0])
+
+
 def package(model: link.Model, kind: ir.Kind) -> PackageView:
     """Return the view of one kind's package."""
     found = {
@@ -40,16 +44,16 @@ def package(model: link.Model, kind: ir.Kind) -> PackageView:
     }
     imports: list[str] = []
     by_module: dict[str, list[str]] = {}
-    for name, module in sorted(found.items()):
-        by_module.setdefault(module, []).append(f"{name} as {name}")
-    for module, names in sorted(by_module.items()):
+    for name, module in sorted(found.items(), key=_order):
+        by_module.setdefault(module, []).append(name)
+    for module, names in sorted(by_module.items(), key=_order):
         one = f"    from .{module} import {', '.join(names)}"
         if len(one) <= 88:
             imports.append(one)
         else:
             imports += [f"    from .{module} import (", *(f"        {n}," for n in names), "    )"]
-    quoted = tuple(f'"{name}"' for name in sorted(found))
-    pairs = tuple(f'"{name}": "{module}"' for name, module in sorted(found.items()))
+    quoted = tuple(f'"{name}"' for name in sorted(found, key=pynames.natural))
+    pairs = tuple(f'"{name}": "{module}"' for name, module in sorted(found.items(), key=_order))
     return PackageView(
         path=f"{kind}/__init__.py",
         summary=f"{TITLES[kind]} of {model.package}, imported when they are asked for.",

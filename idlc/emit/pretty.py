@@ -15,12 +15,16 @@ WIDTH = 88
 
 
 class Group(msgspec.Struct, frozen=True):
-    """A call, list, tuple or subscript: `before`, the items between brackets, `after`."""
+    """A call, list, tuple or subscript: `before`, the items between brackets, `after`.
+
+    Only a subscript is broken without a trailing `comma`.
+    """
 
     before: str
     items: tuple[Node, ...]
     after: str = ""
     brackets: str = "()"
+    comma: str = ","
 
     def flat(self) -> str:
         """Return the group on one line."""
@@ -66,7 +70,7 @@ def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[st
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
     result = [f"{margin}{before}{node.before}{node.brackets[0]}"]
     for item in node.items:
-        result += lines(item, indent + 4, "", ",")
+        result += lines(item, indent + 4, "", node.comma)
     result.append(f"{margin}{node.brackets[1]}{node.after}{after}")
     return result
 

@@ -29,6 +29,12 @@ def snake(name: str) -> str:
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()
 
 
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts numbers in names by their value, as linters do."""
+    parts = re.findall(r"\d+|\D+", name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+
+
 def module(name: ir.TypeName) -> ModuleName:
     """Return the module that holds an interface, without its package."""
     return ModuleName("_" + snake(name.name))
@@ -64,11 +70,22 @@ class Locals:
         """Return `wanted`, or a name like it that is free and shadows nothing."""
         name = wanted
         count = 1
-        while name in self._taken or keyword.iskeyword(name) or hasattr(builtins, name):
+        while not self._free(name):
             count += 1
             name = f"{wanted}_{count}"
         self._taken.add(name)
         return LocalName(name)
+
+    def shortest(self, path: tuple[str, ...]) -> LocalName:
+        """Return the last part of a path, with as many parts before it as make it new."""
+        for start in reversed(range(len(path))):
+            name = "_".join(path[start:])
+            if self._free(name):
+                return self.new(name)
+        return self.new("_".join(path))
+
+    def _free(self, name: str) -> bool:
+        return not (name in self._taken or keyword.iskeyword(name) or hasattr(builtins, name))
 
     def mark(self) -> frozenset[str]:
         """Return what `reset` needs to forget all names given from now on."""

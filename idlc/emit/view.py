@@ -11,7 +11,7 @@ import msgspec
 from idlc.emit import code, documentation, fields, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
-from idlc.emit.pretty import Group, assign, lines
+from idlc.emit.pretty import Group, assign, call, lines
 from idlc.emit.references import References, referred
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -51,6 +51,7 @@ class ModuleView(msgspec.Struct, frozen=True):
 
 
 SERVICE_PARTS = ("Request", "Response", "Event")
+TYPES = "_ClassVar[dict[str, str]]"
 PRAGMAS = (
     '# mypy: disable-error-code="import-not-found,import-untyped"',
     "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
@@ -99,6 +100,7 @@ def _imports(
         standard.append("from array import array as _array")
     if references.implied:
         standard.append("from typing import TYPE_CHECKING")
+    standard.append("from typing import ClassVar as _ClassVar")
     inside, outside = references.imports(references.direct, kind)
     relative = ["from .. import _idlc"]
     if "array" in used:
@@ -137,26 +139,39 @@ def _message(
     writing = code.function(encode(steps, tables), 8)
     makers, needed = _makers(structure.name, steps, references, tables)
     reading = code.text_of(decode(steps, tables, makers[structure.name], makers), 8)
-    definitions = (
+    definitions = tuple(
         line for name, value in tables.definitions for line in assign(name, value, 4)
     )
+    arrays = any("_arrays." in line for line in definitions) and not _has_arrays(interface)
     bulk = ", bulk=True" if is_bulk(steps) else ""
     return MessageView(
         name=references.name(structure.name),
         body=tuple(_body(structure, references)),
         init=tuple(_init(structure, references)),
         codec=f"_{pynames.snake(structure.name.name)}",
-        tables=(*_codec_imports(needed, references, interface.name.kind), *definitions),
+        tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
         decode=tuple(reading),
         result=f"_idlc.Codec(encode, decode{bulk})",
     )
 
 
+def _has_arrays(interface: ir.Interface) -> bool:
+    """Whether a module holds fixed-size numeric arrays itself and so imports numpy."""
+    return any(
+        fields.support(field.type) == "array"
+        for message in derive.messages(interface)
+        for field in message.fields
+    )
+
+
 def _codec_imports(
-    needed: list[ir.TypeName], references: References, kind: ir.Kind
+    needed: list[ir.TypeName], references: References, kind: ir.Kind, arrays: bool
 ) -> list[str]:
+    """Return the imports inside a codec: what only it needs, and only when it is used."""
     inside, outside = references.imports(needed, kind)
+    if arrays:
+        inside.insert(0, "from .._idlc import arrays as _arrays")
     result = [f"    {line}" for line in _wrap(inside)]
     if outside:
         result += [""] if inside else []
@@ -177,7 +192,7 @@ def _body(structure: ir.Message, references: References) -> list[str]:
         *literals.docstring(doc, 4),
         "",
         *_tuple("__match_args__", tuple(public)),
-        *lines(Group("", types, brackets="{}"), 4, "_fields_and_field_types = "),
+        *lines(Group("", types, brackets="{}"), 4, f"_fields_and_field_types: {TYPES} = "),
         *_separated(_constants(structure)),
         *_separated(
             [f"    {fields.view(f, references, qualify).declaration}" for f in structure.fields]
@@ -218,8 +233,9 @@ def _makers(
     for type_ in (own, *_types(steps)):
         if type_ not in makers:
             name = references.name(type_)
-            wanted = f"new_{pynames.snake(type_.name)}"
-            makers[type_] = tables.define(wanted, f"maker {name}", f"_idlc.maker({name})")
+            wanted = f"new_{pynames.snake(type_.name)}".replace("__", "_")
+            maker = call("_idlc.maker", name)
+            makers[type_] = tables.define(wanted, f"maker {name}", maker)
     known = references.own | references.direct
     return makers, [type_ for type_ in makers if type_ not in known]
 

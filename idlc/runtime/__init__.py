@@ -6,8 +6,7 @@ It imports the standard library only; `arrays` imports numpy, `typesupport` look
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any as Any
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from .cdr import (
     HEADERS,

@@ -10,8 +10,7 @@ import numpy as np
 from .cdr import NATIVE
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike as ArrayLike
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 Element = TypeVar("Element", bound="np.generic")
 
@@ -159,3 +158,33 @@ def array_reader(order: str, name: str, size: int) -> Callable[[bytes], Any]:
         return ndarray(size, dtype, bytearray(raw)).byteswap()
 
     return native if order == NATIVE or dtype.itemsize == 1 else swapped
+
+
+__all__ = [
+    "FLOAT32",
+    "FLOAT64",
+    "INT8",
+    "INT16",
+    "INT32",
+    "INT64",
+    "UINT8",
+    "UINT16",
+    "UINT32",
+    "UINT64",
+    "ArrayLike",
+    "Float32Array",
+    "Float64Array",
+    "Int8Array",
+    "Int16Array",
+    "Int32Array",
+    "Int64Array",
+    "UInt8Array",
+    "UInt16Array",
+    "UInt32Array",
+    "UInt64Array",
+    "array",
+    "array_reader",
+    "array_writer",
+    "to_ndarray",
+    "zeros",
+]

@@ -31,7 +31,7 @@ PAD8 = tuple(bytes((4 - at) % 8) for at in range(8))
 LONG_TEXT = 1024
 
 
-def layout(order: str, fields: str, start: int = 4, text: int = 0, align: int = 1) -> Struct:
+def layout(order: str, fields: str, start: int = 0, text: int = 0, align: int = 1) -> Struct:
     """Return the Struct of `fields` beginning at `start`, for a text of `text` bytes.
 
     It ends with the padding that a following value of `align` bytes needs.
@@ -62,7 +62,7 @@ def phases(order: str, fields: str, align: int = 1) -> tuple[Struct, ...]:
 class Texts(dict[int, Callable[..., bytes]]):
     """The `pack` functions of a layout with one text, by the size of the text in bytes."""
 
-    def __init__(self, order: str, fields: str, start: int = 4, align: int = 1) -> None:
+    def __init__(self, order: str, fields: str, start: int = 0, align: int = 1) -> None:
         super().__init__()
         self._layout = order, fields, start
         self._align = align

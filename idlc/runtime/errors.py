@@ -40,7 +40,7 @@ class ValidationError(ValueError):
         return f"{self.path}: must be {self.allowed}, not {text}"
 
 
-class importing:  # noqa: N801
+class importing:
     """A context that says, when an import in it fails, how to get the package."""
 
     def __enter__(self) -> None:

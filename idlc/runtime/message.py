@@ -15,10 +15,7 @@ from .names import public_name, slot_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from dataclasses import Field
-    from dataclasses import dataclass as dataclass
-
-    from typing_extensions import Self
+    from dataclasses import Field, dataclass
 else:
 
     def dataclass(**_options):
@@ -27,17 +24,19 @@ else:
 
 
 Value = TypeVar("Value")
+Kind = TypeVar("Kind", bound="Message")
 
 
 class Fresh(Generic[Value]):
     """A class attribute whose value is made anew at each access, for mutable defaults."""
 
-    def __init__(self, make: Callable[[], Value]) -> None:
+    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
         self._make = make
+        self._arguments = arguments
 
     def __get__(self, instance: object, owner: type | None = None) -> Value:
         """Return a new value."""
-        return self._make()
+        return self._make(*self._arguments)
 
 
 class _SlotTypes:
@@ -145,7 +144,7 @@ class Message(metaclass=MessageMeta):
         return self.serialize(byteorder=byteorder)
 
     @classmethod
-    def deserialize(cls, buffer: bytes | bytearray | memoryview) -> Self:
+    def deserialize(cls: type[Kind], buffer: bytes | bytearray | memoryview) -> Kind:
         """Return the message that `buffer` begins with, in the byte order that its header names.
 
         Raises DecodeError. Bytes after the message are ignored; invalid UTF-8 becomes U+FFFD.
@@ -169,7 +168,7 @@ class Message(metaclass=MessageMeta):
         return to_dict(self)
 
     @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Self:
+    def from_dict(cls: type[Kind], values: dict[str, Any]) -> Kind:
         """Return the message that `to_dict` would turn into `values`; absent fields have defaults.
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
@@ -195,3 +194,6 @@ class Message(metaclass=MessageMeta):
             parts.append(f"{field}={shown!r}")
         package = kind.__module__.rpartition(".")[0]
         return f"{package}.{kind.__name__}({', '.join(parts)})"
+
+
+__all__ = ["Fresh", "InterfaceMeta", "Message", "MessageMeta", "dataclass"]
