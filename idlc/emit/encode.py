@@ -129,9 +129,7 @@ class _Encoder:
             frame.widest = max(frame.widest, align)
             phase = frame.phase()
             start = None if phase else frame.residue
-            writer = self.tables.writer(
-                "".join(frame.fields), bool(frame.text_size), start, align
-            )
+            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
             key = f"[{frame.text_size}]" if frame.text_size else ""
             method = ".pack" if phase and not key else ""
             self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
@@ -170,9 +168,7 @@ class _Encoder:
         if bound is not None:
             self.check(f"len({local}) > {bound}", "too many elements")
 
-    def buffer(
-        self, place: layout.Place, value: Node, unit: int, bound: int | None = None
-    ) -> None:
+    def buffer(self, place: layout.Place, value: Node, unit: int, bound: int | None = None) -> None:
         """Emit the count of a buffer's units, and the buffer."""
         local = place.local
         self.line(value, local)
@@ -254,9 +250,7 @@ class _Encoder:
         self.line(Group(f'b"{gap}".join', (Comprehension(row, loop),)), block)
         self.elements(block, local, repeat, maybe_empty=step.size is None)
 
-    def elements(
-        self, part: str, local: str, repeat: layout.Fixed, *, maybe_empty: bool
-    ) -> None:
+    def elements(self, part: str, local: str, repeat: layout.Fixed, *, maybe_empty: bool) -> None:
         """Emit elements of constant size, of which no padding goes before if there are none."""
         gap = repeat.stride - repeat.size
         size = f"len({local})" if repeat.stride == 1 else f"{repeat.stride} * len({local})"

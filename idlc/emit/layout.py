@@ -130,15 +130,17 @@ CODES = {"bool": "?", "byte": "c"}
 LIST_PRIMITIVES = frozenset({"bool", "byte"})
 
 
-def steps(
-    message: ir.Message, messages: Messages, names: pynames.Locals
-) -> tuple[Step, ...]:
+def steps(message: ir.Message, messages: Messages, names: pynames.Locals) -> tuple[Step, ...]:
     """Return the steps of a structure whose object is in the variable `message`."""
     return tuple(_steps(message, messages, names, "message", ()))
 
 
 def _steps(
-    message: ir.Message, messages: Messages, names: pynames.Locals, owner: str, path: tuple[str, ...]
+    message: ir.Message,
+    messages: Messages,
+    names: pynames.Locals,
+    owner: str,
+    path: tuple[str, ...],
 ) -> list[Step]:
     if not message.fields:
         return [Dummy()]
@@ -155,9 +157,7 @@ def _steps(
     return found
 
 
-def _step(
-    type_: ir.FieldType, place: Place, messages: Messages, names: pynames.Locals
-) -> Step:
+def _step(type_: ir.FieldType, place: Place, messages: Messages, names: pynames.Locals) -> Step:
     match type_:
         case ir.Primitive(name):
             return Number(place, CODES.get(name, type_.info.code), type_.info.size)

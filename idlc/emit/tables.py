@@ -103,9 +103,7 @@ class Tables:
                 f"{kind}_{step.count}", f"{kind} {step.count}", f"_idlc.{kind}_writer({step.count})"
             )
         dtype = numpy_name(step.primitive)
-        expression = Group(
-            f"_arrays.array_{what}", ("order", json.dumps(dtype), str(step.count))
-        )
+        expression = Group(f"_arrays.array_{what}", ("order", json.dumps(dtype), str(step.count)))
         verb = "array" if what == "reader" else "bytes"
         return self.define(f"{verb}_{dtype}_{step.count}", expression.flat(), expression)
 

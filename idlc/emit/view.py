@@ -184,9 +184,7 @@ def _body(structure: ir.Message, references: References) -> list[str]:
     """Return the class's docstring, names, constants and fields."""
     qualify = fields.shadows(structure)
     public = [f'"{pynames.field(field.name)}"' for field in structure.fields]
-    types = tuple(
-        f'"{field.name}": "{fields.idl_text(field.type)}"' for field in structure.fields
-    )
+    types = tuple(f'"{field.name}": "{fields.idl_text(field.type)}"' for field in structure.fields)
     doc = documentation.message(structure, f"{structure.name}.")
     return [
         *literals.docstring(doc, 4),

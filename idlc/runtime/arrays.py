@@ -24,7 +24,9 @@ def to_ndarray(dtype: Any, size: int, values: Any) -> Any:
         return values
     result = np.array(values, dtype)
     if result.shape != (size,):
-        raise ValueError(f"needs an array of {size} elements, not of shape {result.shape}")
+        raise ValueError(
+            f"needs an array of {size} elements, not of shape {result.shape}"
+        )
     return result
 
 
@@ -66,7 +68,9 @@ class NumberArray(Generic[Element]):
 
     if TYPE_CHECKING:
 
-        def __get__(self, message: object, owner: type | None = None) -> NDArray[Element]: ...
+        def __get__(
+            self, message: object, owner: type | None = None
+        ) -> NDArray[Element]: ...
         def __set__(self, message: object, values: ArrayLike) -> None: ...
 
 

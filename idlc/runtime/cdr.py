@@ -31,7 +31,9 @@ PAD8 = tuple(bytes((4 - at) % 8) for at in range(8))
 LONG_TEXT = 1024
 
 
-def layout(order: str, fields: str, start: int = 0, text: int = 0, align: int = 1) -> Struct:
+def layout(
+    order: str, fields: str, start: int = 0, text: int = 0, align: int = 1
+) -> Struct:
     """Return the Struct of `fields` beginning at `start`, for a text of `text` bytes.
 
     It ends with the padding that a following value of `align` bytes needs.
@@ -96,7 +98,9 @@ def text_block(order: str) -> Callable[[Iterable[str]], bytes]:
 
 def wide_text(order: str) -> Callable[[str], bytes]:
     """Return a function that writes a wstring's UTF-16 units, four bytes each."""
-    utf16, utf32 = ("utf-16-le", "utf-32-le") if order == "<" else ("utf-16-be", "utf-32-be")
+    utf16, utf32 = (
+        ("utf-16-le", "utf-32-le") if order == "<" else ("utf-16-be", "utf-32-be")
+    )
     gap = b"\x00\x00"
 
     def write(value: str) -> bytes:
@@ -118,7 +122,9 @@ def wide_block(order: str) -> Callable[[Iterable[str]], bytes]:
 
     def write(values: Iterable[str]) -> bytes:
         raw = [write_one(value) for value in values]
-        return b"".join([part for text in raw for part in (count(len(text) // 4), text)])
+        return b"".join(
+            [part for text in raw for part in (count(len(text) // 4), text)]
+        )
 
     return write
 

@@ -33,7 +33,9 @@ class Codec(NamedTuple):
 Kind = TypeVar("Kind", bound="type[Message]")
 
 
-def codec_for(kind: type[Message]) -> Callable[[Callable[[str], Codec]], Callable[[str], Codec]]:
+def codec_for(
+    kind: type[Message],
+) -> Callable[[Callable[[str], Codec]], Callable[[str], Codec]]:
     """Return a decorator that gives a message class the function that makes its codecs."""
 
     def give(make: Callable[[str], Codec]) -> Callable[[str], Codec]:
@@ -53,7 +55,9 @@ def codec_for(kind: type[Message]) -> Callable[[Callable[[str], Codec]], Callabl
 
 def maker(kind: type) -> Callable[[], Any]:
     """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
-    if "_check_fields" not in getattr(kind, "__slots__", ()) or hasattr(kind, "_codec_"):
+    if "_check_fields" not in getattr(kind, "__slots__", ()) or hasattr(
+        kind, "_codec_"
+    ):
         return partial(object.__new__, kind)
 
     def make() -> Any:
@@ -107,11 +111,15 @@ def as_subclass(kind: type[Any], message: Any) -> Any:
 def order_of(data: Any) -> str:
     """Return the byte order that an encapsulation header names; raise DecodeError otherwise."""
     if len(data) < 4:
-        raise DecodeError(f"the encapsulation header needs 4 bytes, there are {len(data)}")
+        raise DecodeError(
+            f"the encapsulation header needs 4 bytes, there are {len(data)}"
+        )
     for order, header in HEADERS.items():
         if bytes(data[:2]) == header[:2]:
             return order
-    raise DecodeError(f"unknown encapsulation {bytes(data[:2]).hex()}, only plain CDR is read")
+    raise DecodeError(
+        f"unknown encapsulation {bytes(data[:2]).hex()}, only plain CDR is read"
+    )
 
 
 def recover(kind: type[Message], data: Any, error: Exception) -> Any:

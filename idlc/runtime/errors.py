@@ -46,8 +46,12 @@ class importing:
     def __enter__(self) -> None:
         pass
 
-    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        if isinstance(error, ImportError) and not isinstance(error, MissingPackageError):
+    def __exit__(
+        self, _kind: object, error: BaseException | None, _trace: object
+    ) -> None:
+        if isinstance(error, ImportError) and not isinstance(
+            error, MissingPackageError
+        ):
             raise missing_package(error) from error
 
 

@@ -38,16 +38,22 @@ class _GroupMeta(InterfaceMeta):
 
     _interface: ClassVar[Any] = None
 
-    def __new__(cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]) -> Any:
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
+    ) -> Any:
         if not bases:
             return super().__new__(cls, name, bases, namespace)
-        metaclass = type(f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]})
+        metaclass = type(
+            f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
+        )
         made = type.__new__(metaclass, name, bases, namespace)
         metaclass._interface = made
         return made
 
     def __call__(cls, *_values: object, **_named: object) -> Any:
-        raise NotImplementedError(f"{cls.__name__} is a name for its messages, not a message")
+        raise NotImplementedError(
+            f"{cls.__name__} is a name for its messages, not a message"
+        )
 
 
 class ServiceMeta(_GroupMeta):

@@ -85,8 +85,12 @@ class MessageMeta(InterfaceMeta):
         fields = namespace.get("_fields_and_field_types")
         if fields is None:
             return super().__new__(cls, name, bases, namespace)
-        metaclass = type(f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]})
-        converted = {public: namespace.pop(public, None) for public in map(public_name, fields)}
+        metaclass = type(
+            f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
+        )
+        converted = {
+            public: namespace.pop(public, None) for public in map(public_name, fields)
+        }
         namespace["__slots__"] = [slot_name(field) for field in fields]
         made: Any = type.__new__(metaclass, name, bases, namespace)
         for slot, (public, conversion) in zip(made.__slots__, converted.items()):
@@ -125,9 +129,7 @@ class Message(metaclass=MessageMeta):
     _fields_and_field_types: ClassVar[dict[str, str]]
     _codec_: ClassVar[Callable[[str], codec.Codec]]
     SLOT_TYPES: ClassVar[tuple[Any, ...]] = _SlotTypes()  # type: ignore[assignment]
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]] = (
-        _DataclassFields()  # type: ignore[assignment]
-    )
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]] = _DataclassFields()  # type: ignore[assignment]
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
@@ -182,7 +184,8 @@ class Message(metaclass=MessageMeta):
             return NotImplemented
         slots = type(self)._fields_and_field_types
         return all(
-            _equal(getattr(self, slot), getattr(other, slot)) for slot in map(slot_name, slots)
+            _equal(getattr(self, slot), getattr(other, slot))
+            for slot in map(slot_name, slots)
         )
 
     def __repr__(self) -> str:

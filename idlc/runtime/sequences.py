@@ -42,8 +42,9 @@ def to_array(code: str, values: Any) -> Any:
     except TypeError:
         result.extend(values)
         return result
-    if SAME_NUMBER.get(view.format, view.format) == code:
-        result.frombytes(view if view.c_contiguous else view.tobytes())
+    if view.ndim == 1 and SAME_NUMBER.get(view.format, view.format) == code:
+        if view.nbytes:
+            result.frombytes(view.cast("B") if view.c_contiguous else view.tobytes())
     else:
         result.extend(view.tolist())
     return result
@@ -69,7 +70,9 @@ class NumberSequence(Generic[Number]):
 
     if TYPE_CHECKING:
 
-        def __get__(self, message: object, owner: type | None = None) -> array[Number]: ...
+        def __get__(
+            self, message: object, owner: type | None = None
+        ) -> array[Number]: ...
         def __set__(self, message: object, values: Iterable[Number]) -> None: ...
 
 
