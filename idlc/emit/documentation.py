@@ -1,0 +1,52 @@
+"""Docstrings of generated classes: the file's comments, and what the types do not say."""
+
+from __future__ import annotations
+
+from idlc.emit import literals, pynames
+from idlc.model import ir
+
+
+def message(structure: ir.Message, summary: str) -> list[str]:
+    """Return the lines of a message's docstring; `summary` stands in for a missing comment."""
+    lines = [literals.prose(line) for line in structure.comment] or [summary]
+    if len(lines) > 1 and lines[1]:
+        lines.insert(1, "")
+    if structure.fields:
+        lines += ["", "Attributes:"]
+        for field in structure.fields:
+            lines += literals.wrapped(_field(field), 8, 4)
+    return lines
+
+
+def _field(field: ir.Field) -> str:
+    facts = ", ".join(filter(None, (type_text(field.type), *_limits(field.type))))
+    unit = f" [{literals.prose(field.unit)}]" if field.unit else ""
+    words = " ".join(literals.prose(line).strip() for line in field.comment).strip()
+    return f"{pynames.field(field.name)}: {facts}{unit}." + (f" {words}" if words else "")
+
+
+def type_text(type_: ir.FieldType) -> str:
+    """Return a type as interface files spell it."""
+    match type_:
+        case ir.Array(element, size):
+            return f"{type_text(element)}[{size}]"
+        case ir.Sequence(element, bound):
+            return f"{type_text(element)}[{'' if bound is None else f'<={bound}'}]"
+        case ir.String(wide, bound):
+            return ("wstring" if wide else "string") + ("" if bound is None else f"<={bound}")
+        case ir.Ref(target):
+            return f"{target.package}/{target.name}"
+        case ir.Primitive(name):
+            return name
+        case ir.Unknown():
+            raise ValueError("an unknown type cannot be emitted")
+
+
+def _limits(type_: ir.FieldType) -> tuple[str, ...]:
+    """Return the range of an integer in words; what the type itself says is not repeated."""
+    element = ir.element_of(type_)
+    if isinstance(element, ir.Primitive) and element.name != "byte":
+        info = element.info
+        if info.low is not None and info.size < 8:
+            return (f"{info.low} to {info.high}",)
+    return ()

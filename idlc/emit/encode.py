@@ -1,0 +1,347 @@
+"""From a layout to the statements that write it.
+
+Numbers that follow each other are written by one precompiled Struct; so is a string between
+them, by one Struct for each of its sizes. Positions modulo 8 are followed as far as they are
+known, so that padding is part of the Structs. Where a string or a sequence made them unknown,
+the statement picks the Struct by the position, which is noted in `at` (or, if 4 is enough, its
+remainder in `low`) only where somebody reads it.
+"""
+
+from __future__ import annotations
+
+from idlc.emit import code, layout
+from idlc.emit.position import Position, aligned_to_8
+from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.tables import Tables
+from idlc.model import ir
+
+NONE: frozenset[str] = frozenset()
+
+
+class Frame:
+    """Fixed-size values that follow each other, with at most one text: one Struct."""
+
+    def __init__(self, start: Position) -> None:
+        self.modulus = start.modulus
+        self.residue = start.residue
+        self.fields: list[str] = []
+        self.values: list[Node] = []
+        self.text_size = ""
+        self.widest = 1
+
+    def phase(self) -> str:
+        """Return the subscript that picks a Struct by the position, empty if one is enough."""
+        if self.modulus >= self.widest:
+            return ""
+        return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
+
+
+def encode(steps: tuple[layout.Step, ...], tables: Tables) -> tuple[code.Statement, ...]:
+    """Return the statements that write a message; what they use is defined in `tables`."""
+    encoder = _Encoder(tables, Position())
+    encoder.field("4s", 1, 4, "encapsulation")
+    for step in steps:
+        encoder.step(step)
+    encoder.flush(1)
+    return code.prune(tuple(encoder.body), NONE)
+
+
+class _Encoder:
+    """The statements so far, the frame that grows, and the position after both."""
+
+    def __init__(self, tables: Tables, here: Position) -> None:
+        self.tables = tables
+        self.here = here
+        self.body: list[code.Statement] = []
+        self.frame = Frame(here)
+
+    def step(self, step: layout.Step) -> None:
+        """Emit one step."""
+        match step:
+            case layout.Number(place, letter, size):
+                self.field(letter, size, size, place.text)
+            case layout.Dummy():
+                self.field("x", 1, 1)
+            case layout.Block(place, primitive, count):
+                value = call(self.tables.block_writer(step), place.text)
+                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
+            case layout.Enter(place):
+                if not step.empty:
+                    self.line(place.text, place.local)
+            case layout.Text(place, wide):
+                if wide:
+                    writer = self.tables.function("wide_text", "wide_text(order)")
+                    self.buffer(place, call(writer, place.text), 4)
+                else:
+                    self.text(place)
+            case layout.Bytes(place, primitive, bound):
+                function = "flags" if primitive == "bool" else "octets"
+                writer = self.tables.function(function, function)
+                self.buffer(place, call(writer, place.text), 1, bound)
+            case layout.Numbers():
+                self.numbers(step)
+            case layout.Texts():
+                self.texts(step)
+            case layout.Items():
+                self.items(step)
+
+    def line(self, value: Node, target: str) -> None:
+        """Emit an assignment."""
+        self.body.append(code.Line(value, target))
+
+    def put(self, part: Node, reads: str = "") -> None:
+        """Emit a part of the message."""
+        names = frozenset(name for name in ("at", "low") if f"[{name} " in reads)
+        self.body.append(code.Put(part, names))
+
+    # Values of fixed size, and one text among them, gather in a frame.
+
+    def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
+        """Add a value to the frame."""
+        frame = self.frame
+        frame.fields.append(token)
+        frame.widest = max(frame.widest, align)
+        if value is not None:
+            frame.values.append(value)
+        self.here.align(align)
+        self.here.advance(size)
+
+    def text(self, place: layout.Place) -> None:
+        """Add a string to the frame; a frame has at most one."""
+        if self.frame.text_size:
+            self.flush(4)
+        size = self.tables.local(f"{place.local}_size")
+        self.line(f"{place.text}.encode()", place.local)
+        self.line(call("len", place.local), size)
+        self.field("I", 4, 4, f"{size} + 1")
+        self.frame.fields.append("*")
+        self.frame.values.append(place.local)
+        self.frame.text_size = size
+        self.here.skip(size, 1)
+        self.here.advance(1)
+
+    def flush(self, align: int) -> None:
+        """Write the frame; with the padding for a following `align` where that is known."""
+        frame = self.frame
+        if frame.fields:
+            if max(frame.modulus, frame.widest) < align:
+                align = 1
+            frame.widest = max(frame.widest, align)
+            phase = frame.phase()
+            start = None if phase else frame.residue
+            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
+            key = f"[{frame.text_size}]" if frame.text_size else ""
+            method = ".pack" if phase and not key else ""
+            self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
+            self.here.align(align)
+        self.settle()
+
+    def settle(self) -> None:
+        """Note the position in `at` and `low`, and begin a new frame there."""
+        here = self.here
+        for target, value in here.before:
+            self.note(target, value)
+        here.before.clear()
+        if not here.constant:
+            self.note("at", here.text)
+            if not here.known(4):
+                self.note("low", here.low)
+            self.here = Position.variable(here.modulus, here.residue)
+        self.frame = Frame(self.here)
+
+    def note(self, target: str, value: str) -> None:
+        """Note a position; dropped later unless it is read."""
+        value = without_parentheses(value)
+        if target != value:
+            words = value.replace("(", " ").split()
+            self.body.append(code.Note(target, value, frozenset({"at", "low"} & set(words))))
+
+    # Values of variable size are parts of their own.
+
+    def check(self, condition: str, problem: str) -> None:
+        """Emit a check; `validate` finds the field and the words afterwards."""
+        raised = code.Line(f'raise ValueError("{problem}")')
+        self.body.append(code.Block(f"if {condition}:", (raised,)))
+
+    def bound(self, local: str, bound: int | None) -> None:
+        """Check a sequence's upper limit."""
+        if bound is not None:
+            self.check(f"len({local}) > {bound}", "too many elements")
+
+    def buffer(self, place: layout.Place, value: Node, unit: int, bound: int | None = None) -> None:
+        """Emit the count of a buffer's units, and the buffer."""
+        local = place.local
+        self.line(value, local)
+        self.bound(local, bound)
+        count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
+        self.field("I", 4, 4, count)
+        self.flush(1)
+        self.put(local)
+        self.here.skip(f"len({local})", unit)
+        self.settle()
+
+    def numbers(self, step: layout.Numbers) -> None:
+        """Emit a numeric sequence."""
+        local = step.place.local
+        self.line(call(self.tables.sequence_writer(step), step.place.text), local)
+        self.bound(local, step.bound)
+        self.field("I", 4, 4, f"len({local})")
+        self.flush(1)
+        repeat = layout.Fixed(step.unit, step.unit, step.unit)
+        self.elements(local, local, repeat, maybe_empty=True)
+
+    def texts(self, step: layout.Texts) -> None:
+        """Emit an array or sequence of strings."""
+        local = step.place.local
+        block = self.tables.local(f"{local}_block")
+        function = "wide_block" if step.wide else "text_block"
+        self.begin(step)
+        self.flush(4)
+        self.pad(4)
+        writer = self.tables.function(function, f"{function}(order)")
+        self.line(call(writer, local), block)
+        self.put(block)
+        self.here.skip(f"len({block})", 4 if step.wide else 1)
+        self.settle()
+
+    def begin(self, step: layout.Texts | layout.Items) -> None:
+        """Emit the check of a size, or the count."""
+        local = step.place.local
+        self.line(step.place.text, local)
+        self.bound(local, step.bound)
+        if step.size is None:
+            self.field("I", 4, 4, f"len({local})")
+        else:
+            self.check(f"len({local}) != {step.size}", "wrong number of elements")
+
+    def pad(self, align: int, unless_empty: str = "") -> None:
+        """Emit padding as a part of its own."""
+        here = self.here
+        if here.aligned(align):
+            return
+        phase = "[at & 7]" if align == 8 else "[low & 3]"
+        index = f"[{here.residue}]" if here.known(align) else phase
+        part = f"{self.tables.pad(align)}{index}"
+        self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
+        if not unless_empty:
+            here.align(align)
+
+    def items(self, step: layout.Items) -> None:
+        """Emit an array or sequence of structures."""
+        self.begin(step)
+        repeat = layout.fixed(step.body)
+        if repeat is None:
+            self.loop(step)
+        else:
+            self.fused(step, repeat)
+
+    def fused(self, step: layout.Items, repeat: layout.Fixed) -> None:
+        """Emit structures of constant size: one Struct, one join."""
+        local = step.place.local
+        self.flush(1 if step.size is None else repeat.align)
+        inner = _Encoder(self.tables, Position(8, 4))
+        for part in inlined(step):
+            inner.step(part)
+        writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
+        row = Group(writer, tuple(inner.frame.values))
+        block = self.tables.local(f"{local}_block")
+        gap = "\\x00" * (repeat.stride - repeat.size)
+        loop = f"for {step.item} in {local}"
+        self.line(Group(f'b"{gap}".join', (Comprehension(row, loop),)), block)
+        self.elements(block, local, repeat, maybe_empty=step.size is None)
+
+    def elements(self, part: str, local: str, repeat: layout.Fixed, *, maybe_empty: bool) -> None:
+        """Emit elements of constant size, of which no padding goes before if there are none."""
+        gap = repeat.stride - repeat.size
+        size = f"len({local})" if repeat.stride == 1 else f"{repeat.stride} * len({local})"
+        size += f" - {gap}" if gap else ""
+        modulus = power_of_two(repeat.size, repeat.stride)
+        if not maybe_empty or (self.here.aligned(repeat.align) and not gap):
+            self.pad(repeat.align)
+            self.put(part)
+            self.here.skip(size, modulus)
+        else:
+            self.settle()
+            if self.here.constant:
+                self.note("at", self.here.text)
+            self.note("low", self.here.low)
+            self.pad(repeat.align, local)
+            self.put(part)
+            outside, self.body = self.body, []
+            start = aligned_to_8("at") if repeat.align == 8 else "at"
+            self.note("at", f"{start} + {size}")
+            self.note("low", size)
+            outside.append(code.Block(f"if {local}:", tuple(self.body)))
+            self.body = outside
+            self.here = Position.variable(min(modulus, 4), 0)
+        self.settle()
+
+    def loop(self, step: layout.Items) -> None:
+        """Emit structures one by one."""
+        self.flush(1)
+        entry = self.here
+        if entry.constant:
+            self.note("at", entry.text)
+        if entry.known(4):
+            self.note("low", entry.low)
+        outside = self.body
+        head = entry.meet(entry)
+        while True:
+            mark = self.tables.mark()
+            self.body = []
+            self.here = Position.variable(head.modulus, head.residue)
+            self.frame = Frame(self.here)
+            for part in step.body:
+                self.step(part)
+            self.flush(1)
+            end = self.here
+            if end.modulus >= 4 > head.modulus:
+                self.note("low", end.low)
+            met = head.meet(end)
+            if met.modulus == head.modulus:
+                break
+            head = met
+            self.tables.reset(mark)
+        outside.append(code.Block(f"for {step.item} in {step.place.local}:", tuple(self.body)))
+        self.body = outside
+        self.here = head
+        self.frame = Frame(head)
+
+
+def without_parentheses(value: str) -> str:
+    """Return an expression without parentheses around all of it."""
+    depth = 0
+    for place, character in enumerate(value):
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and place < len(value) - 1:
+            return value
+    return value[1:-1] if value.startswith("(") else value
+
+
+def block_code(primitive: str) -> str:
+    """Return the character for a fixed-size array in a layout."""
+    return "B" if primitive in layout.LIST_PRIMITIVES else ir.PRIMITIVES[primitive].code
+
+
+def power_of_two(*sizes: int) -> int:
+    """Return the largest power of two, up to 8, that divides all sizes."""
+    return min(size & -size for size in (*sizes, 8))
+
+
+def inlined(step: layout.Items) -> list[layout.Step]:
+    """Return an element's fixed-size steps, with attribute chains instead of variables."""
+    paths = {step.item: step.item}
+    found: list[layout.Step] = []
+    for part in step.body:
+        match part:
+            case layout.Enter(place):
+                paths[place.local] = f"{paths[place.owner]}.{place.slot}"
+            case layout.Number(place, letter, size):
+                moved = layout.Place(paths[place.owner], place.slot, place.local)
+                found.append(layout.Number(moved, letter, size))
+            case layout.Block(place, primitive, count):
+                moved = layout.Place(paths[place.owner], place.slot, place.local)
+                found.append(layout.Block(moved, primitive, count))
+            case _:
+                found.append(part)
+    return found

@@ -1,0 +1,93 @@
+"""Python statements as lines, broken as ruff breaks them.
+
+In: expressions as text, or as a `Group` where they may be broken. Out: lines without indentation
+errors: a statement that fits stays on one line, otherwise each item of a group gets a line of its
+own and a trailing comma, which formatters keep.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import msgspec
+
+WIDTH = 88
+
+
+class Group(msgspec.Struct, frozen=True):
+    """A call, list, tuple or subscript: `before`, the items between brackets, `after`.
+
+    Only a subscript is broken without a trailing `comma`.
+    """
+
+    before: str
+    items: tuple[Node, ...]
+    after: str = ""
+    brackets: str = "()"
+    comma: str = ","
+
+    def flat(self) -> str:
+        """Return the group on one line."""
+        inner = ", ".join(flat(item) for item in self.items)
+        return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}{self.after}"
+
+
+class Comprehension(msgspec.Struct, frozen=True):
+    """A list comprehension: what is made of each element, and the `for`."""
+
+    element: Node
+    loop: str
+
+    def flat(self) -> str:
+        """Return the comprehension on one line."""
+        return f"[{flat(self.element)} {self.loop}]"
+
+
+Node: TypeAlias = str | Group | Comprehension
+
+
+def call(function: str, *arguments: Node) -> Group:
+    """Return a call."""
+    return Group(function, arguments)
+
+
+def flat(node: Node) -> str:
+    """Return a node on one line."""
+    return node if isinstance(node, str) else node.flat()
+
+
+def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
+    """Return `before`, the node and `after` as lines, indented by `indent` columns."""
+    margin = " " * indent
+    one = f"{margin}{before}{flat(node)}{after}"
+    if isinstance(node, str) or len(one) <= WIDTH:
+        return [one]
+    if isinstance(node, Comprehension):
+        inner = f"{margin}    {flat(node.element)} {node.loop}"
+        body = [inner]
+        if len(inner) > WIDTH:
+            body = [*lines(node.element, indent + 4), f"{margin}    {node.loop}"]
+        return [f"{margin}{before}[", *body, f"{margin}]{after}"]
+    result = [f"{margin}{before}{node.before}{node.brackets[0]}"]
+    for item in node.items:
+        result += lines(item, indent + 4, "", node.comma)
+    result.append(f"{margin}{node.brackets[1]}{node.after}{after}")
+    return result
+
+
+def assign(target: Node, value: Node, indent: int) -> list[str]:
+    """Return an assignment as lines; a tuple of targets is a Group without `before`."""
+    margin = " " * indent
+    if isinstance(target, Group):
+        inner = ", ".join(flat(item) for item in target.items)
+        inner += "," if len(target.items) == 1 else ""
+        bare = f"({inner})" if len(target.items) == 1 else inner
+        if len(f"{margin}{bare} = {flat(value)}") <= WIDTH:
+            return [f"{margin}{bare} = {flat(value)}"]
+        return lines(target, indent, "", f" = {flat(value)}")
+    one = f"{margin}{target} = {flat(value)}"
+    if len(one) <= WIDTH or not isinstance(value, str):
+        return lines(value, indent, f"{target} = ")
+    if len(margin) + 4 + len(value) <= WIDTH:
+        return [f"{margin}{target} = (", f"{margin}    {value}", f"{margin})"]
+    return [one]

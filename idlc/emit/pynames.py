@@ -1,0 +1,96 @@
+"""Typed Python names: nothing reaches generated code as a name except through here."""
+
+from __future__ import annotations
+
+import builtins
+import keyword
+import re
+from typing import NewType
+
+from idlc.model import ir
+from idlc.runtime.names import public_name, slot_name
+
+ModuleName = NewType("ModuleName", str)
+ClassName = NewType("ClassName", str)
+FieldName = NewType("FieldName", str)
+SlotName = NewType("SlotName", str)
+LocalName = NewType("LocalName", str)
+
+#: Names that the emitted codecs use themselves, or may come to use.
+CODEC_NAMES = frozenset(
+    {"at", "count", "data", "decode", "encode", "end", "low", "message", "order", "parts"}
+    | {"put", "size", "struct", "value", "view"}
+)
+
+
+def snake(name: str) -> str:
+    """Return rosidl's snake case of a CamelCase name (spec 7.1)."""
+    name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts numbers in names by their value, as linters do."""
+    parts = re.findall(r"\d+|\D+", name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+
+
+def module(name: ir.TypeName) -> ModuleName:
+    """Return the module that holds an interface, without its package."""
+    return ModuleName("_" + snake(name.name))
+
+
+def class_(name: ir.TypeName) -> ClassName:
+    """Return the class of a structure, service or action."""
+    return ClassName(name.name + "_" if keyword.iskeyword(name.name) else name.name)
+
+
+def qualified_class(name: ir.TypeName) -> ClassName:
+    """Return a name for another package's class where the plain one is taken."""
+    return ClassName(f"{name.package}_{class_(name)}")
+
+
+def field(name: str) -> FieldName:
+    """Return the attribute of a field."""
+    return FieldName(public_name(name))
+
+
+def slot(name: str) -> SlotName:
+    """Return the slot of a field."""
+    return SlotName(slot_name(name))
+
+
+class Locals:
+    """The local variables of one function: each name is given once."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set(CODEC_NAMES)
+
+    def new(self, wanted: str) -> LocalName:
+        """Return `wanted`, or a name like it that is free and shadows nothing."""
+        name = wanted
+        count = 1
+        while not self._free(name):
+            count += 1
+            name = f"{wanted}_{count}"
+        self._taken.add(name)
+        return LocalName(name)
+
+    def shortest(self, path: tuple[str, ...]) -> LocalName:
+        """Return the last part of a path, with as many parts before it as make it new."""
+        for start in reversed(range(len(path))):
+            name = "_".join(path[start:])
+            if self._free(name):
+                return self.new(name)
+        return self.new("_".join(path))
+
+    def _free(self, name: str) -> bool:
+        return not (name in self._taken or keyword.iskeyword(name) or hasattr(builtins, name))
+
+    def mark(self) -> frozenset[str]:
+        """Return what `reset` needs to forget all names given from now on."""
+        return frozenset(self._taken)
+
+    def reset(self, mark: frozenset[str]) -> None:
+        """Forget the names given since `mark`."""
+        self._taken = set(mark)

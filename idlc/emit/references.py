@@ -1,0 +1,90 @@
+"""The classes that one module needs from elsewhere: by which name, and where they are imported."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+from idlc.emit import layout, pynames
+from idlc.model import derive, ir
+
+
+class References:
+    """The names of all classes that a module mentions.
+
+    `direct` are the types of fields as written in the file, imported with the module; `implied`
+    those of derived fields in other packages, imported when used, so that a service's request can
+    be used without them.
+    """
+
+    def __init__(self, interface: ir.Interface, messages: layout.Messages) -> None:
+        self.package = interface.name.package
+        self.own = {message.name for message in derive.messages(interface)}
+        written = {message.name for message in derive.sections(interface)}
+        self.direct: set[ir.TypeName] = set()
+        self.implied: set[ir.TypeName] = set()
+        for message in derive.messages(interface):
+            for name in referred(message):
+                if name in self.own:
+                    continue
+                if message.name in written or name.package == self.package:
+                    self.direct.add(name)
+                else:
+                    self.implied.add(name)
+        self.implied -= self.direct
+        self._names = self._named({*self.own, *_closure(self.own, messages)})
+
+    def _named(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, pynames.ClassName]:
+        by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
+        for name in names:
+            by_class[pynames.class_(name)].append(name)
+        return {
+            name: pynames.class_(name)
+            if name in self.own or len(same) == 1
+            else pynames.qualified_class(name)
+            for same in by_class.values()
+            for name in same
+        }
+
+    def name(self, type_: ir.TypeName) -> pynames.ClassName:
+        """Return the class's name in this module."""
+        return self._names[type_]
+
+    def imports(self, types: Iterable[ir.TypeName], kind: ir.Kind) -> tuple[list[str], list[str]]:
+        """Return import statements, those of this package and those of others, sorted."""
+        inside: set[tuple[int, str, str]] = set()
+        outside: dict[str, set[str]] = defaultdict(set)
+        for type_ in types:
+            target = pynames.class_(type_)
+            if self.name(type_) != target:
+                target = pynames.ClassName(f"{target} as {self.name(type_)}")
+            if type_.package != self.package:
+                outside[f"{type_.package}.{type_.kind}"].add(target)
+            elif type_.kind == kind:
+                inside.add((1, f".{pynames.module(type_)}", target))
+            else:
+                inside.add((0, f"..{type_.kind}.{pynames.module(type_)}", target))
+        return (
+            [f"from {module} import {target}" for _, module, target in sorted(inside)],
+            [
+                f"from {module} import {', '.join(sorted(targets))}"
+                for module, targets in sorted(outside.items())
+            ],
+        )
+
+
+def referred(message: ir.Message) -> list[ir.TypeName]:
+    """Return the structures that a structure's fields name, in order."""
+    elements = (ir.element_of(field.type) for field in message.fields)
+    return [element.target for element in elements if isinstance(element, ir.Ref)]
+
+
+def _closure(own: set[ir.TypeName], messages: layout.Messages) -> set[ir.TypeName]:
+    found: set[ir.TypeName] = set()
+    waiting = list(own)
+    while waiting:
+        for name in referred(messages[waiting.pop()]):
+            if name not in found:
+                found.add(name)
+                waiting.append(name)
+    return found

@@ -1,0 +1,74 @@
+"""From the model to the files of a package, by way of the view-model and the templates.
+
+Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made here.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import jinja2
+import msgspec
+
+from idlc.emit import listing, types_json, view
+from idlc.model import ir, link
+
+PACKAGE = Path(__file__).parent.parent
+
+
+class RenderedFile(msgspec.Struct, frozen=True):
+    """A file to write: `path` with slashes, relative to the package's folder."""
+
+    path: str
+    text: str
+
+
+@cache
+def environment() -> jinja2.Environment:
+    """Return the environment of all templates: strict, without filters of our own."""
+    folders = [PACKAGE / "templates", PACKAGE.parent / "templates"]
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folders),
+        undefined=jinja2.StrictUndefined,
+        autoescape=False,  # noqa: S701 (Python source, escaped by emit.literals)
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+@cache
+def _template(name: str) -> jinja2.Template:
+    return environment().get_template(name)
+
+
+def runtime_files() -> tuple[RenderedFile, ...]:
+    """Return the support package, a verbatim copy of idlc.runtime."""
+    return tuple(
+        RenderedFile(f"_idlc/{path.name}", path.read_text(encoding="utf-8"))
+        for path in sorted((PACKAGE / "runtime").glob("*.py"))
+    )
+
+
+def module_file(interface: ir.Interface, model: link.Model) -> RenderedFile:
+    """Return the module of one interface."""
+    page = view.module(interface, model.messages)
+    return RenderedFile(page.path, _template("module.py.jinja").render(module=page))
+
+
+def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
+    """Return all files of a generated package but its lock, sorted by path.
+
+    The model must be without errors: no `Unknown` type, nothing that is not found.
+    """
+    files = [module_file(interface, model) for interface in model.own]
+    for kind in sorted({interface.name.kind for interface in model.own}):
+        page = listing.package(model, kind)
+        text = _template("package.py.jinja").render(package=page)
+        files.append(RenderedFile(page.path, text))
+    data = json.dumps(types_json.content(model), ensure_ascii=True, separators=(",", ":"))
+    files.append(RenderedFile("_idlc/types.json", data + "\n"))
+    files.append(RenderedFile("py.typed", ""))
+    return tuple(sorted((*files, *runtime_files()), key=lambda file: file.path))

@@ -1,0 +1,130 @@
+"""The values that a codec makes once for a byte order and then uses: Structs and functions."""
+
+from __future__ import annotations
+
+import json
+
+from idlc.emit import layout, pynames
+from idlc.emit.pretty import Group, Node
+from idlc.model import ir
+
+
+class Tables:
+    """Gives each distinct expression one name, in order of first use."""
+
+    def __init__(self, names: pynames.Locals) -> None:
+        self._names = names
+        self._made: dict[str, tuple[str, Node]] = {}
+        self._counts: dict[str, int] = {}
+
+    @property
+    def definitions(self) -> tuple[tuple[str, Node], ...]:
+        """Names and expressions, in order of first use."""
+        return tuple(self._made.values())
+
+    def local(self, wanted: str) -> str:
+        """Return a free local variable."""
+        return self._names.new(wanted)
+
+    def mark(self) -> tuple[int, frozenset[str]]:
+        """Return what `reset` needs."""
+        return len(self._made), self._names.mark()
+
+    def reset(self, mark: tuple[int, frozenset[str]]) -> None:
+        """Forget everything named since `mark`."""
+        count, names = mark
+        self._made = dict(list(self._made.items())[:count])
+        self._names.reset(names)
+
+    def define(self, wanted: str, key: str, expression: Node) -> str:
+        """Return the name of an expression, making it on first use of `key`."""
+        if key not in self._made:
+            self._made[key] = (self._names.new(wanted), expression)
+        return self._made[key][0]
+
+    def numbered(self, stem: str, key: str, expression: Node) -> str:
+        """Return the name of an expression, made as `stem` and a number."""
+        if key in self._made:
+            return self._made[key][0]
+        number = 1 + sum(name.startswith(stem) for name, _ in self._made.values())
+        return self.define(f"{stem}_{number}", key, expression)
+
+    def function(self, name: str, expression: str) -> str:
+        """Return the name of a runtime function."""
+        return self.define(name, expression, f"_idlc.{expression}")
+
+    def struct(self, stem: str, fields: str, start: int | None, method: str) -> str:
+        """Return the bound `method` of one Struct, or a table of Structs by position."""
+        if start is None:
+            return self.numbered(stem, f"{stem}*{fields}", _call("phases", fields))
+        arguments = (fields, f"start={start}") if start else (fields,)
+        expression = _call("layout", *arguments, after=f".{method}")
+        return self.numbered(stem, f"{stem}{start}{fields}.{method}", expression)
+
+    def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
+        """Return what packs a frame: a function, or a table by text size or by position."""
+        if not texts and align == 1:
+            return self.struct("write", fields, start, "pack")
+        arguments = [fields]
+        if start:
+            arguments.append(f"start={start}")
+        if align > 1:
+            arguments.append(f"align={align}")
+        function = ("text_phases" if texts else "phases") if start is None else "Texts"
+        if not texts and start is not None:
+            expression = _call("layout", *arguments, after=".pack")
+        else:
+            expression = _call(function, *arguments)
+        key = f"write {function} {' '.join(arguments)} {texts}"
+        return self.numbered("write", key, expression)
+
+    def pad(self, align: int) -> str:
+        """Return the table of padding to `align`, by position."""
+        return self.function(f"pad{align}", f"PAD{align}")
+
+    def gap(self, size: int) -> str:
+        """Return an expression for `size` zero bytes."""
+        return 'b"' + "\\x00" * size + '"'
+
+    def block_writer(self, step: layout.Block) -> str:
+        """Return the function that turns a fixed-size array into bytes."""
+        return self._block(step, "writer")
+
+    def block_reader(self, step: layout.Block) -> str:
+        """Return the function that turns bytes into a fixed-size array."""
+        return self._block(step, "reader")
+
+    def _block(self, step: layout.Block, what: str) -> str:
+        if step.primitive in layout.LIST_PRIMITIVES:
+            kind = "flags" if step.primitive == "bool" else "octets"
+            if what == "reader":
+                return self.function(f"read_{kind}", f"read_{kind}")
+            return self.define(
+                f"{kind}_{step.count}", f"{kind} {step.count}", f"_idlc.{kind}_writer({step.count})"
+            )
+        dtype = numpy_name(step.primitive)
+        expression = Group(f"_arrays.array_{what}", ("order", json.dumps(dtype), str(step.count)))
+        verb = "array" if what == "reader" else "bytes"
+        return self.define(f"{verb}_{dtype}_{step.count}", expression.flat(), expression)
+
+    def sequence_writer(self, step: layout.Numbers) -> str:
+        """Return the function that turns a sequence of numbers into a buffer."""
+        expression = f'_idlc.sequence_writer(order, "{step.code}")'
+        return self.define(f"buffer_{step.code}", expression, expression)
+
+    def sequence_reader(self, step: layout.Numbers) -> str:
+        """Return the function that turns a buffer into a sequence of numbers."""
+        expression = f'_idlc.sequence_reader(order, "{step.code}")'
+        return self.define(f"array_{step.code}", expression, expression)
+
+
+def numpy_name(primitive: str) -> str:
+    """Return the dtype of a numeric primitive."""
+    return {"char": "uint8"}.get(primitive, primitive)
+
+
+def _call(function: str, fields: str, *arguments: str, after: str = "") -> Group:
+    return Group(f"_idlc.{function}", ("order", json.dumps(fields), *arguments), after)
+
+
+__all__ = ["Tables", "ir", "numpy_name"]

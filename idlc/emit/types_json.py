@@ -1,0 +1,40 @@
+"""The content of `_idlc/types.json`: what rclpy, tools and error messages ask about types."""
+
+from __future__ import annotations
+
+from typing import TypedDict
+
+from idlc.model import derive, link
+from idlc.model.describe import IndividualDict
+
+
+class TypesDict(TypedDict):
+    """Descriptions and hashes by full name, and the files' text by interface name."""
+
+    package: str
+    descriptions: dict[str, IndividualDict]
+    hashes: dict[str, str]
+    sources: dict[str, str]
+
+
+def content(model: link.Model) -> TypesDict:
+    """Return the descriptions of a package's types and of everything that they refer to."""
+    describer = model.describer
+    descriptions: dict[str, IndividualDict] = {}
+    for interface in model.own:
+        structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
+        for structure in structures:
+            full = describer.description(str(structure.name))
+            for one in (full["type_description"], *full["referenced_type_descriptions"]):
+                descriptions[one["type_name"]] = one
+    sources = {
+        str(interface.name): interface.source.text
+        for interface in model.interfaces.values()
+        if interface.source is not None
+    }
+    return {
+        "package": model.package,
+        "descriptions": dict(sorted(descriptions.items())),
+        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
+        "sources": dict(sorted(sources.items())),
+    }

@@ -1,0 +1,300 @@
+"""The view-model: what each generated page says, as finished strings.
+
+In: the model. Out: frozen structs of lines and tuples that templates only lay out. All text from
+interface files has gone through `literals`, all names through `pynames`.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from idlc.emit import code, documentation, fields, layout, literals, pynames
+from idlc.emit.decode import decode, is_bulk
+from idlc.emit.encode import encode
+from idlc.emit.pretty import Group, assign, call, lines
+from idlc.emit.references import References, referred
+from idlc.emit.tables import Tables
+from idlc.model import derive, ir
+
+
+class MessageView(msgspec.Struct, frozen=True):
+    """A message class and its codec. All members are finished lines."""
+
+    name: str
+    body: tuple[str, ...]
+    init: tuple[str, ...]
+    codec: str
+    tables: tuple[str, ...]
+    encode: tuple[str, ...]
+    decode: tuple[str, ...]
+    result: str
+
+
+class GroupView(msgspec.Struct, frozen=True):
+    """A service or action class."""
+
+    name: str
+    base: str
+    body: tuple[str, ...]
+
+
+class ModuleView(msgspec.Struct, frozen=True):
+    """The module of one interface."""
+
+    path: str
+    origin: str
+    pragmas: tuple[str, ...]
+    summary: str
+    imports: tuple[str, ...]
+    messages: tuple[MessageView, ...]
+    groups: tuple[GroupView, ...]
+
+
+SERVICE_PARTS = ("Request", "Response", "Event")
+TYPES = "_ClassVar[dict[str, str]]"
+PRAGMAS = (
+    '# mypy: disable-error-code="import-not-found,import-untyped"',
+    "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
+)
+
+
+def origin(name: ir.TypeName) -> str:
+    """Return an interface's file, as package/kind/Name.kind."""
+    return f"{name}.{name.kind}"
+
+
+def module(interface: ir.Interface, messages: layout.Messages) -> ModuleView:
+    """Return the view of an interface's module."""
+    name = interface.name
+    references = References(interface, messages)
+    structures = derive.messages(interface)
+    return ModuleView(
+        path=f"{name.kind}/{pynames.module(name)}.py",
+        origin=origin(name),
+        pragmas=PRAGMAS if _has_others(references, messages) else (),
+        summary=f"The classes of {name}.",
+        imports=tuple(_imports(references, structures, name.kind)),
+        messages=tuple(
+            _message(structure, interface, references, messages) for structure in structures
+        ),
+        groups=tuple(_groups(interface)),
+    )
+
+
+def _has_others(references: References, messages: layout.Messages) -> bool:
+    waiting = [*references.direct, *references.implied]
+    while waiting:
+        name = waiting.pop()
+        if name.package != references.package:
+            return True
+        waiting += referred(messages[name])
+    return False
+
+
+def _imports(
+    references: References, structures: tuple[ir.Message, ...], kind: ir.Kind
+) -> list[str]:
+    used = {fields.support(field.type) for message in structures for field in message.fields}
+    standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
+    if "sequence" in used:
+        standard.append("from array import array as _array")
+    if references.implied:
+        standard.append("from typing import TYPE_CHECKING")
+    standard.append("from typing import ClassVar as _ClassVar")
+    inside, outside = references.imports(references.direct, kind)
+    relative = ["from .. import _idlc"]
+    if "array" in used:
+        relative.append("from .._idlc import arrays as _arrays")
+    result = [*standard, *([""] if standard else []), *relative, *inside]
+    if outside:
+        result += ["", "with _idlc.importing():", *(f"    {line}" for line in _wrap(outside))]
+    if references.implied:
+        _, implied = references.imports(references.implied, kind)
+        result += ["", "if TYPE_CHECKING:", *(f"    {line}" for line in _wrap(implied))]
+    return result
+
+
+def _wrap(statements: list[str]) -> list[str]:
+    """Break import statements that are too long inside a block."""
+    result = []
+    for statement in statements:
+        head, _, names = statement.partition(" import ")
+        if len(statement) + 8 <= 88:
+            result.append(statement)
+        else:
+            result += [f"{head} import (", *(f"    {n}," for n in names.split(", ")), ")"]
+    return result
+
+
+def _message(
+    structure: ir.Message,
+    interface: ir.Interface,
+    references: References,
+    messages: layout.Messages,
+) -> MessageView:
+    names = pynames.Locals()
+    steps = layout.steps(structure, messages, names)
+    tables = Tables(names)
+    tables.define("encapsulation", "encapsulation", "_idlc.HEADERS[order]")
+    writing = code.function(encode(steps, tables), 8)
+    makers, needed = _makers(structure.name, steps, references, tables)
+    reading = code.text_of(decode(steps, tables, makers[structure.name], makers), 8)
+    definitions = tuple(
+        line for name, value in tables.definitions for line in assign(name, value, 4)
+    )
+    arrays = any("_arrays." in line for line in definitions) and not _has_arrays(interface)
+    bulk = ", bulk=True" if is_bulk(steps) else ""
+    return MessageView(
+        name=references.name(structure.name),
+        body=tuple(_body(structure, references)),
+        init=tuple(_init(structure, references)),
+        codec=f"_{pynames.snake(structure.name.name)}",
+        tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
+        encode=tuple(writing),
+        decode=tuple(reading),
+        result=f"_idlc.Codec(encode, decode{bulk})",
+    )
+
+
+def _has_arrays(interface: ir.Interface) -> bool:
+    """Whether a module holds fixed-size numeric arrays itself and so imports numpy."""
+    return any(
+        fields.support(field.type) == "array"
+        for message in derive.messages(interface)
+        for field in message.fields
+    )
+
+
+def _codec_imports(
+    needed: list[ir.TypeName], references: References, kind: ir.Kind, arrays: bool
+) -> list[str]:
+    """Return the imports inside a codec: what only it needs, and only when it is used."""
+    inside, outside = references.imports(needed, kind)
+    if arrays:
+        inside.insert(0, "from .._idlc import arrays as _arrays")
+    result = [f"    {line}" for line in _wrap(inside)]
+    if outside:
+        result += [""] if inside else []
+        result.append("    with _idlc.importing():")
+        result += [f"        {line}" for line in _wrap(outside)]
+    return [*result, ""] if result else []
+
+
+def _body(structure: ir.Message, references: References) -> list[str]:
+    """Return the class's docstring, names, constants and fields."""
+    qualify = fields.shadows(structure)
+    public = [f'"{pynames.field(field.name)}"' for field in structure.fields]
+    types = tuple(f'"{field.name}": "{fields.idl_text(field.type)}"' for field in structure.fields)
+    doc = documentation.message(structure, f"{structure.name}.")
+    return [
+        *literals.docstring(doc, 4),
+        "",
+        *_tuple("__match_args__", tuple(public)),
+        *lines(Group("", types, brackets="{}"), 4, f"_fields_and_field_types: {TYPES} = "),
+        *_separated(_constants(structure)),
+        *_separated(
+            [f"    {fields.view(f, references, qualify).declaration}" for f in structure.fields]
+        ),
+    ]
+
+
+def _separated(block: list[str]) -> list[str]:
+    return ["", *block] if block else []
+
+
+def _init(structure: ir.Message, references: References) -> list[str]:
+    """Return the constructor."""
+    if not structure.fields:
+        return ["    def __init__(self) -> None:", "        pass"]
+    qualify = fields.shadows(structure)
+    views = [fields.view(field, references, qualify) for field in structure.fields]
+    return [
+        "    def __init__(",
+        "        self,",
+        *(f"        {view.parameter}," for view in views),
+        "    ) -> None:",
+        *(line for view in views for line in view.stores),
+    ]
+
+
+def _tuple(target: str, items: tuple[str, ...]) -> list[str]:
+    if len(items) == 1:
+        return [f"    {target} = ({items[0]},)"]
+    return lines(Group("", items), 4, f"{target} = ")
+
+
+def _makers(
+    own: ir.TypeName, steps: tuple[layout.Step, ...], references: References, tables: Tables
+) -> tuple[dict[ir.TypeName, str], list[ir.TypeName]]:
+    """Return the functions that make empty objects, and the types to import for them."""
+    makers: dict[ir.TypeName, str] = {}
+    for type_ in (own, *_types(steps)):
+        if type_ not in makers:
+            name = references.name(type_)
+            wanted = f"new_{pynames.snake(type_.name)}".replace("__", "_")
+            maker = call("_idlc.maker", name)
+            makers[type_] = tables.define(wanted, f"maker {name}", maker)
+    known = references.own | references.direct
+    return makers, [type_ for type_ in makers if type_ not in known]
+
+
+def _types(steps: tuple[layout.Step, ...]) -> list[ir.TypeName]:
+    found: list[ir.TypeName] = []
+    for step in steps:
+        if isinstance(step, layout.Enter):
+            found.append(step.type)
+        elif isinstance(step, layout.Items):
+            found += [step.type, *_types(step.body)]
+    return found
+
+
+def _constants(structure: ir.Message) -> list[str]:
+    result = []
+    for constant in structure.constants:
+        unit = (f"[{constant.unit}]",) if constant.unit else ()
+        result += [f"    {line}" for line in literals.comment((*constant.comment, *unit))]
+        result += assign(constant.name, literals.scalar(constant.type, constant.value), 4)
+    for field in structure.fields:
+        if field.default is not None:
+            result += fields.default_constant(field, fields.shadows(structure))
+    return result
+
+
+def _groups(interface: ir.Interface) -> list[GroupView]:
+    views = [
+        GroupView(
+            name=service.name.name,
+            base="_idlc.Service",
+            body=(
+                *literals.docstring([f"The service {service.name}."], 4),
+                "",
+                *(f"    {part} = {service.name.name}_{part}" for part in SERVICE_PARTS),
+            ),
+        )
+        for service in derive.services(interface)
+    ]
+    if isinstance(interface, ir.Action):
+        views.append(_action(interface))
+    return views
+
+
+def _action(action: ir.Action) -> GroupView:
+    name = action.name.name
+    return GroupView(
+        name=name,
+        base="_idlc.Action",
+        body=(
+            *literals.docstring([f"The action {action.name}."], 4),
+            "",
+            *(f"    {part} = {name}_{part}" for part in ("Goal", "Result", "Feedback")),
+            "",
+            "    class Impl:",
+            '        """What rclpy needs of the action."""',
+            "",
+            f"        SendGoalService = {name}_SendGoal",
+            f"        GetResultService = {name}_GetResult",
+            f"        FeedbackMessage = {name}_FeedbackMessage",
+            '        CancelGoalService = _idlc.Imported("action_msgs.srv", "CancelGoal")',
+            '        GoalStatusMessage = _idlc.Imported("action_msgs.msg", "GoalStatusArray")',
+        ),
+    )
