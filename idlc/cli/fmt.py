@@ -1,0 +1,81 @@
+"""`idlc fmt`."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import TextIO
+
+    from idlc.driver.fmt import Formatted
+
+EPILOG = """\
+Example:
+
+\b
+  mkdir -p demo/msg
+  echo 'float64   speed 0.5# [m/s]' > demo/msg/Drive.msg
+  idlc fmt demo
+"""
+
+
+@click.command("fmt", epilog=EPILOG)
+@click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
+@click.option("--check", is_flag=True, help="Write nothing; fail if a file would change.")
+@click.option("--diff", is_flag=True, help="Write nothing; show what would change, and fail if so.")
+def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
+    """Lay interface files out: one space after types, comments in one column.
+
+    Words, values and comments stay as they are, and so does the meaning. Files with errors are
+    left alone. PATH is as for `idlc check`.
+    """
+    from idlc.cli import terminal
+    from idlc.disk import config
+    from idlc.driver.fmt import fmt
+    from idlc.text.diagnostics import Report
+    from idlc.text.present import counted
+
+    report = Report()
+    settings = config.load(report)
+    dry = check or diff
+    files: list[Formatted] = []
+    if not report.had_errors:
+        for file in fmt(paths or settings.paths or (".",), report, write=not dry):
+            files.append(file)
+            if file.changed and diff:
+                sys.stdout.writelines(_diff(file, sys.stdout))
+            elif file.changed:
+                sys.stdout.write(f"{'would change' if dry else 'changed'} {file.path}\n")
+    terminal.show(report, "text", sys.stderr)
+    changed = sum(file.changed for file in files)
+    broken = sum(file.old is None for file in files)
+    parts = [f"{counted(changed, 'file')} {'would change' if dry else 'changed'}"] * bool(changed)
+    parts += [f"{counted(broken, 'file')} with errors left alone"] * bool(broken)
+    rest = len(files) - changed - broken
+    parts += [f"{counted(rest, 'file')} in order"] * bool(rest)
+    if parts:
+        (sys.stderr if diff else sys.stdout).write(", ".join(parts) + "\n")
+    return terminal.status(report) or int(dry and bool(changed))
+
+
+def _diff(file: Formatted, stream: TextIO) -> Iterator[str]:
+    """Yield a unified diff: for a program as it is, for a terminal without what would harm it."""
+    from difflib import unified_diff
+
+    from idlc.cli import terminal
+    from idlc.text.visible import visible
+
+    old = (file.old or "").splitlines(keepends=True)
+    new = (file.new or "").splitlines(keepends=True)
+    codes = {"+": "32", "-": "31", "@": "36"} if terminal.colours(stream) else {}
+    for line in unified_diff(old, new, f"a/{file.path}", f"b/{file.path}"):
+        text = line.rstrip("\r\n")
+        shown = visible(text) if stream.isatty() else text
+        code = codes.get(line[:1])
+        yield f"\x1b[{code}m{shown}\x1b[0m\n" if code else f"{shown}\n"
+        if not line.endswith(("\n", "\r")):
+            yield "\\ No newline at end of file\n"

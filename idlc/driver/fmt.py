@@ -1,0 +1,67 @@
+"""The pipeline of `idlc fmt`: lay each sound file out, and write it if that changed anything."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from idlc.disk.find import InterfaceFile, find
+from idlc.disk.read import read_source
+from idlc.disk.rewrite import replace
+from idlc.driver.stages import stage
+from idlc.model import ir
+from idlc.text.diagnostics import Report, Severity
+
+if TYPE_CHECKING:
+    from idlc.text.source import Source
+
+
+class Formatted(NamedTuple):
+    """A file before and after; both are `None` if it is left alone because of its errors."""
+
+    path: str
+    old: str | None = None
+    new: str | None = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether its layout is not the canonical one."""
+        return self.old != self.new
+
+
+def fmt(paths: Sequence[str], report: Report, *, write: bool) -> Iterator[Formatted]:
+    """Yield each file that paths mean, laid out; with `write`, after writing it.
+
+    Files with errors are reported and left alone.
+    """
+    for file in find(paths, report):
+        source = read_source(file.path, file.shown, report)
+        if source is None:
+            continue
+        with stage("format", file.shown):
+            found = _format(file, source, report)
+        if write and found.changed and found.new is not None:
+            replace(file.path, file.shown, found.new.encode("utf-8"), report)
+        yield found
+
+
+def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
+    from idlc.model.lower import lower
+    from idlc.model.meaning import meaning
+    from idlc.syntax.format import format_file
+    from idlc.syntax.parse import parse
+    from idlc.text.source import Source
+
+    problems, again = Report(), Report()
+    name = ir.TypeName("package", file.kind, file.name)
+    tree = parse(source)
+    before = lower(tree, name, problems)
+    if problems.had_errors:
+        report.extend(one for one in problems if one.severity is Severity.ERROR)
+        return Formatted(file.shown)
+    new = format_file(tree)
+    if new != source.text:
+        after = lower(parse(Source(file.shown, new)), name, again)
+        if again.had_errors or meaning(after) != meaning(before):
+            raise AssertionError("the layout would change the meaning; the file was left alone")
+    return Formatted(file.shown, source.text, new)

@@ -1,0 +1,181 @@
+"""`fmt`'s layout: what it changes, what it leaves, and that the meaning stays."""
+
+import json
+from pathlib import Path
+
+import pytest
+import rosidl_view
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from inventions import Inventor
+
+from idlc.model import ir
+from idlc.model.lower import lower
+from idlc.model.meaning import meaning
+from idlc.syntax.format import format_file
+from idlc.syntax.parse import parse
+from idlc.text.diagnostics import Report
+from idlc.text.source import Source
+
+GOLDEN = Path(__file__).parents[1] / "golden" / "spec" / "accept_reject.jsonl"
+CASES = [
+    case
+    for case in map(json.loads, GOLDEN.read_text("utf-8").splitlines())
+    if case["build_verdict"] == "accept"
+]
+
+
+def formatted(text):
+    return format_file(parse(Source("X.msg", text)))
+
+
+def text_of(case):
+    return bytes.fromhex(case["bytes_hex"]).decode() if "bytes_hex" in case else case["text"]
+
+
+def content(text, kind):
+    """What a file means, each word that it is made of, and the codes of its problems."""
+    report = Report()
+    file = parse(Source(f"X.{kind}", text))
+    interface = lower(file, ir.TypeName("pkg", kind, "X"), report)
+    lines = [
+        ("".join(line.code.split()), line.comment.rstrip())
+        for section in file.sections
+        for line in section.lines
+        if line.code.strip() or line.comment
+    ]
+    # unusual line ends become usual ones, and nothing else may go
+    problems = [found.code for found in report if found.code != "IDL110"]
+    return meaning(interface), lines, problems, len(file.sections), report.had_errors
+
+
+def assert_only_the_layout_changes(text, kind):
+    once = format_file(parse(Source(f"X.{kind}", text)))
+    before, after = content(text, kind), content(once, kind)
+    assert after == before
+    assert format_file(parse(Source(f"X.{kind}", once))) == once
+    assert not once or once.endswith("\n")
+
+
+UNCHANGED = [
+    "",
+    "int8 a\n",
+    "# Head, with blanks at the end that ROS 2 keeps.  \n\n# about a\nint8 a\n",
+    "\n# about a, not about the message\nint8 a\n",
+    "int8 A=1\nint8 LONGER = 2\n",
+    "int8 A      = 1\nint8 LONGER = 2\n",
+    "int8 a # one blank is a gap\n\nint8 bcd      # a wide one too\n",
+    "float32 x   # [m] east\n            # of here\nfloat32 yz  # [m] north\n",
+    "float32 x\n    # indented, with its own place\nfloat32 y\n",
+    "int8 a\n---\n\nint8 b\n\n---\nint8 c\n",
+    "int8 a\r\n\r\n---\r\nint8 b\r\n",
+    "string A=x  y = z\n",
+    'string a "two  blanks"\n',
+    "int8[] a [1,2,  3]\n",
+    "string A=\n",
+    "#comment\nint8 a  #comment\n",
+]
+
+
+@pytest.mark.parametrize("text", UNCHANGED)
+def test_what_is_in_order_stays(text):
+    assert formatted(text) == text
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("int8   a", "int8 a\n"),
+        ("int8\ta\t1\t# x", "int8 a 1                # x\n"),
+        ("int8 a   5  \n", "int8 a 5\n"),
+        ("int8 A= 1\nint8 B =2\nint8 C  =  3\n", "int8 A = 1\nint8 B = 2\nint8 C = 3\n"),
+        ("int8  A   = 1\nint16 LONG= 2\n", "int8 A = 1\nint16 LONG = 2\n"),
+        ("int8    AB  = 1\nuint16  C   = 2\n", "int8 AB  = 1\nuint16 C = 2\n"),
+        ("int8 a# x\n", "int8 a  # x\n"),
+        ("int8 a # x\nint8 bcd # y\n", "int8 a    # x\nint8 bcd  # y\n"),
+        (
+            "float32 x  # [m] east\n           # of here\nfloat32 y_north  # [m]\n",
+            "float32 x        # [m] east\n                 # of here\nfloat32 y_north  # [m]\n",
+        ),
+        ("int8 a\n\t# more\n", "int8 a\n        # more\n"),
+        ("# head \n\n# about a   \nint8 a\n", "# head \n\n# about a\nint8 a\n"),
+        ("\n\n\nint8 a\n\n\n\n\nint8 b\n\n\n", "int8 a\n\n\nint8 b\n"),
+        ("\n\n\n# about a\nint8 a\n", "\n# about a\nint8 a\n"),
+        ("int8 a\r\nint8  b\n", "int8 a\r\nint8 b\r\n"),
+        ("int8 a\rint8 b\x0bint8 c", "int8 a\nint8 b\nint8 c\n"),
+        ("int8 a\n---", "int8 a\n---\n"),
+        ("---\r\nint8 a", "---\r\nint8 a\r\n"),
+        ("   \n\t\nint8 a\n   \n", "int8 a\n"),
+    ],
+)
+def test_layout(before, after):
+    assert formatted(before) == after
+    assert formatted(after) == after
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case['id']}-{case['label']}")
+def test_every_valid_recorded_case_keeps_its_content(case):
+    text = text_of(case)
+    assert_only_the_layout_changes(text, case["kind"])
+    once = format_file(parse(Source("X", text)))
+    assert rosidl_view.view({**case, "bytes_hex": once.encode().hex()}) == rosidl_view.view(case)
+
+
+def test_invented_files_keep_their_content():
+    known = {kind: [text_of(c) for c in CASES if c["kind"] == kind] for kind in ir.KINDS}
+    valid = 0
+    for case in Inventor(5, known).cases(3000):
+        try:
+            text = text_of(case)
+        except UnicodeDecodeError:
+            continue
+        if not content(text, case["kind"])[-1]:
+            valid += 1
+            assert_only_the_layout_changes(text, case["kind"])
+    assert valid > 1000
+
+
+BLANKS = st.sampled_from([" ", "  ", "\t", " \t ", "      "])
+GAP = st.sampled_from(["", " ", "  ", "\t", "\u00a0", "          "])
+COMMENT = st.sampled_from(["", "", "#", "# [m] x", "#x  ", "##  y", "# a\tb"])
+END = st.sampled_from(["\n", "\n", "\n", "\r\n", "\r", "\x0b", "\u2028"])
+
+
+@st.composite
+def laid_out_lines(draw):
+    number = draw(st.integers(0, 999))
+    shape = draw(st.sampled_from(["blank", "comment", "field", "default", "constant"]))
+    blank, wide = draw(GAP), draw(BLANKS)
+    comment = draw(COMMENT)
+    match shape:
+        case "blank":
+            text = blank
+        case "comment":
+            text = blank + (comment or "#")
+        case "field":
+            text = f"int8[]{wide}f{number}{blank}{comment}"
+        case "default":
+            text = f"string<=9 {wide}f{number}{wide}'v  {number}'{blank}{comment}"
+        case _:
+            value = draw(st.sampled_from(["1", '" a = b"', "a  b", "''", ""]))
+            text = f"string{wide}C{number}{blank}={draw(GAP)}{value}{blank}{comment}"
+    return text + draw(END)
+
+
+@settings(max_examples=300)
+@given(st.lists(laid_out_lines(), max_size=12).map("".join), st.booleans())
+@example("AB=1\n", False)
+@example("int8 AB=1\nint8 A = 1\n", False)
+@example("# head\x0b  # more\n", True)
+def test_layout_invented_by_chance_keeps_the_content(text, is_service):
+    if is_service:
+        text += "---\n" + text
+    if not content(text, "srv" if is_service else "msg")[-1]:
+        assert_only_the_layout_changes(text, "srv" if is_service else "msg")
+
+
+@given(st.text("a1 =#\t\n\r\x0b[]<-\"'A", max_size=40))
+def test_any_text_can_be_laid_out(text):
+    once = formatted(text)
+    assert formatted(once) == once
+    assert "".join(once.split()) == "".join(text.split())
