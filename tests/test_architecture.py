@@ -18,6 +18,8 @@ RUNTIME = [path for path in MODULES if path.parent.name == "runtime"]
 
 #: Each stage may import those before it; `runtime` stands apart and imports none.
 STAGES = ("text", "syntax", "model", "checks", "emit", "disk", "driver", "cli")
+#: What emit shares with the runtime, so that there is one rule for the names in Python.
+SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 #: The outermost modules, which belong to the command line.
 OUTERMOST = {"__main__": "cli", "__init__": "text"}
 
@@ -25,6 +27,8 @@ OUTERMOST = {"__main__": "cli", "__init__": "text"}
 MAY_DO_IO = {"disk", "cli"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
+#: What may read idlc's own files, its templates and its runtime.
+READS_ITS_OWN = {"idlc/emit/render.py"}
 
 #: What runtime modules may import besides the standard library and each other, and only inside
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
@@ -35,7 +39,10 @@ RUNTIME_WITH_NUMPY = {"arrays"}
 MODULE_BUDGET = 300
 FUNCTION_BUDGET = 40
 #: path, or path:function, that is over budget -> why it stays so.
-OVER_BUDGET: dict[str, str] = {}
+OVER_BUDGET: dict[str, str] = {
+    "idlc/emit/decode.py": "one method for each step of a layout plan, over one state",
+    "idlc/emit/encode.py": "one method for each step of a layout plan, over one state",
+}
 
 
 def name_of(path: Path) -> str:
@@ -92,7 +99,7 @@ def test_imports_point_one_way(path):
     allowed = {"runtime"} if own == "runtime" else {*STAGES[: STAGES.index(own) + 1], "__version__"}
     for name, node, _ in imports_of(path):
         parts = name.split(".")
-        if parts[0] == "idlc":
+        if parts[0] == "idlc" and not (own == "emit" and name in SHARED_WITH_RUNTIME):
             assert len(parts) > 1, f"line {node.lineno}: name the module of idlc that is meant"
             assert parts[1] in allowed, f"line {node.lineno}: {own} imports {name}"
 
@@ -101,8 +108,10 @@ def test_imports_point_one_way(path):
     "path", [p for p in MODULES if stage_of(p) not in {*MAY_DO_IO, "runtime"}], ids=name_of
 )
 def test_the_core_does_no_io(path):
+    allowed = {"pathlib"} if name_of(path) in READS_ITS_OWN else set()
     for name, node, _ in imports_of(path):
-        assert name.split(".")[0] not in IO_MODULES, f"line {node.lineno}: imports {name}"
+        top = name.split(".")[0]
+        assert top in allowed or top not in IO_MODULES, f"line {node.lineno}: imports {name}"
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id not in IO_CALLS, f"line {node.lineno}: calls {node.func.id}"

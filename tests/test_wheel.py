@@ -30,13 +30,16 @@ assert not {'idlc', 'jinja2', 'lark', 'msgspec', 'numpy'}.intersection(sys.modul
 
 
 def source_files() -> dict[str, Path]:
-    """Return every file that belongs to the package, by its path in a wheel."""
+    """Return every file that belongs to the package, by its path in a wheel.
+
+    ruff.toml tells how this repository is linted.
+    """
     folders = {"idlc": ROOT / "idlc", "idlc/templates": ROOT / "templates"}
     return {
         f"{inside}/{path.relative_to(folder).as_posix()}": path
         for inside, folder in folders.items()
         for path in folder.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and "__pycache__" not in path.parts and path.name != "ruff.toml"
     }
 
 

@@ -32,15 +32,19 @@ class References:
                 else:
                     self.implied.add(name)
         self.implied -= self.direct
-        self._names = self._named({*self.own, *_closure(self.own, messages)})
+        groups = {interface.name, *(service.name for service in derive.services(interface))}
+        self._names = self._named(self.own | groups, _closure(self.own, messages))
 
-    def _named(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, pynames.ClassName]:
+    def _named(
+        self, own: set[ir.TypeName], others: set[ir.TypeName]
+    ) -> dict[ir.TypeName, pynames.ClassName]:
+        """Return each structure's class; those that the module defines keep their plain name."""
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
-        for name in names:
+        for name in own | others:
             by_class[pynames.class_(name)].append(name)
         return {
             name: pynames.class_(name)
-            if name in self.own or len(same) == 1
+            if name in own or len(same) == 1
             else pynames.qualified_class(name)
             for same in by_class.values()
             for name in same

@@ -157,7 +157,8 @@ def _message(
 
 
 def _codec_head(name: ir.TypeName) -> tuple[str, ...]:
-    function = f"def _{pynames.snake(name.name)}"
+    # with a suffix, or the codec of a message `Arrays` would hide the import `_arrays`
+    function = f"def _{pynames.snake(name.name)}_codec"
     head = f"{function}(order: str, text: _idlc.Text) -> _idlc.Codec:"
     if len(head) <= WIDTH:
         return (head,)

@@ -150,7 +150,9 @@ class Message(metaclass=MessageMeta):
         return self.serialize(byteorder=byteorder)
 
     @classmethod
-    def deserialize(cls, buffer: bytes | bytearray | memoryview) -> typing_extensions.Self:
+    def deserialize(
+        cls, buffer: bytes | bytearray | memoryview
+    ) -> typing_extensions.Self:
         """Return the message that `buffer` begins with, in the byte order that its header names.
 
         Raises DecodeError. Bytes after the message are ignored; invalid UTF-8 becomes U+FFFD.
