@@ -53,7 +53,7 @@ bench: $(TEST_ENV)/installed ## measure against rosbags, rclpy and rosidl
 
 clean: ## remove environments and everything that was built
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
-	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	find . \( -name __pycache__ -o -name .ruff_cache \) -type d -prune -exec rm -rf {} +
 
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(DEMO_ENV)/installed: EXTRA := ros

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -30,17 +31,17 @@ assert not {'idlc', 'jinja2', 'lark', 'msgspec', 'numpy'}.intersection(sys.modul
 
 
 def source_files() -> dict[str, Path]:
-    """Return every file that belongs to the package, by its path in a wheel.
-
-    ruff.toml tells how this repository is linted.
-    """
+    """Return every file that belongs to the package, by its path in a wheel."""
     folders = {"idlc": ROOT / "idlc", "idlc/templates": ROOT / "templates"}
-    return {
+    found = {
         f"{inside}/{path.relative_to(folder).as_posix()}": path
         for inside, folder in folders.items()
         for path in folder.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts and path.name != "ruff.toml"
+        if path.is_file()
     }
+    # ruff.toml tells how this repository is linted
+    no_part = re.compile(r"/__pycache__/|/\.|/ruff\.toml$")
+    return {inside: path for inside, path in found.items() if not no_part.search(inside)}
 
 
 def clean_environment() -> dict[str, str]:
@@ -75,7 +76,9 @@ def distributions(tmp_path_factory) -> Path:
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, tree)
     for name in ("idlc", "templates"):
-        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(
+            ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__", ".*")
+        )
     out = tmp_path_factory.mktemp("dist")
     run(sys.executable, "-m", "build", "--outdir", out, tree, cwd=out)
     return out
