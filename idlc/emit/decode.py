@@ -8,14 +8,18 @@ the runtime.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from idlc.emit import layout
 from idlc.emit.code import Block, Line, Statement
-from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.cursor import Cursor
+from idlc.emit.encode import block_code
+from idlc.emit.pretty import Group, Node, call
 from idlc.emit.tables import Tables
-from idlc.emit.encode import block_code, inlined
 from idlc.model import ir
 
-SHORT = Line('raise ValueError("too short")')
+TOO_SHORT = (Line('raise ValueError("too short")'),)
+TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
 def is_bulk(steps: tuple[layout.Step, ...]) -> bool:
@@ -33,356 +37,300 @@ def decode(
 
     `own` and `makers` name the functions that make empty objects.
     """
-    decoder = _Decoder(tables, makers, is_bulk(steps))
-    if decoder.bulk:
-        decoder.line("memoryview(data)", "view")
+    decoder = _Decoder(tables, makers, "view" if is_bulk(steps) else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
         decoder.step(step)
-    decoder.flush()
-    decoder.body.append(Line("return message"))
-    return tuple(decoder.body)
+    decoder.flush(last=True)
+    first = []
+    if decoder.source == "view":
+        first.append(Line("memoryview(data)", "view"))
+    if decoder.limited:
+        first.append(Line("len(data)", "limit"))
+    return (*first, *decoder.body, Line("return message"))
 
 
-class _Decoder:
-    """The statements so far, the numbers to be read together, and the position before them.
+class _Run:
+    """Fixed-size values that are read together."""
 
-    The position is `at + offset`, or `offset` as long as it is constant.
-    """
-
-    def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], bulk: bool) -> None:
-        self.tables = tables
-        self.makers = makers
-        self.bulk = bulk
-        self.body: list[Statement] = []
-        self.base = ""
-        self.offset = 4
-        self.modulus = 8
-        self.residue = 4
+    def __init__(self) -> None:
         self.fields: list[str] = []
         self.targets: list[str] = []
         self.sizes: list[tuple[int, int]] = []
         self.after: list[Statement] = []
 
-    @property
-    def at(self) -> str:
-        """The position as an expression."""
-        if not self.base:
-            return str(self.offset)
-        if self.offset < 0:
-            return f"{self.base} - {-self.offset}"
-        return f"{self.base} + {self.offset}" if self.offset else self.base
-
-    def moved(self, by: int) -> str:
-        """The position `by` bytes later as an expression."""
-        self.offset += by
-        text = self.at
-        self.offset -= by
-        return text
-
-    def line(self, value: Node, target: Node = "") -> None:
-        """Emit a statement."""
-        self.body.append(Line(value, target))
-
-    def step(self, step: layout.Step) -> None:
-        """Emit one step."""
-        match step:
-            case layout.Number(place, letter, size):
-                self.field(letter, size, size, place.text)
-            case layout.Dummy():
-                self.field("x", 1, 1)
-            case layout.Block(place, primitive, count):
-                raw = place.local
-                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, raw)
-                reader = self.tables.block_reader(step)
-                self.after.append(Line(call(reader, raw), place.text))
-            case layout.Enter(place, type_):
-                self.line(f"{self.makers[type_]}()", place.local)
-                self.line(place.local, place.text)
-            case layout.Text(place, wide):
-                self.wide_text(place.text) if wide else self.text(place.text)
-            case layout.Bytes(place, primitive, bound):
-                reader = "read_flags" if primitive == "bool" else "read_octets"
-                raw = self.buffer(self.count(bound), 1)
-                self.line(call(self.tables.function(reader, reader), raw), place.text)
-            case layout.Numbers(place, _, bound):
-                raw = self.buffer(self.count(bound), step.unit)
-                reader = self.tables.sequence_reader(step)
-                self.line(call(reader, raw), place.text)
-            case layout.Texts():
-                self.texts(step)
-            case layout.Items():
-                self.items(step)
-
-    # Numbers that follow each other are read together.
-
-    def field(self, token: str, align: int, size: int, target: str = "") -> None:
-        """Add a value to what is read next."""
+    def add(self, token: str, align: int, size: int, target: str = "") -> None:
+        """Add a value of `size` bytes, stored in `target`."""
         self.fields.append(token)
         self.sizes.append((align, size))
         if target:
             self.targets.append(target)
 
-    def flush(self, *, last: bool = True) -> None:
-        """Read the values gathered; unless `last`, the position after them is kept."""
-        if not self.fields:
-            return
-        widest = max(align for align, _ in self.sizes)
-        leading = self.sizes[0][0]
-        if widest > self.modulus and leading == widest:
-            self.align(widest)
-        fields = "".join(self.fields)
-        target: Node = Group("", tuple(self.targets))
-        if widest <= self.modulus:
-            reader = self.tables.struct("read", fields, self.residue, "unpack_from")
-            self.read(call(reader, "data", self.at), target)
-            for align, size in self.sizes:
-                self.skip((4 - self.residue) % align + size)
-        else:
-            self.phased(fields, target, last)
-        self.body += self.after
-        self.fields, self.targets, self.sizes, self.after = [], [], [], []
-
-    def read(self, value: Group, target: Node) -> None:
-        """Emit the reading of values; none at all for a dummy, which is only skipped."""
-        if isinstance(target, Group) and not target.items:
-            self.line(value)
-        else:
-            self.line(value, target)
-
-    def phased(self, fields: str, target: Node, last: bool) -> None:
-        """Read values whose padding depends on the position."""
-        table = self.tables.struct("read", fields, None, "")
-        index = f"{self.at} & 7"
-        if last:
-            self.read(call(f"{table}[{index}].unpack_from", "data", self.at), target)
-            return
-        chosen = "struct"
-        self.line(f"{table}[{index}]", chosen)
-        self.read(call(f"{chosen}.unpack_from", "data", self.at), target)
-        self.line(f"{self.at} + {chosen}.size", "at")
-        self.base, self.offset = "at", 0
+    def skipped(self, cursor: Cursor) -> Cursor:
+        """Return the position after the values, of which the first is at `cursor`."""
         for align, size in self.sizes:
-            if align > self.modulus:
-                self.modulus, self.residue = align, 4 % align
-            else:
-                self.residue = (self.residue + (4 - self.residue) % align) % self.modulus
-            self.residue = (self.residue + size) % self.modulus
+            if align > cursor.modulus:
+                cursor = cursor.known(align, 4)
+            cursor = cursor.skip(cursor.padding(align) + size)
+        return cursor
 
-    def skip(self, size: int) -> None:
-        """Go a constant number of bytes ahead."""
-        self.offset += size
-        self.residue = (self.residue + size) % self.modulus
+    def assignment(self, value: Group) -> Line:
+        """Return the statement that reads the values."""
+        return Line(value, Group("", tuple(self.targets))) if self.targets else Line(value)
+
+
+class _Decoder:
+    """The statements so far, the values to be read together, and the position before them."""
+
+    def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], source: str) -> None:
+        self.tables = tables
+        self.makers = makers
+        self.source = source
+        self.body: list[Statement] = []
+        self.here = Cursor()
+        self.run = _Run()
+        self.limited = False
+
+    def step(self, step: layout.Step) -> None:
+        """Emit one step."""
+        match step:
+            case layout.Number() | layout.Dummy() | layout.Block():
+                self.fixed(step, self.run)
+            case layout.Enter(place, type_):
+                self.body += self.enter(place, type_)
+            case layout.Text(place, wide):
+                self.line(self.wide_text() if wide else self.text(), place.text)
+            case layout.Bytes(place, primitive, bound):
+                name = "read_flags" if primitive == "bool" else "read_octets"
+                raw = self.buffer(self.count(bound), 1, 1, self.source)
+                self.line(call(self.tables.function(name, name), raw), place.text)
+            case layout.Numbers():
+                self.numbers(step)
+            case layout.Texts():
+                self.texts(step)
+            case layout.Items():
+                self.items(step)
+
+    def line(self, value: Node, target: Node = "") -> None:
+        """Emit a statement."""
+        self.body.append(Line(value, target))
+
+    # Values of fixed size.
+
+    def fixed(self, step: layout.Step, run: _Run) -> None:
+        """Add a value to a run."""
+        match step:
+            case layout.Number(place, letter, size):
+                run.add(letter, size, size, place.text)
+            case layout.Block(place, primitive, count):
+                token = f"{count}{block_code(primitive)}"
+                run.add(token, step.unit, step.size, place.local)
+                reader = self.tables.block_reader(step)
+                run.after.append(Line(call(reader, place.local), place.text))
+            case _:
+                run.add("x", 1, 1)
+
+    def enter(self, place: layout.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
+        """Return the statements that make a nested object."""
+        return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
+
+    def flush(self, *, last: bool = False) -> None:
+        """Read the run; the position after it is of no interest if it is the `last`."""
+        run, self.run = self.run, _Run()
+        if not run.fields:
+            return
+        widest = max(align for align, _ in run.sizes)
+        if run.sizes[0][0] == widest:
+            self.align(widest)
+        fields = "".join(run.fields)
+        here = self.here.text()
+        if widest <= self.here.modulus:
+            reader = self.tables.reader(fields, self.here.residue)
+            self.body.append(run.assignment(call(reader, "data", here)))
+            self.here = run.skipped(self.here)
+        else:
+            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
+            struct = table if last else "struct"
+            if not last:
+                self.line(table, struct)
+            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
+            if not last:
+                self.line(f"{here} + struct.size", "at")
+                self.here = run.skipped(self.here).at("at")
+        self.body += run.after
 
     def align(self, align: int) -> None:
         """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.modulus >= align:
-            self.skip((4 - self.residue) % align)
-            return
-        if align == 8:
-            self.line(f"({self.moved(3)} & -8) + 4", "at")
+        if self.here.modulus >= align:
+            self.here = self.here.skip(self.here.padding(align))
+        elif align == 8:
+            self.line(f"({self.here.text(3)} & -8) + 4", "at")
+            self.here = Cursor("at", 0, 8, 4)
         else:
-            self.line(f"{self.moved(align - 1)} & -{align}", "at")
-        self.base, self.offset = "at", 0
-        self.modulus, self.residue = align, 4 % align
+            self.line(f"{self.here.text(align - 1)} & -{align}", "at")
+            self.here = Cursor("at", 0, align, 4 % align)
 
-    def settle(self) -> None:
-        """Bring the position into `at`."""
-        if self.at != "at":
-            self.line(self.at, "at")
-        self.base, self.offset = "at", 0
+    def settle(self, target: Cursor) -> None:
+        """Bring the position into the variable of `target`."""
+        value = self.here.text(-target.offset)
+        if value != target.base:
+            self.line(value, target.base)
+        self.here = self.here.at(target.base, target.offset)
 
     # Values of variable size.
 
-    def number(self, target: str) -> str:
+    def number(self, target: str) -> None:
         """Read a count or size into a variable, together with the numbers before it."""
-        self.field("I", 4, 4, target)
-        self.flush(last=False)
-        return target
+        self.run.add("I", 4, 4, target)
+        self.flush()
 
     def count(self, bound: int | None) -> str:
         """Read the count of a sequence and check its upper limit."""
-        count = self.number("count")
+        self.number("count")
         if bound is not None:
-            raised = Line('raise ValueError("too many elements")')
-            self.body.append(Block(f"if {count} > {bound}:", (raised,)))
-        return count
+            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
+        return "count"
 
     def start(self) -> str:
-        """Return the position as an expression that stays true while `end` changes."""
-        if self.base == "end":
-            self.settle()
-        return self.at
+        """Return the position as an expression that stays true when `end` changes."""
+        if self.here.base == "end":
+            self.settle(Cursor("at", 0))
+        return self.here.text()
 
-    def slice(self, start: str, end: str) -> str:
-        """Return a slice of the buffer."""
-        if not start.isidentifier() and not start.isdigit() or not end.isidentifier():
-            return f"[{start} : {end}]"
-        return f"[{start}:{end}]"
+    def text(self) -> Node:
+        """Read the size of a string; return the expression that reads the string.
 
-    def text(self, target: str) -> None:
-        """Read a string; the index of its last byte checks the bounds."""
+        The index of the last byte, which should be zero, checks the bounds.
+        """
         self.number("size")
         start = self.start()
-        self.line(f"{self.moved(-1)} + size", "end")
-        part = f"{start} : end + (data[end] > 0)"
-        if self.bulk:
-            self.line(call("str", f"data[{part}]", '"utf-8"', '"replace"'), target)
-        else:
-            self.line(Group("data", (part,), ".decode()", "[]", ""), target)
-        self.base, self.offset = "end", 1
-        self.modulus, self.residue = 1, 0
+        self.line(f"{self.here.text(-1)} + size", "end")
+        self.here = Cursor("end", 1, 1, 0)
+        return call("text", f"data[{start} : end + (data[end] > 0)]")
 
-    def wide_text(self, target: str) -> None:
-        """Read a wstring."""
-        raw = self.buffer(self.number("count"), 4, "data")
-        reader = self.tables.function("read_wide_text", "read_wide_text(order)")
-        self.line(call(reader, raw), target)
+    def wide_text(self) -> Node:
+        """Read the size of a wstring; return the expression that reads the wstring."""
+        self.number("count")
+        raw = self.buffer("count", 4, 4, "data")
+        return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
 
-    def buffer(self, count: str, unit: int, source: str = "") -> str:
-        """Check that elements are there; return the slice that holds them, and go behind it."""
-        source = source or ("view" if self.bulk else "data")
-        if self.modulus < unit or (4 - self.residue) % unit:
-            self.settle()
-            aligned = Line(f"({self.at} + 3 & -8) + 4", "at")
-            self.body.append(Block(f"if {count}:", (aligned,)))
-            self.modulus, self.residue = 4, 0
+    def buffer(self, count: str, align: int, size: int, source: str) -> str:
+        """Check that `count` elements are there; return their slice, and go behind it."""
+        if not self.here.aligned(align):
+            self.settle(Cursor("at", 0))
+            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
+            self.here = self.here.known(4, 0)
         start = self.start()
-        size = count if unit == 1 else f"{unit} * {count}"
-        self.line(f"{start} + {size}", "end")
-        self.body.append(Block("if end > len(data):", (SHORT,)))
-        self.base, self.offset = "end", 0
-        self.modulus = min(self.modulus, unit)
-        self.residue %= self.modulus
-        return f"{source}{self.slice(start, 'end')}"
+        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
+        self.short_if("end > limit")
+        modulus = min(self.here.modulus, size & -size)
+        self.here = self.here.at("end").known(modulus, self.here.residue)
+        if start.isidentifier() or start.isdigit():
+            return f"{source}[{start}:end]"
+        return f"{source}[{start} : end]"
 
-    def least(self, count: str, size: int) -> None:
-        """Check that `count` elements of at least `size` bytes can be there."""
-        wanted = count if size == 1 else f"{size} * {count}"
-        self.body.append(Block(f"if {self.at} + {wanted} > len(data):", (SHORT,)))
+    def short_if(self, condition: str) -> None:
+        """Emit a check that the buffer is long enough."""
+        self.limited = True
+        self.body.append(Block(f"if {condition}:", TOO_SHORT))
+
+    def numbers(self, step: layout.Numbers) -> None:
+        """Read a numeric sequence: a copy of an empty array, filled from the buffer."""
+        local = step.place.local
+        raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
+        self.line(f"{self.tables.empty_array(step)}[:]", local)
+        self.line(call(f"{local}.frombytes", raw))
+        if step.unit > 1:
+            swapped = (Line(f"{local}.byteswap()"),)
+            self.body.append(Block(f"if {self.tables.swap()}:", swapped))
+        self.line(local, step.place.text)
+
+    def begin(self, step: layout.Texts | layout.Items, least: int) -> str:
+        """Read the count and check that so many can be there, or return the size."""
+        if step.size is not None:
+            self.flush()
+            count = str(step.size)
+        else:
+            count = self.count(step.bound)
+            wanted = count if least == 1 else f"{least} * {count}"
+            if least:
+                self.short_if(f"{self.here.text()} + {wanted} > limit")
+        self.line("[]", step.place.local)
+        self.line(step.place.local, step.place.text)
+        return count
 
     def texts(self, step: layout.Texts) -> None:
         """Read an array or sequence of strings."""
-        local = step.place.local
-        count = self.begin(step)
-        if step.size is None:
-            self.least(count, 4)
-        self.line("[]", local)
-        self.line(local, step.place.text)
 
-        def body() -> None:
-            if step.wide:
-                self.wide_text("value")
-                self.line(call(f"{local}.append", "value"))
-            else:
-                self.text("value")
-                self.line(call(f"{local}.append", "value"))
+        def element() -> None:
+            value = self.wide_text() if step.wide else self.text()
+            self.line(call(f"{step.place.local}.append", value))
 
-        self.loop(f"for _ in range({count}):", body)
-
-    def begin(self, step: layout.Texts | layout.Items) -> str:
-        """Read the count, or return the size."""
-        if step.size is not None:
-            self.flush(last=False)
-            return str(step.size)
-        return self.count(step.bound)
+        self.loop(f"for _ in range({self.begin(step, 4)}):", element)
 
     def items(self, step: layout.Items) -> None:
         """Read an array or sequence of structures."""
-        local = step.place.local
-        count = self.begin(step)
-        self.line("[]", local)
-        self.line(local, step.place.text)
         repeat = layout.fixed(step.body)
         if repeat is not None and repeat.stride == repeat.size:
-            self.fused(step, repeat, count)
+            self.rows(step, repeat)
             return
-        if step.size is None:
-            self.least(count, layout.smallest(step.body))
 
-        def body() -> None:
+        def element() -> None:
             self.line(f"{self.makers[step.type]}()", step.item)
-            self.line(call(f"{local}.append", step.item))
+            self.line(call(f"{step.place.local}.append", step.item))
             for part in step.body:
                 self.step(part)
-            self.flush(last=False)
+            self.flush()
 
-        self.loop(f"for _ in range({count}):", body)
+        count = self.begin(step, layout.smallest(step.body))
+        self.loop(f"for _ in range({count}):", element)
 
-    def fused(self, step: layout.Items, repeat: layout.Fixed, count: str) -> None:
-        """Read structures of constant size, one Struct each, without positions."""
-        local = step.place.local
+    def rows(self, step: layout.Items, repeat: layout.Fixed) -> None:
+        """Read structures of constant size: one Struct yields the values of each."""
+        count = self.begin(step, 0)
         if step.size is not None:
             self.align(repeat.align)
-        fields, targets, after = [], [], []
-        enters: list[Statement] = []
+        run = _Run()
+        entered: list[Statement] = []
         for part in step.body:
-            match part:
-                case layout.Number(place, letter):
-                    fields.append(letter)
-                    targets.append(place.text)
-                case layout.Dummy():
-                    fields.append("x")
-                case layout.Block(place, primitive, size):
-                    fields.append(f"{size}{block_code(primitive)}")
-                    targets.append(place.local)
-                    reader = self.tables.block_reader(part)
-                    after.append(Line(call(reader, place.local), place.text))
-                case layout.Enter(place, type_):
-                    enters.append(Line(f"{self.makers[type_]}()", place.local))
-                    enters.append(Line(place.local, place.text))
-                case _:
-                    pass
-        reader = self.tables.struct("rows", "".join(fields), 4, "iter_unpack")
+            if isinstance(part, layout.Enter):
+                entered += self.enter(part.place, part.type)
+            else:
+                self.fixed(part, run)
+        reader = self.tables.rows("".join(run.fields))
         values = self.tables.local(f"{step.item}_values")
-        rows = self.buffer_of(repeat, count)
-        body = [
+        rows = self.buffer(count, repeat.align, repeat.size, self.source)
+        stored = [Line(values, Group("", tuple(run.targets)))] if run.targets else []
+        body = (
             Line(f"{self.makers[step.type]}()", step.item),
-            Line(call(f"{local}.append", step.item)),
-            *enters,
-        ]
-        if targets:
-            body.append(Line(values, Group("", tuple(targets))))
-        body += after
-        self.body.append(Block(f"for {values} in {reader}({rows}):", tuple(body)))
+            Line(call(f"{step.place.local}.append", step.item)),
+            *entered,
+            *stored,
+            *run.after,
+        )
+        self.body.append(Block(f"for {values} in {reader}({rows}):", body))
 
-    def buffer_of(self, repeat: layout.Fixed, count: str) -> str:
-        """Return the slice that holds `count` elements of constant size."""
-        if self.modulus < repeat.align or (4 - self.residue) % repeat.align:
-            self.settle()
-            aligned = Line(f"({self.at} + 3 & -8) + 4", "at")
-            self.body.append(Block(f"if {count}:", (aligned,)))
-            self.modulus, self.residue = 4, 0
-        start = self.start()
-        self.line(f"{start} + {repeat.size} * {count}", "end")
-        self.body.append(Block("if end > len(data):", (SHORT,)))
-        self.base, self.offset = "end", 0
-        self.modulus = min(self.modulus, repeat.size & -repeat.size)
-        self.residue %= self.modulus
-        return f"{'view' if self.bulk else 'data'}{self.slice(start, 'end')}"
+    def loop(self, head: str, emit: Callable[[], None]) -> None:
+        """Emit a loop; `emit` emits its body, until what is known of the position holds.
 
-    def loop(self, head: str, body: object) -> None:
-        """Emit a loop whose body begins and ends with the position in `at`."""
-        assert callable(body)
-        self.settle()
-        outside = self.body
-        modulus, residue = self.modulus, self.residue
+        Between two rounds the position is in `at`, or in `end` if the body ends with a string.
+        """
+        outside, entry = self.body, self.here
+        first = entry.at("at")
         while True:
             mark = self.tables.mark()
-            self.body = []
-            self.base, self.offset, self.modulus, self.residue = "at", 0, modulus, residue
-            body()
-            self.settle()
-            met = min(modulus, self.modulus)
-            while residue % met != self.residue % met:
-                met //= 2
-            if met == modulus:
+            self.body, self.here = [], first
+            emit()
+            again = first.meet(self.here)
+            if first.base == "at" and self.here.base == "end":
+                again = again.at("end", self.here.offset)
+            if again == first:
                 break
-            modulus, residue = met, residue % met
+            first = again
             self.tables.reset(mark)
-        outside.append(Block(head, tuple(self.body)))
-        self.body = outside
-        self.modulus, self.residue = modulus, residue
-
-
-__all__ = ["Comprehension", "decode", "inlined", "is_bulk"]
+        self.settle(first)
+        loop = Block(head, tuple(self.body))
+        self.body, self.here = outside, entry
+        self.settle(first)
+        self.body.append(loop)
+        self.here = first

@@ -200,7 +200,7 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
         given = call("_idlc.to_array", code, name)
     else:
         dtype = f"_arrays.{numpy_name(field.type.element.name).upper()}"
-        values = "_arrays.ArrayLike"
+        values = "_arrays.Values"
         declaration = f"{name}: _arrays.{kind} = _arrays.{kind}({field.type.size})"
         given = call("_arrays.to_ndarray", dtype, str(field.type.size), name)
     return FieldView(

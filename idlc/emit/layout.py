@@ -169,14 +169,14 @@ def _step(type_: ir.FieldType, place: Place, messages: Messages, names: pynames.
             kind = Bytes if name in LIST_PRIMITIVES else Numbers
             return kind(place, name, bound)
         case ir.Array(element) | ir.Sequence(element):
-            size = type_.size if isinstance(type_, ir.Array) else None
+            length = type_.size if isinstance(type_, ir.Array) else None
             bound = type_.bound if isinstance(type_, ir.Sequence) else None
             if isinstance(element, ir.String):
-                return Texts(place, element.wide, size, bound)
+                return Texts(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
                 item = names.new("item")
                 body = _steps(messages[element.target], messages, names, item, (item,))
-                return Items(place, element.target, item, tuple(body), size, bound)
+                return Items(place, element.target, item, tuple(body), length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
 
 

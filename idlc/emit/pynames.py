@@ -18,8 +18,8 @@ LocalName = NewType("LocalName", str)
 
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
-    {"at", "count", "data", "decode", "encode", "end", "low", "message", "order", "parts"}
-    | {"put", "size", "struct", "value", "view"}
+    {"at", "count", "data", "decode", "encode", "end", "limit", "low", "message", "order"}
+    | {"parts", "put", "size", "struct", "text", "view"}
 )
 
 

@@ -53,18 +53,21 @@ class Tables:
         """Return the name of a runtime function."""
         return self.define(name, expression, f"_idlc.{expression}")
 
-    def struct(self, stem: str, fields: str, start: int | None, method: str) -> str:
-        """Return the bound `method` of one Struct, or a table of Structs by position."""
+    def reader(self, fields: str, start: int | None) -> str:
+        """Return what unpacks a run: a function, or without `start` a table by position."""
         if start is None:
-            return self.numbered(stem, f"{stem}*{fields}", _call("phases", fields))
+            return self.numbered("read", f"read {fields}", _call("phases", fields))
         arguments = (fields, f"start={start}") if start else (fields,)
-        expression = _call("layout", *arguments, after=f".{method}")
-        return self.numbered(stem, f"{stem}{start}{fields}.{method}", expression)
+        expression = _call("layout", *arguments, after=".unpack_from")
+        return self.numbered("read", f"read {start} {fields}", expression)
+
+    def rows(self, fields: str) -> str:
+        """Return the function that yields the values of one structure after the other."""
+        expression = _call("layout", fields, "start=4", after=".iter_unpack")
+        return self.numbered("rows", f"rows {fields}", expression)
 
     def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
         """Return what packs a frame: a function, or a table by text size or by position."""
-        if not texts and align == 1:
-            return self.struct("write", fields, start, "pack")
         arguments = [fields]
         if start:
             arguments.append(f"start={start}")
@@ -112,10 +115,14 @@ class Tables:
         expression = f'_idlc.sequence_writer(order, "{step.code}")'
         return self.define(f"buffer_{step.code}", expression, expression)
 
-    def sequence_reader(self, step: layout.Numbers) -> str:
-        """Return the function that turns a buffer into a sequence of numbers."""
-        expression = f'_idlc.sequence_reader(order, "{step.code}")'
-        return self.define(f"array_{step.code}", expression, expression)
+    def empty_array(self, step: layout.Numbers) -> str:
+        """Return the name of an empty array, of which sequences are copies."""
+        expression = f'_idlc.array("{step.code}")'
+        return self.define(f"empty_{step.code}", expression, expression)
+
+    def swap(self) -> str:
+        """Return the name of the flag that numeric sequences are in the other byte order."""
+        return self.define("swap", "swap", "order != _idlc.NATIVE")
 
 
 def numpy_name(primitive: str) -> str:

@@ -11,7 +11,7 @@ import msgspec
 from idlc.emit import code, documentation, fields, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
-from idlc.emit.pretty import Group, assign, call, lines
+from idlc.emit.pretty import WIDTH, Group, assign, call, lines
 from idlc.emit.references import References, referred
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -23,7 +23,7 @@ class MessageView(msgspec.Struct, frozen=True):
     name: str
     body: tuple[str, ...]
     init: tuple[str, ...]
-    codec: str
+    codec: tuple[str, ...]
     tables: tuple[str, ...]
     encode: tuple[str, ...]
     decode: tuple[str, ...]
@@ -148,12 +148,20 @@ def _message(
         name=references.name(structure.name),
         body=tuple(_body(structure, references)),
         init=tuple(_init(structure, references)),
-        codec=f"_{pynames.snake(structure.name.name)}",
+        codec=_codec_head(structure.name),
         tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
         decode=tuple(reading),
         result=f"_idlc.Codec(encode, decode{bulk})",
     )
+
+
+def _codec_head(name: ir.TypeName) -> tuple[str, ...]:
+    function = f"def _{pynames.snake(name.name)}"
+    head = f"{function}(order: str, text: _idlc.Text) -> _idlc.Codec:"
+    if len(head) <= WIDTH:
+        return (head,)
+    return (f"{function}(", "    order: str, text: _idlc.Text", ") -> _idlc.Codec:")
 
 
 def _has_arrays(interface: ir.Interface) -> bool:

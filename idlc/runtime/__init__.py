@@ -5,11 +5,13 @@ It imports the standard library only; `arrays` imports numpy, `typesupport` look
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
 from .cdr import (
     HEADERS,
+    NATIVE,
     PAD2,
     PAD4,
     PAD8,
@@ -28,7 +30,7 @@ from .cdr import (
     wide_block,
     wide_text,
 )
-from .codec import Codec, codec_for, maker
+from .codec import Codec, Text, codec_for, maker
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
@@ -44,7 +46,6 @@ from .sequences import (
     UInt16Sequence,
     UInt32Sequence,
     UInt64Sequence,
-    sequence_reader,
     sequence_writer,
     to_array,
 )
@@ -55,6 +56,7 @@ Floats: TypeAlias = Iterable[float]
 
 __all__ = [
     "HEADERS",
+    "NATIVE",
     "PAD2",
     "PAD4",
     "PAD8",
@@ -74,12 +76,14 @@ __all__ = [
     "Integers",
     "Message",
     "Service",
+    "Text",
     "Texts",
     "UInt8Sequence",
     "UInt16Sequence",
     "UInt32Sequence",
     "UInt64Sequence",
     "ValidationError",
+    "array",
     "codec_for",
     "dataclass",
     "flags",
@@ -95,7 +99,6 @@ __all__ = [
     "read_flags",
     "read_octets",
     "read_wide_text",
-    "sequence_reader",
     "sequence_writer",
     "several",
     "text_block",

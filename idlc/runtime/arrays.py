@@ -10,7 +10,11 @@ import numpy as np
 from .cdr import NATIVE
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from numpy.typing import ArrayLike, NDArray
+
+    Values: TypeAlias = ArrayLike
 
 Element = TypeVar("Element", bound="np.generic")
 
@@ -175,7 +179,6 @@ __all__ = [
     "UINT16",
     "UINT32",
     "UINT64",
-    "ArrayLike",
     "Float32Array",
     "Float64Array",
     "Int8Array",

@@ -82,15 +82,27 @@ def text_phases(order: str, fields: str, align: int = 1) -> tuple[Texts, ...]:
 
 
 def text_block(order: str) -> Callable[[Iterable[str]], bytes]:
-    """Return a function that writes the strings of an array, from a multiple of four on."""
+    """Return a function that writes the strings of an array, from a multiple of four on.
+
+    Short ASCII strings, as most are, are put together as text and encoded once.
+    """
+    sized = [layout(order, "I").pack(size + 1).decode("latin-1") for size in range(127)]
+    ended = [bytes(1 + (-size - 1) % 4).decode() for size in range(127)]
     padded = Texts(order, "I*", align=4)
 
     def write(values: Iterable[str]) -> bytes:
+        try:
+            text = "".join([sized[len(v)] + v + ended[len(v)] for v in values])
+            if text.isascii():
+                return trimmed(text.encode(), values)
+        except IndexError:
+            pass
         raw = [value.encode() for value in values]
-        if not raw:
-            return b""
-        block = b"".join([padded[len(text)](len(text) + 1, text) for text in raw])
-        excess = (-len(raw[-1]) - 1) % 4
+        return trimmed(b"".join([padded[len(r)](len(r) + 1, r) for r in raw]), raw)
+
+    def trimmed(block: bytes, values: Any) -> bytes:
+        """Cut the padding after the last string."""
+        excess = (-len(values[-1]) - 1) % 4 if values else 0
         return block[:-excess] if excess else block
 
     return write
@@ -157,12 +169,14 @@ def octets(values: Iterable[bytes]) -> bytes:
 
 def read_flags(raw: bytes | memoryview) -> list[bool]:
     """Return the bools of an array; every byte but zero is true."""
-    return memoryview(raw).cast("?").tolist()
+    values: list[Any] = memoryview(raw).cast("?").tolist()
+    return values
 
 
 def read_octets(raw: bytes | memoryview) -> list[bytes]:
     """Return the bytes of an array as `bytes` of length 1."""
-    return memoryview(raw).cast("c").tolist()
+    values: list[Any] = memoryview(raw).cast("c").tolist()
+    return values
 
 
 def flags_writer(size: int) -> Callable[[Iterable[object]], bytes]:
@@ -183,19 +197,3 @@ def _exactly(size: int, write: Callable[[Any], bytes]) -> Callable[[Any], bytes]
         return raw
 
     return checked
-
-
-class LenientBytes(bytes):
-    """Bytes whose slices decode invalid UTF-8 to U+FFFD, as rosidl reads strings.
-
-    The codecs decode strictly, which is faster; on a failure they read once more from this.
-    """
-
-    def __getitem__(self, index):  # type: ignore[no-untyped-def, override]
-        """Return an int for an index, lenient bytes for a slice."""
-        item = super().__getitem__(index)
-        return LenientBytes(item) if isinstance(item, bytes) else item
-
-    def decode(self, encoding: str = "utf-8", errors: str = "replace") -> str:
-        """Return the text, with U+FFFD for what is invalid."""
-        return super().decode(encoding, errors)

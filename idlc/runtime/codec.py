@@ -5,9 +5,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from .cdr import HEADERS, NATIVE, LenientBytes
+from .cdr import HEADERS, NATIVE
 from .errors import DecodeError, ValidationError
 
 if TYPE_CHECKING:
@@ -15,14 +15,24 @@ if TYPE_CHECKING:
 
 ORDERS = {"little": "<", "big": ">"}
 
+#: What turns bytes into a str.
+Text = Callable[[Any], str]
+
+#: Reads invalid UTF-8 as U+FFFD, as rosidl does, and takes a memoryview, too. Slower than
+#: `bytes.decode`, so the codecs use it only where that failed or cannot be.
+lenient_text: Text = partial(str, encoding="utf-8", errors="replace")
+
+#: What decoding raises when a buffer is not a message.
+FAILURES = (struct.error, ValueError, IndexError, OverflowError)
+
 
 class Codec(NamedTuple):
     """The two functions of one class and byte order.
 
     `encode(message)` returns the parts of the message in order: buffers, of which the first
-    begins with the encapsulation header. Numeric arrays are parts of their own, not copied.
-    `decode(data)` returns a message from a buffer that begins with the encapsulation header;
-    `bulk` says that `data` may be a memoryview, otherwise it must be `bytes`.
+    begins with the encapsulation header. Numeric sequences are parts of their own, not copied.
+    `decode(data)` returns a message from `bytes` that begin with the encapsulation header.
+    `bulk` says that there are numeric sequences, so that a memoryview saves a copy.
     """
 
     encode: Callable[[Any], list[Any]]
@@ -30,24 +40,29 @@ class Codec(NamedTuple):
     bulk: bool = False
 
 
-Kind = TypeVar("Kind", bound="type[Message]")
+class Codecs(Protocol):
+    """Gives the codec of a byte order, making it on first use."""
+
+    def __call__(self, order: str, text: Text = bytes.decode) -> Codec:
+        """Return the codec whose `decode` makes strings by `text`."""
 
 
-def codec_for(
-    kind: type[Message],
-) -> Callable[[Callable[[str], Codec]], Callable[[str], Codec]]:
+Make = Callable[[str, Text], Codec]
+
+
+def codec_for(kind: type[Message]) -> Callable[[Make], Make]:
     """Return a decorator that gives a message class the function that makes its codecs."""
 
-    def give(make: Callable[[str], Codec]) -> Callable[[str], Codec]:
-        made: dict[str, Codec] = {}
+    def give(make: Make) -> Make:
+        made: dict[tuple[str, Text], Codec] = {}
 
-        def codec(order: str) -> Codec:
-            found = made.get(order)
+        def codecs(order: str, text: Text = bytes.decode) -> Codec:
+            found = made.get((order, text))
             if found is None:
-                found = made[order] = make(order)
+                found = made[order, text] = make(order, text)
             return found
 
-        kind._codec_ = staticmethod(codec)
+        kind._codec_ = codecs
         return make
 
     return give
@@ -62,7 +77,7 @@ def maker(kind: type) -> Callable[[], Any]:
 
     def make() -> Any:
         made = object.__new__(kind)
-        made._check_fields = False  # type: ignore[attr-defined]
+        made._check_fields = False
         return made
 
     return make
@@ -70,37 +85,46 @@ def maker(kind: type) -> Callable[[], Any]:
 
 def install(kind: type[Message]) -> None:
     """Replace `serialize` and `deserialize` of the class that owns the codec by direct ones."""
-    owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
-    make = owner._codec_  # type: ignore[attr-defined]
-    encode, decode, bulk = make("<")
+    owner: Any = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    codecs = owner._codec_
+    encode, decode, _ = codecs("<")
     join = b"".join
 
     def serialize(self: Any, *, byteorder: str = "little") -> bytes:
         try:
             if byteorder == "little":
                 return join(encode(self))
-            return join(make(ORDERS[byteorder]).encode(self))
+            return join(codecs(ORDERS[byteorder]).encode(self))
         except Exception as error:
             raise encode_error(self, byteorder, error) from error
 
     def deserialize(cls: Any, buffer: Any) -> Any:
-        data = buffer if type(buffer) is bytes else memoryview(buffer).cast("B")
         try:
-            if data[1] == 1 and not data[0]:
-                result = decode(data if bulk else bytes(data))
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                message = decode(buffer)
             else:
-                result = make(order_of(data)).decode(data if bulk else bytes(data))
-        except (struct.error, ValueError, IndexError, OverflowError) as error:
-            result = recover(owner, data, error)
-        return result if cls is owner else as_subclass(cls, result)
+                message = read(codecs, buffer)
+        except FAILURES as error:
+            message = recover(owner, buffer, error)
+        return message if cls is owner else as_subclass(cls, message)
 
     serialize.__doc__ = owner.serialize.__doc__
     deserialize.__doc__ = owner.deserialize.__doc__
-    owner.serialize = serialize  # type: ignore[method-assign, assignment]
-    owner.deserialize = classmethod(deserialize)  # type: ignore[method-assign, assignment]
+    owner.serialize = serialize
+    owner.deserialize = classmethod(deserialize)
 
 
-def as_subclass(kind: type[Any], message: Any) -> Any:
+def read(codecs: Codecs, buffer: Any) -> Any:
+    """Return a message from any buffer, in either byte order."""
+    if type(buffer) is not bytes:
+        buffer = memoryview(buffer).cast("B")
+        if codecs(NATIVE).bulk:
+            return codecs(order_of(buffer), lenient_text).decode(buffer)
+        buffer = bytes(buffer)
+    return codecs(order_of(buffer)).decode(buffer)
+
+
+def as_subclass(kind: Any, message: Any) -> Any:
     """Return a message of a user's subclass with the fields of `message`."""
     result = kind.__new__(kind)
     for slot in type(message).__slots__:
@@ -122,20 +146,20 @@ def order_of(data: Any) -> str:
     )
 
 
-def recover(kind: type[Message], data: Any, error: Exception) -> Any:
+def recover(kind: Any, buffer: Any, error: Exception) -> Any:
     """Return the message if only its UTF-8 is invalid; raise DecodeError otherwise."""
     if isinstance(error, DecodeError):
         raise error
+    data = bytes(buffer)
     order = order_of(data)
-    lenient = LenientBytes(data)
     if isinstance(error, UnicodeDecodeError):
         try:
-            return kind._codec_(order).decode(lenient)
-        except (struct.error, ValueError, IndexError, OverflowError):
+            return kind._codec_(order, lenient_text).decode(data)
+        except FAILURES:
             pass
     from .explain import explain
 
-    raise explain(kind, lenient, order) from None
+    raise explain(kind, data, order) from None
 
 
 def encode_error(message: Message, byteorder: str, error: Exception) -> Exception:
@@ -151,4 +175,4 @@ def encode_error(message: Message, byteorder: str, error: Exception) -> Exceptio
     return error
 
 
-__all__ = ["NATIVE", "Codec", "codec_for", "install", "maker"]
+__all__ = ["Codec", "Text", "codec_for", "encode_error", "install", "maker"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, Field, field
+import dataclasses
 from inspect import signature
 from typing import TYPE_CHECKING, Any
 
@@ -12,24 +12,24 @@ if TYPE_CHECKING:
     from .message import Message
 
 
-def dataclass_fields(kind: type[Message]) -> dict[str, Field[Any]]:
+def dataclass_fields(kind: type[Message]) -> dict[str, dataclasses.Field[Any]]:
     """Return a class's fields by their Python names, in order."""
-    import dataclasses
-
-    owner = next(
+    owner: Any = next(
         base for base in kind.__mro__ if "_fields_and_field_types" in base.__dict__
     )
-    parameters = signature(owner.__init__).parameters
+    parameters = signature(owner).parameters
     found = {}
     for wire in owner._fields_and_field_types:
         name = public_name(wire)
         default = parameters[name].default
         if default is None:
-            made: Any = field(default_factory=_fresh(owner, slot_name(wire)))
+            made: Any = dataclasses.field(
+                default_factory=_fresh(owner, slot_name(wire))
+            )
         else:
-            made = field(default=MISSING if default is signature else default)
+            made = dataclasses.field(default=default)
         made.name = name
-        made.type = owner.__annotations__[name]
+        made.type = owner.__annotations__.get(name)
         made.kw_only = False
         made._field_type = dataclasses._FIELD  # type: ignore[attr-defined]
         found[name] = made

@@ -43,10 +43,10 @@ class _GroupMeta(InterfaceMeta):
     ) -> Any:
         if not bases:
             return super().__new__(cls, name, bases, namespace)
-        metaclass = type(
+        metaclass: Any = type(
             f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
         )
-        made = type.__new__(metaclass, name, bases, namespace)
+        made: Any = type.__new__(metaclass, name, bases, namespace)
         metaclass._interface = made
         return made
 

@@ -16,6 +16,8 @@ from .names import public_name, slot_name
 if TYPE_CHECKING:
     from collections.abc import Callable
     from dataclasses import Field, dataclass
+
+    import typing_extensions
 else:
 
     def dataclass(**_options):
@@ -24,7 +26,6 @@ else:
 
 
 Value = TypeVar("Value")
-Kind = TypeVar("Kind", bound="Message")
 
 
 class Fresh(Generic[Value]):
@@ -82,10 +83,11 @@ class MessageMeta(InterfaceMeta):
     def __new__(
         cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
     ) -> MessageMeta:
+        """Return a message class, or a user's subclass of one."""
         fields = namespace.get("_fields_and_field_types")
         if fields is None:
             return super().__new__(cls, name, bases, namespace)
-        metaclass = type(
+        metaclass: Any = type(
             f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
         )
         converted = {
@@ -93,7 +95,9 @@ class MessageMeta(InterfaceMeta):
         }
         namespace["__slots__"] = [slot_name(field) for field in fields]
         made: Any = type.__new__(metaclass, name, bases, namespace)
-        for slot, (public, conversion) in zip(made.__slots__, converted.items()):
+        for slot, (public, conversion) in zip(
+            made.__slots__, converted.items(), strict=True
+        ):
             member = made.__dict__[slot]
             attribute = member if conversion is None else conversion.property_of(member)
             type.__setattr__(made, public, attribute)
@@ -127,7 +131,7 @@ class Message(metaclass=MessageMeta):
     __hash__ = None  # type: ignore[assignment]
 
     _fields_and_field_types: ClassVar[dict[str, str]]
-    _codec_: ClassVar[Callable[[str], codec.Codec]]
+    _codec_: ClassVar[codec.Codecs]
     SLOT_TYPES: ClassVar[tuple[Any, ...]] = _SlotTypes()  # type: ignore[assignment]
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]] = _DataclassFields()  # type: ignore[assignment]
 
@@ -146,7 +150,7 @@ class Message(metaclass=MessageMeta):
         return self.serialize(byteorder=byteorder)
 
     @classmethod
-    def deserialize(cls: type[Kind], buffer: bytes | bytearray | memoryview) -> Kind:
+    def deserialize(cls, buffer: bytes | bytearray | memoryview) -> typing_extensions.Self:
         """Return the message that `buffer` begins with, in the byte order that its header names.
 
         Raises DecodeError. Bytes after the message are ignored; invalid UTF-8 becomes U+FFFD.
@@ -170,14 +174,15 @@ class Message(metaclass=MessageMeta):
         return to_dict(self)
 
     @classmethod
-    def from_dict(cls: type[Kind], values: dict[str, Any]) -> Kind:
+    def from_dict(cls, values: dict[str, Any]) -> typing_extensions.Self:
         """Return the message that `to_dict` would turn into `values`; absent fields have defaults.
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
         """
         from .dictionaries import from_dict
 
-        return from_dict(cls, values)
+        message: typing_extensions.Self = from_dict(cls, values)
+        return message
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):

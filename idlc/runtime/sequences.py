@@ -148,20 +148,3 @@ def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:
         return result
 
     return native if order == NATIVE else swapped
-
-
-def sequence_reader(order: str, code: str) -> Callable[[Any], Any]:
-    """Return a function that turns a slice of the wire's bytes into an array."""
-
-    def native(raw: Any) -> Any:
-        result = array(code)
-        result.frombytes(raw)
-        return result
-
-    def swapped(raw: Any) -> Any:
-        result = array(code)
-        result.frombytes(raw)
-        result.byteswap()
-        return result
-
-    return native if order == NATIVE else swapped

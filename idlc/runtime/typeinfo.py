@@ -140,8 +140,7 @@ def class_of(name: str) -> Any:
 
 def slot_types(kind: type) -> tuple[Any, ...]:
     """Return the fields' types as rosidl_parser.definition objects."""
-    from rosidl_parser import definition
-
+    definition = import_module("rosidl_parser.definition")
     return tuple(_slot_type(definition, field) for field in fields_of(type_name(kind)))
 
 
