@@ -1,0 +1,188 @@
+"""The C side of type support: structures, capsules, and callbacks that are safe to give to C.
+
+Everything given to C must live as long as the process, so it is handed to `keep`. An exception
+that leaves a ctypes callback leaves the result *uninitialised*, so callbacks whose result is a
+pointer are built from C callables only (`constant`, `resolver`): no bytecode runs in them, hence
+no signal handler either.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import operator
+from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+_FOREVER: list[object] = []
+# The module is torn down before the last C callback may come, so the list outlives its name.
+ctypes.pythonapi.Py_IncRef(py_object(_FOREVER))
+
+
+def keep(value: T) -> T:
+    """Return `value`, which will never be freed."""
+    _FOREVER.append(value)
+    return value
+
+
+class String(ctypes.Structure):
+    """`rosidl_runtime_c__String` and its twin in type descriptions; `size` without the NUL."""
+
+    _fields_ = (("data", c_char_p), ("size", c_size_t), ("capacity", c_size_t))
+
+
+class Sequence(ctypes.Structure):
+    """Any `X__Sequence`; `data` points to `size` elements."""
+
+    _fields_ = (("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t))
+
+
+class FieldType(ctypes.Structure):
+    """`rosidl_runtime_c__type_description__FieldType`."""
+
+    _fields_ = (
+        ("type_id", c_uint8),
+        ("capacity", c_uint64),
+        ("string_capacity", c_uint64),
+        ("nested_type_name", String),
+    )
+
+
+class Field(ctypes.Structure):
+    """`rosidl_runtime_c__type_description__Field`."""
+
+    _fields_ = (("name", String), ("type", FieldType), ("default_value", String))
+
+
+class IndividualDescription(ctypes.Structure):
+    """`rosidl_runtime_c__type_description__IndividualTypeDescription`."""
+
+    _fields_ = (("type_name", String), ("fields", Sequence))
+
+
+class Description(ctypes.Structure):
+    """`rosidl_runtime_c__type_description__TypeDescription`."""
+
+    _fields_ = (("type_description", IndividualDescription), ("referenced", Sequence))
+
+
+class Source(ctypes.Structure):
+    """`rosidl_runtime_c__type_description__TypeSource`."""
+
+    _fields_ = (("type_name", String), ("encoding", String), ("raw_file_contents", String))
+
+
+class TypeHash(ctypes.Structure):
+    """`rosidl_type_hash_t`; version 1 is RIHS01."""
+
+    _fields_ = (("version", c_uint8), ("value", c_uint8 * 32))
+
+
+#: The three functions by which rcl asks for hash, description and sources.
+_ABOUT = (
+    ("get_type_hash", c_void_p),
+    ("get_type_description", c_void_p),
+    ("get_type_description_sources", c_void_p),
+)
+
+
+class MessageTypeSupport(ctypes.Structure):
+    """`rosidl_message_type_support_t`."""
+
+    _fields_ = (("identifier", c_void_p), ("data", c_void_p), ("func", c_void_p), *_ABOUT)
+
+
+class ServiceTypeSupport(ctypes.Structure):
+    """`rosidl_service_type_support_t`."""
+
+    _fields_ = (
+        ("identifier", c_void_p),
+        ("data", c_void_p),
+        ("func", c_void_p),
+        ("request", c_void_p),
+        ("response", c_void_p),
+        ("event", c_void_p),
+        ("event_create", c_void_p),
+        ("event_destroy", c_void_p),
+        *_ABOUT,
+    )
+
+
+class ActionTypeSupport(ctypes.Structure):
+    """`rosidl_action_type_support_t`."""
+
+    _fields_ = (
+        ("goal_service", c_void_p),
+        ("result_service", c_void_p),
+        ("cancel_service", c_void_p),
+        ("feedback_message", c_void_p),
+        ("status_message", c_void_p),
+        *_ABOUT,
+    )
+
+
+def string(text: str) -> String:
+    """Return `text` as a C string with a size; its bytes live as long as the structure."""
+    data = text.encode()
+    return String(data, len(data), len(data) + 1)
+
+
+def sequence(items: list[Any], element: type[ctypes.Structure]) -> Sequence:
+    """Return a sequence of copies of `items`, kept for ever."""
+    array = keep((element * len(items))(*items))
+    return Sequence(ctypes.addressof(array), len(items), len(items))
+
+
+def address(function: Any) -> int:  # noqa: ANN401 (ctypes has no type for "any function pointer")
+    """Return where the code of a foreign function or callback is; the callback is kept."""
+    return ctypes.cast(keep(function), c_void_p).value or 0
+
+
+def constant(pointer: int) -> int:
+    """Return a C function that ignores its arguments and returns `pointer`."""
+    return address(ctypes.PYFUNCTYPE(c_void_p)(itertools.repeat(pointer).__next__))
+
+
+def resolver(answers: dict[bytes, int]) -> int:
+    """Return the C function `f(handle, identifier)` that looks `identifier` up, else NULL.
+
+    A class attribute that is not a descriptor is called without `self`: the handle becomes an
+    object whose `[identifier]` is `answers.get(identifier)`, all of it in C.
+    """
+    handle = keep(type("Handle", (c_void_p,), {"__getitem__": answers.get}))
+    prototype = ctypes.PYFUNCTYPE(c_void_p, handle, c_char_p)
+    return address(prototype(operator.getitem))
+
+
+_new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
+    ("PyCapsule_New", ctypes.pythonapi)
+)
+_capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
+    ("PyCapsule_GetPointer", ctypes.pythonapi)
+)
+#: (address, size, flags) -> memoryview; flags: 0x100 to read, 0x200 to write.
+view_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t, c_int)(
+    ("PyMemoryView_FromMemory", ctypes.pythonapi)
+)
+
+
+def capsule(pointer: int) -> object:
+    """Return a capsule without a name, as rclpy expects them."""
+    return keep(_new_capsule(pointer, None, None))
+
+
+def capsule_pointer(value: object) -> int:
+    """Return what a capsule without a name points to."""
+    return int(_capsule_pointer(value, None))
+
+
+#: What a function that C reads as `bool` returns from Python: C looks at the low byte of the
+#: address and never releases the reference, hence a small integer, which lives for ever.
+TRUE = next(number for number in range(256) if id(number) & 0xFF)
+
+
+def c_function(name: str) -> int:
+    """Return the address of a function of Python's own C interface."""
+    return address(getattr(ctypes.pythonapi, name))
