@@ -10,9 +10,11 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import logging
 import operator
+from collections.abc import Callable
 from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 
@@ -80,18 +82,16 @@ class TypeHash(ctypes.Structure):
     _fields_ = (("version", c_uint8), ("value", c_uint8 * 32))
 
 
-#: The three functions by which rcl asks for hash, description and sources.
-_ABOUT = (
-    ("get_type_hash", c_void_p),
-    ("get_type_description", c_void_p),
-    ("get_type_description_sources", c_void_p),
-)
+class About(ctypes.Structure):
+    """The three functions by which rcl asks for hash, description and sources: never NULL."""
+
+    _fields_ = (("type_hash", c_void_p), ("description", c_void_p), ("sources", c_void_p))
 
 
 class MessageTypeSupport(ctypes.Structure):
     """`rosidl_message_type_support_t`."""
 
-    _fields_ = (("identifier", c_void_p), ("data", c_void_p), ("func", c_void_p), *_ABOUT)
+    _fields_ = (("identifier", c_void_p), ("data", c_void_p), ("func", c_void_p), ("about", About))
 
 
 class ServiceTypeSupport(ctypes.Structure):
@@ -106,7 +106,7 @@ class ServiceTypeSupport(ctypes.Structure):
         ("event", c_void_p),
         ("event_create", c_void_p),
         ("event_destroy", c_void_p),
-        *_ABOUT,
+        ("about", About),
     )
 
 
@@ -119,7 +119,7 @@ class ActionTypeSupport(ctypes.Structure):
         ("cancel_service", c_void_p),
         ("feedback_message", c_void_p),
         ("status_message", c_void_p),
-        *_ABOUT,
+        ("about", About),
     )
 
 
@@ -133,6 +133,11 @@ def sequence(items: list[Any], element: type[ctypes.Structure]) -> Sequence:
     """Return a sequence of copies of `items`, kept for ever."""
     array = keep((element * len(items))(*items))
     return Sequence(ctypes.addressof(array), len(items), len(items))
+
+
+def pointer(value: ctypes.Structure) -> int:
+    """Return the address of a structure that is kept."""
+    return ctypes.addressof(keep(value))
 
 
 def address(function: Any) -> int:  # noqa: ANN401 (ctypes has no type for "any function pointer")
@@ -162,7 +167,8 @@ _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
 _capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
-#: (address, size, flags) -> memoryview; flags: 0x100 to read, 0x200 to write.
+READ, WRITE = 0x100, 0x200
+#: (address, size, READ or WRITE) -> memoryview.
 view_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t, c_int)(
     ("PyMemoryView_FromMemory", ctypes.pythonapi)
 )
@@ -186,3 +192,23 @@ TRUE = next(number for number in range(256) if id(number) & 0xFF)
 def c_function(name: str) -> int:
     """Return the address of a function of Python's own C interface."""
     return address(getattr(ctypes.pythonapi, name))
+
+
+class MessageCapsules(NamedTuple):
+    """What rclpy reads from the metaclass of a message class."""
+
+    type_support: object
+    create: object
+    destroy: object
+    convert_from_py: object
+    convert_to_py: object
+
+
+def callback(prototype: Any, function: Callable[..., object]) -> int:  # noqa: ANN401
+    """Return the C function that calls `function`, which must catch every exception."""
+    return address(prototype(function))
+
+
+def report(what: str, error: BaseException) -> None:
+    """Log an error that cannot be raised because C called."""
+    logging.getLogger(__package__).warning("%s: %s", what, error)

@@ -99,20 +99,12 @@ def _type_hash(name: str) -> c.TypeHash:
     return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
 
 
-class About(NamedTuple):
-    """The C functions that tell rcl about a type, in the order of the structures' last fields."""
-
-    type_hash: int
-    description: int
-    sources: int
-
-
 @cache
-def about(name: str) -> About:
+def about(name: str) -> c.About:
     """Return functions that never fail and never return NULL, as rcl demands."""
     others = sorted(references(name))
     individuals = c.sequence([_individual(n) for n in others], c.IndividualDescription)
     description = c.Description(_individual(name), individuals)
     sources = c.sequence([_source(n) for n in (name, *others)], c.Source)
     told = (_type_hash(name), description, sources)
-    return About(*(c.constant(ctypes.addressof(c.keep(value))) for value in told))
+    return c.About(*(c.constant(c.pointer(value)) for value in told))

@@ -93,5 +93,5 @@ def fast_cdr() -> FastCdr:
     known = begin_of(here) == begin and position == begin + 5 and data.value == b"\1\2\3\4\5"
     if indices or index is None or not known:
         raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    append_bytes = method(f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_char_p, c_size_t)
+    append_bytes = method(f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t)
     return FastCdr(index + 1, index + 5, append_bytes)

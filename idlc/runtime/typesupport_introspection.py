@@ -22,6 +22,8 @@ from .typesupport_descriptions import (
     load,
 )
 
+IDENTIFIER = "rosidl_typesupport_introspection_c"
+
 #: Type id in descriptions -> (type id in introspection, C type of one element).
 _ELEMENTS: dict[int, tuple[int, Any]] = {
     2: (9, ctypes.c_int8),
@@ -87,6 +89,7 @@ class Library(NamedTuple):
 
     identifier: int
     same_handle: int
+    same_service: int
 
 
 @cache
@@ -94,14 +97,14 @@ def library() -> Library:
     """Return addresses in the libraries that define what introspection is.
 
     The identifier is rosidl's own string, because middlewares compare the pointers.
-    `same_handle` is the function that answers with the handle itself if the identifier fits.
+    `same_handle` and `same_service` answer with the handle itself if the identifier fits.
     """
-    introspection = load_library("librosidl_typesupport_introspection_c.so")
+    introspection = load_library(f"lib{IDENTIFIER}.so")
     runtime = load_library("librosidl_runtime_c.so")
-    symbol = "rosidl_typesupport_introspection_c__identifier"
     return Library(
-        c_void_p.in_dll(introspection, symbol).value or 0,
+        c_void_p.in_dll(introspection, f"{IDENTIFIER}__identifier").value or 0,
         c.address(runtime.get_message_typesupport_handle_function),
+        c.address(runtime.get_service_typesupport_handle_function),
     )
 
 
@@ -181,6 +184,6 @@ def handle(name: str, shift: int = 0) -> int:
         library().identifier,
         ctypes.addressof(members(name, shift)),
         library().same_handle,
-        *about(name),
+        about(name),
     )
-    return ctypes.addressof(c.keep(support))
+    return c.pointer(support)
