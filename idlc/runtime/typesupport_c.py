@@ -8,15 +8,22 @@ no signal handler either.
 
 from __future__ import annotations
 
+import _thread
 import ctypes
 import itertools
 import logging
+import opcode
 import operator
-from collections.abc import Callable
+import sys
 from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
+from collections.abc import Callable
+from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
+
+#: Arguments of the interpreter's RESUME instruction.
+_AT_START, _IN_YIELD_FROM = 0, 2
 
 _FOREVER: list[object] = []
 # The module is torn down before the last C callback may come, so the list outlives its name.
@@ -172,6 +179,12 @@ READ, WRITE = 0x100, 0x200
 view_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t, c_int)(
     ("PyMemoryView_FromMemory", ctypes.pythonapi)
 )
+#: (address, size) -> bytes.
+copy_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t)(
+    ("PyBytes_FromStringAndSize", ctypes.pythonapi)
+)
+#: Where the content of a `bytes` object begins, from its `id`; a terminating zero follows it.
+BYTES_OFFSET = bytes.__basicsize__ - 1
 
 
 def capsule(pointer: int) -> object:
@@ -184,9 +197,25 @@ def capsule_pointer(value: object) -> int:
     return int(_capsule_pointer(value, None))
 
 
-#: What a function that C reads as `bool` returns from Python: C looks at the low byte of the
-#: address and never releases the reference, hence a small integer, which lives for ever.
-TRUE = next(number for number in range(256) if id(number) & 0xFF)
+def _c_true() -> object:
+    """Return an object that C code takes for `true` where it expects a `bool`.
+
+    A function of Python's C interface that stands in for a `bool` function returns a pointer,
+    and the caller looks at its low byte, or (clang, aarch64) at the lowest bit only. So the
+    object is put at an address that ends in 01; nothing ever frees it. Python 3.14 needs the
+    lowest bit for itself: there the low byte is just not zero, which x86-64's gcc accepts.
+    """
+    if sys.version_info >= (3, 14):
+        return next(number for number in range(256) if id(number) & 0xFF)
+    room = keep(ctypes.create_string_buffer(0x200))
+    start = (ctypes.addressof(room) | 0xFF) + 2
+    immortal = 0xFFFF_FFFF if sys.version_info >= (3, 12) else 1 << 60
+    (ctypes.c_size_t * 2).from_address(start)[:] = (immortal, id(object))
+    return ctypes.cast(start, py_object).value
+
+
+#: What `convert_from_py` returns: C reads it as `true` and never releases it.
+TRUE = _c_true()
 
 
 def c_function(name: str) -> int:
@@ -194,19 +223,46 @@ def c_function(name: str) -> int:
     return address(getattr(ctypes.pythonapi, name))
 
 
-class MessageCapsules(NamedTuple):
-    """What rclpy reads from the metaclass of a message class."""
+class MessageSupport(NamedTuple):
+    """What a road makes for a message class: its type support, and the type of its memory."""
 
-    type_support: object
-    create: object
-    destroy: object
-    convert_from_py: object
-    convert_to_py: object
+    handle: int
+    memory: Callable[[], object]
 
 
-def callback(prototype: Any, function: Callable[..., object]) -> int:  # noqa: ANN401
-    """Return the C function that calls `function`, which must catch every exception."""
-    return address(prototype(function))
+def callback(prototype: Any, function: FunctionType) -> int:  # noqa: ANN401
+    """Return the C function that calls `function`, which must catch every exception.
+
+    Signal handlers run on entry of a Python function, before its first `try`, and what they
+    raise would be lost with the result. The interpreter does not look for signals where a
+    function resumes inside a `yield from`, so the function is told that it does. (Python 3.10
+    has no such instruction; it does not look before a leading `try` either.)
+    """
+    code = function.__code__
+    raw = bytearray(code.co_code)
+    resume = opcode.opmap.get("RESUME")
+    at = next((at for at in range(0, len(raw), 2) if raw[at] == resume), None)
+    if at is not None and raw[at + 1] == _AT_START:
+        raw[at + 1] = _IN_YIELD_FROM
+    deaf = FunctionType(
+        code.replace(co_code=bytes(raw)),
+        function.__globals__,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    return address(prototype(deaf))
+
+
+def interrupted(error: BaseException) -> bool:
+    """Return whether a callback should try again because only a signal came in between.
+
+    The signal is sent once more, by another thread: soon, but not before C code is left.
+    """
+    if isinstance(error, Exception):
+        return False
+    _thread.start_new_thread(_thread.interrupt_main, ())
+    return True
 
 
 def report(what: str, error: BaseException) -> None:

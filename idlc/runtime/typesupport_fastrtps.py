@@ -8,26 +8,31 @@ interface, hence an exception reaches the caller of `publish` untouched.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+import sys
 from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from typing import Any
 
 from . import typesupport_c as c
 from . import typesupport_introspection as introspection
+from .cdr import NATIVE
+from .codec import encode_error, install
 from .typesupport_descriptions import about
 from .typesupport_fastcdr import fast_cdr
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
-_HEADER_SIZE = 4
+#: The encapsulation header, which the middleware reads and writes itself.
+_HEADER = 4
+#: Received messages up to this size are copied into `bytes`, which decode faster than views.
+_SMALL = 4096
 #: How many `Cdr` objects are remembered; they live on the stack, at few different addresses.
 _MAX_VIEWS = 256
 _views: dict[int, memoryview] = {}
 
 
 class Memory:
-    """Message memory: `message @ memory` encodes into it, `+memory` is the decoded message.
+    """Message memory: `message @ memory` encodes into it, `+memory` is the message itself.
 
     `__len__` is the encoded size. It is a slot that holds a function, so that no bytecode runs
     where C asks for the size: an interrupt there could not be told.
@@ -35,19 +40,41 @@ class Memory:
 
     __slots__ = ("length", "message", "parts")
 
-    def __rmatmul__(self, message: Any) -> int:  # noqa: ANN401
-        """Encode `message`; raise what the codec raises."""
-        parts = self.parts = message._parts()
-        self.length = sum(map(len, parts)).__index__
-        self.message = message
-        return c.TRUE
-
-    def __pos__(self) -> object:
-        """Return the message that was decoded last."""
+    def __pos__(self) -> Any:  # noqa: ANN401
+        """Return the message that was encoded or decoded last."""
         return self.message
 
 
-Memory.__len__ = Memory.length
+Memory.__len__ = Memory.length  # type: ignore[attr-defined]
+
+
+def _buffers(parts: list[Any]) -> list[Any]:
+    """Return the parts after the first as writable views of bytes, which have addresses."""
+    views = [memoryview(part) for part in parts[1:]]
+    bytewise = [view.cast("B") for view in views if view.nbytes]
+    return [memoryview(bytearray(view)) if view.readonly else view for view in bytewise]
+
+
+def _memory_type(cls: Any) -> type[Memory]:  # noqa: ANN401
+    """Return the memory of a message class, which encodes with the class's codec."""
+    encode = cls._codec_(NATIVE).encode
+    true = c.TRUE
+
+    def store(memory: Any, message: Any) -> object:  # noqa: ANN401
+        try:
+            parts = encode(message)
+        except Exception as error:
+            raise encode_error(message, sys.byteorder, error) from error
+        size = len(parts[0]) - _HEADER
+        if len(parts) > 1:
+            parts[1:] = _buffers(parts)
+            size += sum([part.nbytes for part in parts[1:]])
+        memory.parts = parts
+        memory.length = size.__index__
+        memory.message = message
+        return true
+
+    return type("Memory", (Memory,), {"__slots__": (), "__rmatmul__": store})
 
 
 class _Callbacks(ctypes.Structure):
@@ -84,46 +111,65 @@ def _view(cdr: int) -> memoryview:
     return view
 
 
-def _address_of(part: Any) -> int:  # noqa: ANN401
-    """Return where the bytes of a writable buffer are."""
-    return ctypes.addressof(c_char.from_buffer(part))
-
-
 @cache
 def _serializer() -> int:
     """Return `cdr_serialize(memory, cdr)`."""
     position, end, append = fast_cdr()
     views = _views
+    body = c.BYTES_OFFSET + _HEADER
 
-    def serialize(memory: Memory, cdr: int) -> bool:
+    def serialize(memory: Any, cdr: int) -> bool:  # noqa: ANN401
         try:
             words = views.get(cdr) or _view(cdr)
-            if words[end] - words[position] < memory.length():
+            start = words[position]
+            if words[end] - start < memory.length():
                 return False
-            for part in memory.parts:
-                append(cdr, part if type(part) is bytes else _address_of(part), len(part))
+            parts = memory.parts
+            append(cdr, id(parts[0]) + body, len(parts[0]) - _HEADER)
+            if len(parts) > 1:
+                for part in parts[1:]:
+                    append(cdr, ctypes.addressof(c_char.from_buffer(part)), len(part))
+            return True
         except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
-            c.report("a message was not sent", error)
-            return False
-        return True
+            failure = error
+        try:
+            if c.interrupted(failure):
+                words[position] = start
+                return serialize(memory, cdr)
+            c.report("a message was not sent", failure)
+        except BaseException:  # noqa: BLE001, S110
+            pass
+        return False
 
     return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
 
 
-def _deserializer(name: str, decode: Callable[[memoryview], object]) -> int:
+def _deserializer(name: str, cls: Any) -> int:  # noqa: ANN401
     """Return `cdr_deserialize(cdr, memory)` for one class."""
     position, end, _ = fast_cdr()
     views = _views
+    install(cls)
+    decode = cls.deserialize
 
-    def deserialize(cdr: int, memory: Memory) -> bool:
+    def deserialize(cdr: int, memory: Any) -> bool:  # noqa: ANN401
         try:
             words = views.get(cdr) or _view(cdr)
-            start = words[position] - _HEADER_SIZE
-            memory.message = decode(c.view_memory(start, words[end] - start, c.READ))
+            start = words[position] - _HEADER
+            size = words[end] - start
+            if size <= _SMALL:
+                memory.message = decode(c.copy_memory(start, size))
+            else:
+                memory.message = decode(c.view_memory(start, size, c.READ))
+            return True
         except BaseException as error:  # noqa: BLE001
-            c.report(f"a received {name} was dropped", error)
-            return False
-        return True
+            failure = error
+        try:
+            if c.interrupted(failure):
+                return deserialize(cdr, memory)
+            c.report(f"a received {name} was dropped", failure)
+        except BaseException:  # noqa: BLE001, S110
+            pass
+        return False
 
     return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
 
@@ -145,14 +191,14 @@ def _identifier() -> int:
     return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
 
 
-def message(cls: type[Any], name: str) -> c.MessageCapsules:
+def message(cls: Any, name: str) -> c.MessageSupport:  # noqa: ANN401
     """Return what rclpy needs to publish and take messages of a class."""
     package, kind, short = name.split("/")
     callbacks = _Callbacks(
         f"{package}::{kind}".encode(),
         short.encode(),
         _serializer(),
-        _deserializer(name, cls._decode),
+        _deserializer(name, cls),
         c.c_function("PyObject_Size"),
         _unbounded(),
     )
@@ -163,23 +209,7 @@ def message(cls: type[Any], name: str) -> c.MessageCapsules:
     }
     support.func = c.resolver(answers)
     support.about = about(name)
-    return c.MessageCapsules(
-        type_support=c.capsule(ctypes.addressof(support)),
-        create=_create(),
-        destroy=c.capsule(c.c_function("Py_DecRef")),
-        convert_from_py=c.capsule(c.c_function("PyNumber_MatrixMultiply")),
-        convert_to_py=c.capsule(c.c_function("PyNumber_Positive")),
-    )
-
-
-@cache
-def _create() -> object:
-    return c.capsule(c.address(PYFUNCTYPE(py_object)(Memory)))
-
-
-def new_memory(cls: type[Any]) -> Memory:  # noqa: ARG001 (the other road needs the class)
-    """Return empty memory for a message of a class."""
-    return Memory()
+    return c.MessageSupport(ctypes.addressof(support), _memory_type(cls))
 
 
 def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001

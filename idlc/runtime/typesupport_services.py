@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import PYFUNCTYPE, c_bool, c_int32, c_int64, c_uint8, c_uint32, c_void_p, py_object
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -42,7 +43,7 @@ def _message_at(memory: int | None) -> list[object]:
     return [+ctypes.cast(memory, py_object).value]
 
 
-def event(cls: type[Any], handle: int, road: ModuleType) -> Event:
+def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
     """Return how rcl makes and frees event messages; `cls` is the service's Event class.
 
     Both functions are needed as soon as there is a handle: rcl calls them without a look.
@@ -57,19 +58,31 @@ def event(cls: type[Any], handle: int, road: ModuleType) -> Event:
             message.info.stamp.nanosec = told.nanosec
             message.info.client_gid = list(told.client_gid)
             message.info.sequence_number = told.sequence_number
-            memory = road.new_memory(cls)
+            memory = memory_type()
             message @ memory
             ctypes.pythonapi.Py_IncRef(py_object(memory))
             return id(memory)
         except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
-            c.report("a service event was not sent", error)
-            return 0
+            failure = error
+        try:
+            if c.interrupted(failure):
+                return create(info, _, request, response)
+            c.report("a service event was not sent", failure)
+        except BaseException:  # noqa: BLE001, S110
+            pass
+        return 0
 
     def destroy(memory: Any, _: int) -> bool:  # noqa: ANN401
         try:
             ctypes.pythonapi.Py_DecRef(py_object(memory))
         except BaseException as error:  # noqa: BLE001
-            c.report("a service event was not freed", error)
+            failure = error
+        else:
+            return True
+        try:
+            c.interrupted(failure)
+        except BaseException:  # noqa: BLE001, S110
+            pass
         return True
 
     info = ctypes.POINTER(_EventInfo)
