@@ -7,7 +7,7 @@ memory; introspection-based middlewares read and write the memory that they desc
 from __future__ import annotations
 
 import ctypes
-from ctypes import c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
+from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -145,6 +145,10 @@ def offsets(name: str) -> list[int]:
 
 
 def _member(field: Field, offset: int) -> Member:
+    """Return how a field is told to the middleware.
+
+    No size function: without one, Cyclone DDS reads sequences from C memory by itself.
+    """
     type_id, size = _MESSAGE, ctypes.sizeof(element_type(field))
     if field.base != NESTED:
         type_id = _ELEMENTS[field.base][0]
@@ -158,7 +162,57 @@ def _member(field: Field, offset: int) -> Member:
         is_upper_bound=field.shape == BOUNDED_SEQUENCE,
         offset=offset,
     )
+    if field.base == NESTED and field.shape != SCALAR:
+        member.get_function = member.get_const_function = _get(field.shape == ARRAY, size)
+        if field.shape != ARRAY:
+            member.resize_function = _resize(field.nested, size)
     return member
+
+
+@cache
+def _get(fixed: bool, size: int) -> int:
+    """Return `get(field, index)`, the address of an element.
+
+    A result must come out whatever happens, so no function is called in these two: the
+    interpreter looks for signals only where functions are called.
+    """
+
+    def in_array(field: int, index: int) -> int:
+        return field + index * size
+
+    def in_sequence(field: Any, index: int) -> int:  # noqa: ANN401
+        return field[0].data + index * size  # type: ignore[no-any-return]
+
+    if fixed:
+        return c.callback(PYFUNCTYPE(c_void_p, c_size_t, c_size_t), in_array)
+    prototype = PYFUNCTYPE(c_void_p, ctypes.POINTER(c.Sequence), c_size_t)
+    return c.callback(prototype, in_sequence)
+
+
+@cache
+def _resize(name: str, size: int) -> int:
+    """Return `resize(field, count)`, which frees what there was and makes `count` elements."""
+    from . import typesupport_transcode as transcode
+
+    many = transcode.Many(list(transcode.steps(name)), 0, size)
+
+    def resize(field: int, count: int) -> bool:
+        try:
+            many.free(transcode.area(field, ctypes.sizeof(c.Sequence)), 0)
+            if count:
+                ctypes.memset(transcode.allocate(field, count, size).address, 0, count * size)
+            return True
+        except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
+            failure = error
+        try:
+            if c.interrupted(failure):
+                return resize(field, count)
+            c.report("a received message was dropped", failure)
+        except BaseException:  # noqa: BLE001, S110
+            pass
+        return False
+
+    return c.callback(PYFUNCTYPE(c_bool, c_void_p, c_size_t), resize)
 
 
 def members(name: str, shift: int = 0) -> Members:
