@@ -13,6 +13,7 @@ from typing import Any
 
 from . import typesupport_c as c
 from . import typesupport_services as services
+from .typesupport_descriptions import load
 from .typesupport_extension import extension
 
 #: Middlewares that take encoded messages through Fast DDS's type support.
@@ -46,8 +47,8 @@ def _road() -> ModuleType:
 
 def _name(cls: Any) -> str:  # noqa: ANN401
     """Return the full name of a class as ROS 2 writes it."""
-    package, kind, _ = cls.__module__.split(".")[-3:]
-    return f"{package}/{kind}/{cls.__name__}"
+    kind = cls.__module__.split(".")[-2]
+    return f"{load().package}/{kind}/{cls.__name__}"
 
 
 def _handle(cls: Any) -> int:  # noqa: ANN401

@@ -3,15 +3,15 @@
 The facts are in `types.json` beside this module, written with the package and read only when
 rclpy asks for type support:
 
-    {"types":   {"pkg/msg/Name": [["field", type_id, capacity, string_capacity,
-                                   "nested/type/Name" or "", "default"], …]},
-     "hashes":  {"pkg/msg/Name": "RIHS01_…"},
+    {"package": "pkg",
+     "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
+     "hashes": {"pkg/msg/Name": "RIHS01_…"},
      "sources": {"pkg/msg/Name": "text of the interface file"}}
 
-`types` and `hashes` hold every structure of the package, derived ones and the pseudo-structures
-of services and actions included, and all that these refer to; `sources` holds the files among
-them. A type id is a base plus 48 for a fixed array, 96 for a bounded, 144 for an unbounded
-sequence (rosidl's `type_description_interfaces/msg/FieldType`).
+`descriptions` and `hashes` hold every structure of the package, derived ones and the
+pseudo-structures of services and actions included, and all that these refer to; `sources` holds
+the files among them. A type id is a base plus 48 for a fixed array, 96 for a bounded, 144 for an
+unbounded sequence (rosidl's `type_description_interfaces/msg/FieldType`).
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
 
 
 class Field(NamedTuple):
-    """A field as in `types.json`; `capacity` is an array's size or a sequence's bound."""
+    """A field as described; `capacity` is an array's size or a sequence's bound."""
 
     name: str
     type_id: int
     capacity: int
     string_capacity: int
-    nested: str
-    default: str
+    nested_type_name: str
+    default_value: str
 
     @property
     def base(self) -> int:
@@ -50,8 +50,9 @@ class Field(NamedTuple):
 
 
 class Types(NamedTuple):
-    """The content of `types.json`."""
+    """The content of `types.json`; fields by type."""
 
+    package: str
     types: dict[str, list[Field]]
     hashes: dict[str, str]
     sources: dict[str, str]
@@ -64,22 +65,28 @@ def load() -> Types:
     if text is None:
         raise ImportError(f"{__package__} has no types.json: run `idlc gen` again")
     data = json.loads(text)
-    fields = {name: [Field(*field) for field in own] for name, own in data["types"].items()}
-    return Types(fields, data["hashes"], data["sources"])
+    types = {
+        name: [
+            Field(field["name"], **field["type"], default_value=field["default_value"])
+            for field in description["fields"]
+        ]
+        for name, description in data["descriptions"].items()
+    }
+    return Types(data["package"], types, data["hashes"], data["sources"])
 
 
 @cache
 def references(name: str) -> frozenset[str]:
     """Return all types that `name` refers to, directly or not, itself excluded."""
-    direct = {field.nested for field in load().types[name] if field.nested}
+    direct = {field.nested_type_name for field in load().types[name] if field.nested_type_name}
     return frozenset(direct.union(*map(references, direct)))
 
 
 def _field(field: Field) -> c.Field:
     kind = c.FieldType(
-        field.type_id, field.capacity, field.string_capacity, c.string(field.nested)
+        field.type_id, field.capacity, field.string_capacity, c.string(field.nested_type_name)
     )
-    return c.Field(c.string(field.name), kind, c.string(field.default))
+    return c.Field(c.string(field.name), kind, c.string(field.default_value))
 
 
 @cache

@@ -120,6 +120,7 @@ def _serializer() -> int:
 
     def serialize(memory: Any, cdr: int) -> bool:  # noqa: ANN401
         try:
+            words = start = None
             words = views.get(cdr) or _view(cdr)
             start = words[position]
             if words[end] - start < memory.length():
@@ -134,7 +135,8 @@ def _serializer() -> int:
             failure = error
         try:
             if c.interrupted(failure):
-                words[position] = start
+                if start is not None:
+                    words[position] = start
                 return serialize(memory, cdr)
             c.report("a message was not sent", failure)
         except BaseException:  # noqa: BLE001, S110

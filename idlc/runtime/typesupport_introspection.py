@@ -129,7 +129,7 @@ def structure(name: str) -> type[ctypes.Structure]:
 
 def element_type(field: Field) -> Any:  # noqa: ANN401 (any ctypes type)
     """Return the C type of one element of a field."""
-    return structure(field.nested) if field.base == NESTED else _ELEMENTS[field.base][1]
+    return structure(field.nested_type_name) if field.base == NESTED else _ELEMENTS[field.base][1]
 
 
 def _c_type(field: Field) -> Any:  # noqa: ANN401
@@ -156,7 +156,7 @@ def _member(field: Field, offset: int) -> Member:
         name=field.name.encode(),
         type_id=type_id,
         string_upper_bound=field.string_capacity,
-        members=handle(field.nested) if field.nested else None,
+        members=handle(field.nested_type_name) if field.nested_type_name else None,
         is_array=field.shape != SCALAR,
         array_size=field.capacity,
         is_upper_bound=field.shape == BOUNDED_SEQUENCE,
@@ -165,7 +165,7 @@ def _member(field: Field, offset: int) -> Member:
     if field.base == NESTED and field.shape != SCALAR:
         member.get_function = member.get_const_function = _get(field.shape == ARRAY, size)
         if field.shape != ARRAY:
-            member.resize_function = _resize(field.nested, size)
+            member.resize_function = _resize(field.nested_type_name, size)
     return member
 
 

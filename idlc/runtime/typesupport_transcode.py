@@ -234,7 +234,7 @@ def _free(memory: Area, start: int) -> None:
 def _element_steps(field: Field) -> list[Step]:
     """Return the steps of one element that begins at 0."""
     if field.base == NESTED:
-        return list(steps(field.nested))
+        return list(steps(field.nested_type_name))
     kind = introspection.element_type(field)
     if kind is c.String:
         return [WideText(0) if field.base in _WIDE else Text(0)]
