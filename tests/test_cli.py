@@ -347,6 +347,27 @@ def test_messages_nested_deeper_than_pythons_stack():
     assert len(idlc("hash", "demo").stdout.splitlines()) == depth + 1
 
 
+def test_a_name_longer_than_the_file_system_allows():
+    make("demo/msg/A.msg", f"{'A' * 5000} a\nstd_msgs/{'B' * 5000} b\n{'c' * 5000}/C c\n")
+    make("deps/x_msgs/msg/X.msg")
+    done = idlc("check", "demo", "-I", "deps")
+    assert done.returncode == 1
+    assert done.stdout.count("error[IDL20") == 3
+    assert idlc("hash", f"std_msgs/msg/{'A' * 5000}").returncode == 2
+
+
+def test_a_working_folder_that_is_gone():
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"mkdir x && cd x && rmdir ../x && '{sys.executable}' -m idlc check"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
+    )
+    assert done.returncode == 2
+    assert "the working folder is gone" in done.stderr
+
+
 def complete(*words: str) -> list[str]:
     env = {
         **os.environ,

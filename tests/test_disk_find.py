@@ -165,10 +165,17 @@ def test_the_first_include_folder_wins_then_prefixes_then_the_catalogue(monkeypa
     make("ros/share/std_msgs/msg/Bool.msg")
     assert library().source(name).path == "ros/share/std_msgs/msg/Bool.msg"
     make("b/std_msgs/msg/Bool.msg")
+    Path("a").mkdir()
     assert library("a", "b").source(name).path == "b/std_msgs/msg/Bool.msg"
     make("a/std_msgs/msg/Bool.msg")
     assert library("a", "b").source(name).path == "a/std_msgs/msg/Bool.msg"
-    assert library("missing").source(TypeName.parse("std_msgs/msg/Nope")) is None
+    assert library("a").source(TypeName.parse("std_msgs/msg/Nope")) is None
+
+
+def test_an_include_folder_that_is_missing_is_reported():
+    report = Report()
+    Library(["missing"], report)
+    assert [found.code for found in report] == ["IDL602"]
 
 
 @pytest.mark.parametrize("name", ["../etc/msg/A", "std_msgs/msg/..", "a.b/msg/A", "-/msg/-"])

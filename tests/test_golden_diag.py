@@ -43,7 +43,7 @@ def test_every_code_has_a_case(code):
     assert any(f"[{code}]" in path.read_text(encoding="utf-8") for path in named)
 
 
-def parts(code: str, title: str) -> tuple[dict[str, str], str]:
+def parts(code: str, title: str) -> tuple[dict[str, str], list[str]]:
     """Return the files and the commands of a section of a code's page."""
     text = page(code)
     assert text is not None, f"idlc/text/explain/{code}.md is missing"
@@ -52,36 +52,43 @@ def parts(code: str, title: str) -> tuple[dict[str, str], str]:
     console = blocks.pop("console", "$ idlc check .\n")
     commands = [line[2:] for line in console.splitlines() if line.startswith("$ ")]
     assert blocks or commands
-    return blocks, "\n".join(commands)
+    return blocks, commands
 
 
-def tried(code: str, title: str, tmp_path: Path) -> str:
-    """Return what idlc says to the example of a page, pasted into a shell in an empty folder."""
-    files, commands = parts(code, title)
-    folder = tmp_path / "demo"
-    folder.mkdir()
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
-    idlc = f"idlc() {{ '{sys.executable}' -m idlc \"$@\"; }}\n"
-    done = subprocess.run(
-        ["/bin/sh", "-c", idlc + commands],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "AMENT_PREFIX_PATH": "", "PYTHONUTF8": "1"},
-    )
-    return done.stdout + done.stderr
+@pytest.fixture
+def tried(tmp_path, monkeypatch, capsys):
+    """Return what idlc says to the example of a page, as pasted into a shell in an empty folder."""
+
+    def run(code: str, title: str) -> str:
+        files, commands = parts(code, title)
+        folder = tmp_path / title / "demo"
+        for path, text in {".git/HEAD": "", **files}.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, encoding="utf-8")
+        monkeypatch.chdir(folder)
+        if all(re.fullmatch(r"idlc [\w ./-]+", line) for line in commands):
+            for line in commands:
+                main(line.split()[1:])
+            return "".join(capsys.readouterr())
+        idlc = f"idlc() {{ '{sys.executable}' -m idlc \"$@\"; }}"
+        done = subprocess.run(
+            ["/bin/sh", "-c", "\n".join((idlc, *commands))],
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, "PYTHONUTF8": "1"},
+        )
+        return done.stdout + done.stderr
+
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    return run
 
 
 @pytest.mark.parametrize("code", sorted(set(CODES) - NOT_ON_DEMAND))
-def test_every_page_shows_how_to_get_the_code_and_how_to_avoid_it(code, tmp_path):
-    (tmp_path / "bad").mkdir()
-    (tmp_path / "good").mkdir()
-    bad = tried(code, "Bad", tmp_path / "bad")
+def test_every_page_shows_how_to_get_the_code_and_how_to_avoid_it(code, tried):
+    bad = tried(code, "Bad")
     assert f"[{code}]" in bad, bad
-    good = tried(code, "Good", tmp_path / "good")
+    good = tried(code, "Good")
     assert f"[{code}]" not in good, good
     assert "error[" not in good, good
 

@@ -23,6 +23,11 @@ def run(words: list[str]) -> int:
         with contextlib.suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
+        Path.cwd()
+    except OSError:
+        sys.stderr.write("Error: the working folder is gone\n")
+        return 2
+    try:
         status = app.main(words, prog_name=_called_as(), standalone_mode=False)
         sys.stdout.flush()
     except click.ClickException as error:

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from idlc.disk.read import decode, read_bytes, shown
+from idlc.disk.read import decode, is_file, read_bytes, shown
 from idlc.text import codes
 from idlc.text.source import Source, Span
 from idlc.text.suggest import did_you_mean
@@ -45,7 +45,7 @@ def load(report: Report) -> Config:
     """Return the settings that hold in the working folder."""
     for folder in (here := Path.cwd(), *here.parents):
         path = folder / FILE
-        if path.is_file():
+        if is_file(path):
             return _read(path, report)
     return Config()
 

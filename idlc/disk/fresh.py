@@ -10,6 +10,7 @@ from pathlib import Path
 from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.lock import FILE, Lock, digest, meaning
+from idlc.disk.read import is_folder
 from idlc.disk.tree import Obstacle, Tree
 from idlc.model.ir import TypeName
 
@@ -75,5 +76,5 @@ def _idlc_is_newer(path: Path) -> bool:
 
 @lru_cache(maxsize=1)
 def _newest_maker() -> int:
-    found = (entry for folder in _MAKERS if folder.is_dir() for entry in os.scandir(folder))
+    found = (entry for folder in _MAKERS if is_folder(folder) for entry in os.scandir(folder))
     return max(entry.stat().st_mtime_ns for entry in found if entry.is_file())

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from idlc.disk import surroundings
 from idlc.disk.find import KIND_FOLDERS, KINDS, walk
 from idlc.disk.package import declared_name, manifest
-from idlc.disk.read import absolute, read_source, shown
+from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
 from idlc.model import catalog, ir
+from idlc.text import codes
 
 if TYPE_CHECKING:
     from idlc.text.diagnostics import Report
@@ -77,7 +78,7 @@ def _root(file: Path) -> Path:
 
 
 def _has_interfaces(root: Path) -> bool:
-    return any((root / kind).is_dir() for kind in KIND_FOLDERS)
+    return any(is_folder(root / kind) for kind in KIND_FOLDERS)
 
 
 class Library:
@@ -89,12 +90,15 @@ class Library:
 
     def __init__(
         self,
-        folders: Iterable[str],
+        folders: Sequence[str],
         report: Report,
         *,
         own: Mapping[str, Sequence[Path]] | None = None,
     ) -> None:
         places = [Folder(path) for path in folders]
+        for path in folders:
+            if not is_folder(Path(path)):
+                report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
         self._places: tuple[Folder | Prefix, ...] = (
             *places,
             *map(Prefix, surroundings.ament_prefixes()),
@@ -108,7 +112,7 @@ class Library:
         known = self._known.get(package)
         if known is None:
             found = (root for place in self._places for root in place.roots(package))
-            known = [*self._own.get(package, ()), *(root for root in found if root.is_dir())]
+            known = [*self._own.get(package, ()), *(root for root in found if is_folder(root))]
             self._known[package] = known
         return known
 
@@ -119,7 +123,7 @@ class Library:
         file = f"{name.name}.{name.kind}"
         for root in self._roots(name.package):
             for path in (root / name.kind / file, root / file):
-                if path.is_file():
+                if is_file(path):
                     return path
         return None
 
@@ -163,6 +167,6 @@ class Library:
 
 def _files(folder: Path) -> list[Path]:
     try:
-        return [path for path in folder.iterdir() if path.is_file()]
+        return [path for path in folder.iterdir() if is_file(path)]
     except OSError:
         return []

@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 
 import msgspec
 
-from idlc.disk.read import read_bytes
+from idlc.disk.read import is_file, read_bytes
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.visible import one_line
@@ -89,7 +89,7 @@ def encode(lock: Lock) -> bytes:
 def load(out: Path, name: str, report: Report) -> Lock | None:
     """Return the lock of a generated package, `None` if it has none; report IDL615."""
     path = out / FILE
-    if not path.is_file():
+    if not is_file(path):
         return None
     shown = f"{name}/{FILE}"
     data = read_bytes(path, shown, report)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
-from idlc.disk.read import read_bytes
+from idlc.disk.read import is_file, is_folder, read_bytes
 from idlc.text import codes
 from idlc.text.source import Source, Span
 
@@ -21,11 +21,16 @@ MANIFEST = "package.xml"
 def manifest(folder: Path) -> Path | None:
     """Return the nearest package.xml at or above an absolute folder, within its repository."""
     path = folder / MANIFEST
-    if path.is_file():
+    if is_file(path):
         return path
-    if folder.parent == folder or (folder / ".git").exists():
+    if folder.parent == folder or _is_repository(folder):
         return None
     return manifest(folder.parent)
+
+
+def _is_repository(folder: Path) -> bool:
+    """Whether a folder is the top of a git repository, of a submodule or a worktree too."""
+    return is_folder(folder / ".git") or is_file(folder / ".git")
 
 
 def declared_name(path: Path, name: str, report: Report) -> str | None:

@@ -37,6 +37,16 @@ def absolute(path: str | Path) -> Path:
     return Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
 
 
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a regular file; a path that cannot be looked at does not."""
+    return os.path.isfile(path)  # noqa: PTH113 - Path.is_file() raises
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path leads to a folder; a path that cannot be looked at does not."""
+    return os.path.isdir(path)  # noqa: PTH112 - Path.is_dir() raises
+
+
 def shown(path: Path) -> str:
     """Return a path as a person knows it: relative to the working folder where that is below."""
     try:

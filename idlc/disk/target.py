@@ -11,7 +11,7 @@ from idlc.disk import fresh, surroundings, write
 from idlc.disk.library import Library
 from idlc.disk.lock import FILE, Lock, digest, encode, load
 from idlc.disk.plan import Change, Plan, plan
-from idlc.disk.read import absolute
+from idlc.disk.read import absolute, is_file, is_folder
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 
@@ -39,7 +39,7 @@ class Target:
     def usable(self) -> bool:
         """Whether this is or can become a folder; reports IDL612."""
         for path in (self._path, *self._path.parents):
-            if path.is_dir():
+            if is_folder(path):
                 return True
             if os.path.lexists(path):
                 message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
@@ -63,7 +63,7 @@ class Target:
     def _finds(self, package: str, kind: str) -> bool:
         """Whether a package can be imported, found without importing, or lies next to this one."""
         places = [*surroundings.python_folders(package), self._path.parent / package]
-        return any((place / kind / "__init__.py").is_file() for place in places)
+        return any(is_file(place / kind / "__init__.py") for place in places)
 
     def plan(self, files: Mapping[str, str], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.

@@ -18,7 +18,7 @@ import msgspec
 
 from idlc.disk import lock
 from idlc.disk.plan import Change, Plan, emptied
-from idlc.disk.read import reason
+from idlc.disk.read import is_file, is_folder, reason
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 
@@ -67,9 +67,10 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
     """
     lock_path = plan.out / lock.FILE
     try:
-        old_lock = lock_path.read_bytes() if lock_path.is_file() else None
+        old_lock = lock_path.read_bytes() if is_file(lock_path) else None
         if not plan.changes and old_lock == new_lock:
-            os.utime(lock_path)
+            with contextlib.suppress(OSError):  # a package that cannot be written may be right
+                os.utime(lock_path)
             _sweep(plan.out)
             return True
         transaction = _Transaction(plan.out)
@@ -123,7 +124,7 @@ class _Transaction:
 
     def _make_folder(self, folder: Path) -> None:
         missing = []
-        while not folder.is_dir():
+        while not is_folder(folder):
             missing.append(folder)
             folder = folder.parent
         for path in reversed(missing):

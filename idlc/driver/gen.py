@@ -123,8 +123,13 @@ def _package(
     vendored: Sequence[Package | None] | None = None,
 ) -> Package | None:
     """Return a sound model rendered and compared with what is on disk."""
+    from idlc.emit.limits import oversized
     from idlc.emit.render import render_package
 
+    refused = list(oversized(model))
+    if refused:
+        target.report.extend(refused)
+        return None
     with stage("render", model.package):
         files = {file.path: file.text for file in render_package(model)}
     plan = target.plan(files, check=options.check)

@@ -70,5 +70,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
         files.append(RenderedFile(page.path, text))
     data = json.dumps(types_json.content(model), ensure_ascii=True, separators=(",", ":"))
     files.append(RenderedFile("_idlc/types.json", data + "\n"))
+    # a package without it would lose to any other of its name, wherever that stands on the path
+    files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
     files.append(RenderedFile("py.typed", ""))
     return tuple(sorted((*files, *runtime_files()), key=lambda file: file.path))

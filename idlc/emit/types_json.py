@@ -9,7 +9,11 @@ from idlc.model.describe import IndividualDict
 
 
 class TypesDict(TypedDict):
-    """Descriptions and hashes by full name, and the files' text by interface name."""
+    """Descriptions and hashes by full name, and the package's own files by interface name.
+
+    Other packages' files are left out: their text differs between an installation and the
+    catalogue, and the same input must give the same output.
+    """
 
     package: str
     descriptions: dict[str, IndividualDict]
@@ -29,7 +33,7 @@ def content(model: link.Model) -> TypesDict:
                 descriptions[one["type_name"]] = one
     sources = {
         str(interface.name): interface.source.text
-        for interface in model.interfaces.values()
+        for interface in model.own
         if interface.source is not None
     }
     return {

@@ -113,6 +113,7 @@ BAD_LOCK = Code("IDL615", "bad-lock", ERROR)
 DRIFT = Code("IDL616", "drift", ERROR)
 NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
 NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
+STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -131,6 +132,7 @@ USAGE: frozenset[str] = frozenset(
         CANNOT_WRITE,
         BAD_LOCK,
         NO_SUCH_TYPE,
+        STRUCTURE_TOO_LARGE,
     )
 )
 

@@ -52,8 +52,6 @@ def generate(package: str, out: Path) -> None:
         [str(word) for word in command], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    # without it, rosidl's package of the same name would win, wherever it stands on the path
-    (out / package / "__init__.py").touch()
 
 
 @pytest.fixture

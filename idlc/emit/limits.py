@@ -1,0 +1,68 @@
+"""How large a structure may be for its codec to be written out.
+
+A codec has its nested structures inlined, so twenty messages of two fields each can ask for a
+million lines. ROS 2 accepts such types; nobody can use them. They are refused before any work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from idlc.model import derive, ir
+from idlc.model.link import Model
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic
+
+MAX_FIELDS = 20_000
+MAX_DEPTH = 100
+
+
+class _Extent(NamedTuple):
+    """The fields of a structure with all that it holds, and how deep they nest."""
+
+    fields: int
+    depth: int
+
+
+def oversized(model: Model) -> Iterator[Diagnostic]:
+    """Yield a problem for each of the model's own interfaces that is over a limit."""
+    extents = _extents(model)
+    for interface in model.own:
+        worst = [extents[message.name] for message in derive.messages(interface)]
+        fields, depth = max(e.fields for e in worst), max(e.depth for e in worst)
+        path = interface.source.path if interface.source else str(interface.name)
+        if fields > MAX_FIELDS:
+            message = f"`{interface.name}` has {fields:,} fields, nested ones included"
+            hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
+        elif depth > MAX_DEPTH:
+            message = f"`{interface.name}` nests messages {depth} deep"
+            hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
+        else:
+            continue
+        yield codes.STRUCTURE_TOO_LARGE.of(path, message, hint=hint)
+
+
+def _extents(model: Model) -> dict[ir.TypeName, _Extent]:
+    """Measure every structure after those that it holds; with a stack, so depth is no limit."""
+    found: dict[ir.TypeName, _Extent] = {}
+    for root in model.messages:
+        waiting = [root]
+        while waiting:
+            held = _held(model.messages[waiting[-1]])
+            missing = [name for name in held if name not in found]
+            if missing:
+                waiting += missing
+                continue
+            name = waiting.pop()
+            parts = [found[one] for one in held]
+            found[name] = _Extent(
+                len(model.messages[name].wire_fields) + sum(part.fields for part in parts),
+                1 + max((part.depth for part in parts), default=0),
+            )
+    return found
+
+
+def _held(message: ir.Message) -> list[ir.TypeName]:
+    elements = (ir.element_of(field.type) for field in message.fields)
+    return [element.target for element in elements if isinstance(element, ir.Ref)]
