@@ -28,7 +28,7 @@ help: ## show this list
 	@echo 'make TARGET, where TARGET is'
 	@sed -n 's/^\([a-z-]*\):.*## /  \1 \t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 14
 
-demo: $(DEMO_ENV)/installed ## compile the example and send its messages through the real rclpy
+demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with it in the real rclpy
 	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
 	@$(DEMO_ENV)/bin/idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller
 	@$(DEMO_ENV)/bin/idlc gen $(DEMO_ENV)/share/std_msgs --package std_msgs_by_idlc -o $(DEMO_OUT)/std_msgs_by_idlc

@@ -4,9 +4,14 @@ Needs the compiled packages on the path (the Makefile sees to it) and, from the 
 the real ROS 2 client library from the wheels.
 """
 
+from __future__ import annotations
+
 import inspect
 import os
 import sys
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 # The messages of this demo stay on this machine and meet no other run.
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -18,6 +23,9 @@ from my_robot_controller.srv import AddTwoInts
 from rich.console import Console
 from rich.panel import Panel
 from rich.text import Text
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 console = Console(highlight=False, width=min(100, Console().width))
 
@@ -55,16 +63,70 @@ def the_wire_without_ros() -> None:
     show("'rclpy' in sys.modules", "rclpy" in sys.modules)
 
 
-def the_real_rclpy() -> None:
-    """Send a message of idlc's through a real publisher to a real subscription, and back."""
-    stop("3  The real rclpy agrees")
-    import rclpy
-    from rclpy.node import Node
+def publish_and_subscribe(node: Node) -> None:
+    stop("3  The real rclpy publishes and receives it: no CMake, no compiler, no colcon")
+    received: list[RobotCommand] = []
+    node.create_subscription(RobotCommand, "command", received.append, 10)
+    publisher = node.create_publisher(RobotCommand, "command", 10)
+    sent = RobotCommand(command_type=RobotCommand.TURN, angular_velocity_z=1.5)
+    publisher.publish(sent)
+    wait_until(node, lambda: bool(received))
+    show("publisher.publish(command)  # and what the subscription received", received[0])
+    assert received == [sent]
+
+
+def call_a_service(node: Node) -> None:
+    stop("4  Services")
+
+    def add(request: AddTwoInts.Request, response: AddTwoInts.Response) -> AddTwoInts.Response:
+        response.sum = request.a + request.b
+        return response
+
+    node.create_service(AddTwoInts, "add_two_ints", add)
+    client = node.create_client(AddTwoInts, "add_two_ints")
+    client.wait_for_service()
+    answer = client.call_async(AddTwoInts.Request(a=40, b=2))
+    wait_until(node, answer.done)
+    show("client.call_async(AddTwoInts.Request(a=40, b=2))", answer.result())
+    assert answer.result() == AddTwoInts.Response(sum=42)
+
+
+def run_an_action(node: Node) -> None:
+    stop("5  Actions, with feedback")
+    from rclpy.action import ActionClient, ActionServer
+    from rclpy.action.server import ServerGoalHandle
+
+    def count_down(goal: ServerGoalHandle) -> Countdown.Result:
+        for count in range(goal.request.target_count, 0, -1):
+            goal.publish_feedback(Countdown.Feedback(current_count=count))
+        goal.succeed()
+        return Countdown.Result(final_count=0, success=True)
+
+    counts: list[int] = []
+    server = ActionServer(node, Countdown, "countdown", count_down)
+    client = ActionClient(node, Countdown, "countdown")
+    client.wait_for_server()
+    sending = client.send_goal_async(
+        Countdown.Goal(target_count=3),
+        feedback_callback=lambda message: counts.append(message.feedback.current_count),
+    )
+    wait_until(node, sending.done)
+    getting = sending.result().get_result_async()
+    wait_until(node, lambda: getting.done() and len(counts) == 3)
+    show("client.send_goal_async(Countdown.Goal(target_count=3))  # feedback", counts)
+    show("# result", getting.result().result)
+    assert counts == [3, 2, 1]
+    assert getting.result().result == Countdown.Result(final_count=0, success=True)
+    client.destroy()
+    server.destroy()
+
+
+def meet_rosidl(node: Node) -> None:
+    """Send a message of idlc's class to a subscription of rosidl's class, and back."""
+    stop("6  Nodes that use rosidl's own classes understand it, and are understood")
     from std_msgs.msg import ColorRGBA as OfficialColor
     from std_msgs_by_idlc.msg import ColorRGBA
 
-    rclpy.init()
-    node = Node("demo")
     received: list[object] = []
     node.create_subscription(OfficialColor, "colour", received.append, 10)
     node.create_subscription(OfficialColor, "colour", received.append, 10, raw=True)
@@ -72,26 +134,41 @@ def the_real_rclpy() -> None:
 
     sent = ColorRGBA(r=1.0, g=0.5, b=0.25, a=1.0)
     publisher.publish(sent.serialize())
-    while len(received) < 2:
-        rclpy.spin_once(node, timeout_sec=10)
+    wait_until(node, lambda: len(received) == 2)
     raw = next(message for message in received if isinstance(message, bytes))
     official = next(message for message in received if not isinstance(message, bytes))
+    show("sent, of a class that idlc compiled from std_msgs", sent)
+    show("received, as rosidl's class", official)
+    show("received, as bytes, and read by idlc's class", ColorRGBA.deserialize(raw))
+    assert ColorRGBA.deserialize(raw) == sent
+    assert all(getattr(official, name) == getattr(sent, name) for name in "rgba")
+
+
+def wait_until(node: Node, happened: Callable[[], bool]) -> None:
+    """Let the node work until something has happened, for at most ten seconds."""
+    import rclpy
+
+    end = time.monotonic() + 10
+    while not happened():
+        if time.monotonic() > end:
+            raise TimeoutError("nothing arrived for ten seconds")
+        rclpy.spin_once(node, timeout_sec=0.1)
+
+
+def with_rclpy(*stops: Callable[[Node], None]) -> None:
+    """Run stops of the tour with a node of the real rclpy."""
+    import rclpy
+
+    rclpy.init()
+    node = rclpy.create_node("demo")
+    for part in stops:
+        part(node)
     node.destroy_node()
     rclpy.shutdown()
 
-    show("publisher.publish(sent.serialize())  # idlc's class, rclpy's publisher", sent)
-    show("# what rclpy's subscription received, as rosidl's class", official)
-    show("# the raw bytes received, read by idlc's class", ColorRGBA.deserialize(raw))
-    assert ColorRGBA.deserialize(raw) == sent
-    for name in ("r", "g", "b", "a"):
-        assert getattr(official, name) == getattr(sent, name)
-
-
-#: The stops of the tour, in order.
-TOUR = (a_class_with_documentation, the_wire_without_ros, the_real_rclpy)
-
 
 if __name__ == "__main__":
-    for part in TOUR:
-        part()
+    a_class_with_documentation()
+    the_wire_without_ros()
+    with_rclpy(publish_and_subscribe, call_a_service, run_an_action, meet_rosidl)
     console.print("\n[green]All of it agreed.[/] Look into build/demo to see what was written.")

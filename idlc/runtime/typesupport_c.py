@@ -80,7 +80,11 @@ class Description(ctypes.Structure):
 class Source(ctypes.Structure):
     """`rosidl_runtime_c__type_description__TypeSource`."""
 
-    _fields_ = (("type_name", String), ("encoding", String), ("raw_file_contents", String))
+    _fields_ = (
+        ("type_name", String),
+        ("encoding", String),
+        ("raw_file_contents", String),
+    )
 
 
 class TypeHash(ctypes.Structure):
@@ -92,13 +96,22 @@ class TypeHash(ctypes.Structure):
 class About(ctypes.Structure):
     """The three functions by which rcl asks for hash, description and sources: never NULL."""
 
-    _fields_ = (("type_hash", c_void_p), ("description", c_void_p), ("sources", c_void_p))
+    _fields_ = (
+        ("type_hash", c_void_p),
+        ("description", c_void_p),
+        ("sources", c_void_p),
+    )
 
 
 class MessageTypeSupport(ctypes.Structure):
     """`rosidl_message_type_support_t`."""
 
-    _fields_ = (("identifier", c_void_p), ("data", c_void_p), ("func", c_void_p), ("about", About))
+    _fields_ = (
+        ("identifier", c_void_p),
+        ("data", c_void_p),
+        ("func", c_void_p),
+        ("about", About),
+    )
 
 
 class ServiceTypeSupport(ctypes.Structure):

@@ -34,7 +34,8 @@ class Extension(NamedTuple):
     def message(self) -> dict[str, object]:
         """Return the five capsules of a message by the metaclass's attributes."""
         return {
-            attribute: self._capsule(prefix) for attribute, prefix in _MESSAGE_CAPSULES.items()
+            attribute: self._capsule(prefix)
+            for attribute, prefix in _MESSAGE_CAPSULES.items()
         }
 
     def service(self) -> object:

@@ -47,7 +47,9 @@ def _load() -> ctypes.CDLL:
             return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)
         except OSError:
             continue
-    raise ImportError(f"the middleware has not loaded {' or '.join(_LIBRARIES)}. {_ADVICE}")
+    raise ImportError(
+        f"the middleware has not loaded {' or '.join(_LIBRARIES)}. {_ADVICE}"
+    )
 
 
 def _words(cdr: int) -> list[int]:
@@ -72,7 +74,9 @@ def fast_cdr() -> FastCdr:
     try:
         new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
         new_cdr = method(_NEW_CDR, None, c_void_p, c_void_p, c_int, c_int)
-        append = method(f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t)
+        append = method(
+            f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t
+        )
         position_of = method(f"{_CDR}20get_current_positionEv", c_void_p, c_void_p)
         begin_of = method(f"{_CDR}18get_buffer_pointerEv", c_void_p, c_void_p)
     except AttributeError as error:
@@ -90,8 +94,14 @@ def fast_cdr() -> FastCdr:
         position = position_of(here)
         indices.add(_find(_words(here), begin, (position, begin, begin + size)))
     index = indices.pop()
-    known = begin_of(here) == begin and position == begin + 5 and data.value == b"\1\2\3\4\5"
+    known = (
+        begin_of(here) == begin
+        and position == begin + 5
+        and data.value == b"\1\2\3\4\5"
+    )
     if indices or index is None or not known:
         raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    append_bytes = method(f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t)
+    append_bytes = method(
+        f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t
+    )
     return FastCdr(index + 1, index + 5, append_bytes)

@@ -217,5 +217,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:  # noqa: ANN401
 def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
     """Return identifier and data of a service's type support; handles of its messages given."""
     package, kind, short = name.split("/")
-    callbacks = _ServiceCallbacks(f"{package}::{kind}".encode(), short.encode(), request, response)
+    callbacks = _ServiceCallbacks(
+        f"{package}::{kind}".encode(), short.encode(), request, response
+    )
     return _identifier(), c.pointer(callbacks)

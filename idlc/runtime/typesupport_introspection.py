@@ -129,7 +129,11 @@ def structure(name: str) -> type[ctypes.Structure]:
 
 def element_type(field: Field) -> Any:  # noqa: ANN401 (any ctypes type)
     """Return the C type of one element of a field."""
-    return structure(field.nested_type_name) if field.base == NESTED else _ELEMENTS[field.base][1]
+    return (
+        structure(field.nested_type_name)
+        if field.base == NESTED
+        else _ELEMENTS[field.base][1]
+    )
 
 
 def _c_type(field: Field) -> Any:  # noqa: ANN401
@@ -163,7 +167,9 @@ def _member(field: Field, offset: int) -> Member:
         offset=offset,
     )
     if field.base == NESTED and field.shape != SCALAR:
-        member.get_function = member.get_const_function = _get(field.shape == ARRAY, size)
+        member.get_function = member.get_const_function = _get(
+            field.shape == ARRAY, size
+        )
         if field.shape != ARRAY:
             member.resize_function = _resize(field.nested_type_name, size)
     return member
@@ -200,7 +206,9 @@ def _resize(name: str, size: int) -> int:
         try:
             many.free(transcode.area(field, ctypes.sizeof(c.Sequence)), 0)
             if count:
-                ctypes.memset(transcode.allocate(field, count, size).address, 0, count * size)
+                ctypes.memset(
+                    transcode.allocate(field, count, size).address, 0, count * size
+                )
             return True
         except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
             failure = error

@@ -6,7 +6,16 @@ Both are made of the type support of their messages, so nothing here depends on 
 from __future__ import annotations
 
 import ctypes
-from ctypes import PYFUNCTYPE, c_bool, c_int32, c_int64, c_uint8, c_uint32, c_void_p, py_object
+from ctypes import (
+    PYFUNCTYPE,
+    c_bool,
+    c_int32,
+    c_int64,
+    c_uint8,
+    c_uint32,
+    c_void_p,
+    py_object,
+)
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -93,7 +102,9 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
     )
 
 
-def service(name: str, request: int, response: int, event: Event, road: ModuleType) -> int:
+def service(
+    name: str, request: int, response: int, event: Event, road: ModuleType
+) -> int:
     """Return the address of a service's type support, made of its messages' handles."""
     identifier, data = road.service(name, request, response, event.handle)
     return c.pointer(

@@ -74,7 +74,8 @@ def service(name: str, *handles: int) -> tuple[int, int]:
     """Return identifier and data of a service's type support; handles of its messages given."""
     package, kind, short = name.split("/")
     members = [
-        c.MessageTypeSupport.from_address(handle).data if handle else None for handle in handles
+        c.MessageTypeSupport.from_address(handle).data if handle else None
+        for handle in handles
     ]
     data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
     return introspection.library().identifier, c.pointer(data)

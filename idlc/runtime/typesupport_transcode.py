@@ -81,8 +81,12 @@ def _runtime() -> _Runtime:
     return _Runtime(
         assign(("rosidl_runtime_c__String__assignn", library)),
         assign_wide(("rosidl_runtime_c__U16String__assignn", library)),
-        PYFUNCTYPE(c_bool, c_void_p, c_size_t)(("rosidl_runtime_c__uint8__Sequence__init", library)),
-        PYFUNCTYPE(None, c_void_p)(("rosidl_runtime_c__uint8__Sequence__fini", library)),
+        PYFUNCTYPE(c_bool, c_void_p, c_size_t)(
+            ("rosidl_runtime_c__uint8__Sequence__init", library)
+        ),
+        PYFUNCTYPE(None, c_void_p)(
+            ("rosidl_runtime_c__uint8__Sequence__fini", library)
+        ),
     )
 
 
@@ -144,7 +148,9 @@ class WideText(Text):
         units = array("H", cursor.take(4 * count, 1).cast("I"))
         units.append(0)  # never without an address
         start = units.buffer_info()[0]
-        _demand(_runtime().assign_wide(memory.address + base + self.offset, start, count))
+        _demand(
+            _runtime().assign_wide(memory.address + base + self.offset, start, count)
+        )
 
     def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
         data, size, _ = _TRIPLE.unpack_from(memory.view, base + self.offset)
