@@ -18,7 +18,11 @@ from idlc.emit.pretty import Group, Node, call
 from idlc.emit.tables import Tables
 from idlc.model import ir
 
+#: Up to this size slices of bytes are faster than slices of a memoryview.
+SMALL = 4096
+
 TOO_SHORT = (Line('raise ValueError("too short")'),)
+UNENDED = (Line('raise ValueError("text without end")'),)
 TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
@@ -44,9 +48,9 @@ def decode(
     decoder.flush(last=True)
     first = []
     if decoder.source == "view":
-        first.append(Line("memoryview(data)", "view"))
+        first.append(Line(f"data if limit < {SMALL} else memoryview(data)", "view"))
     if decoder.limited:
-        first.append(Line("len(data)", "limit"))
+        first.insert(0, Line("len(data)", "limit"))
     return (*first, *decoder.body, Line("return message"))
 
 
@@ -200,13 +204,14 @@ class _Decoder:
     def text(self) -> Node:
         """Read the size of a string; return the expression that reads the string.
 
-        The index of the last byte, which should be zero, checks the bounds.
+        The last byte must be zero; to look at it is to check the bounds.
         """
         self.number("size")
         start = self.start()
         self.line(f"{self.here.text(-1)} + size", "end")
+        self.body.append(Block("if data[end]:", UNENDED))
         self.here = Cursor("end", 1, 1, 0)
-        return call("text", f"data[{start} : end + (data[end] > 0)]")
+        return call("text", f"data{slice_of(start)}")
 
     def wide_text(self) -> Node:
         """Read the size of a wstring; return the expression that reads the wstring."""
@@ -225,9 +230,7 @@ class _Decoder:
         self.short_if("end > limit")
         modulus = min(self.here.modulus, size & -size)
         self.here = self.here.at("end").known(modulus, self.here.residue)
-        if start.isidentifier() or start.isdigit():
-            return f"{source}[{start}:end]"
-        return f"{source}[{start} : end]"
+        return f"{source}{slice_of(start)}"
 
     def short_if(self, condition: str) -> None:
         """Emit a check that the buffer is long enough."""
@@ -334,3 +337,10 @@ class _Decoder:
         self.settle(first)
         self.body.append(loop)
         self.here = first
+
+
+def slice_of(start: str) -> str:
+    """Return the slice from an expression to `end`."""
+    if start.isidentifier() or start.isdigit():
+        return f"[{start}:end]"
+    return f"[{start} : end]"

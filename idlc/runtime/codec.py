@@ -18,9 +18,8 @@ ORDERS = {"little": "<", "big": ">"}
 #: What turns bytes into a str.
 Text = Callable[[Any], str]
 
-#: Reads invalid UTF-8 as U+FFFD, as rosidl does, and takes a memoryview, too. Slower than
-#: `bytes.decode`, so the codecs use it only where that failed or cannot be.
-lenient_text: Text = partial(str, encoding="utf-8", errors="replace")
+#: Takes a memoryview, too. Slower than `bytes.decode`.
+text_of_view: Text = partial(str, encoding="utf-8")
 
 #: What decoding raises when a buffer is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
@@ -50,7 +49,7 @@ class Codecs(Protocol):
 Make = Callable[[str, Text], Codec]
 
 
-def codec_for(kind: type[Message]) -> Callable[[Make], Make]:
+def codec_for(kind: Any) -> Callable[[Make], Make]:
     """Return a decorator that gives a message class the function that makes its codecs."""
 
     def give(make: Make) -> Make:
@@ -98,20 +97,19 @@ def install(kind: type[Message]) -> None:
         except Exception as error:
             raise encode_error(self, byteorder, error) from error
 
-    def deserialize(cls: Any, buffer: Any) -> Any:
+    def deserialize(buffer: Any) -> Any:
         try:
             if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                message = decode(buffer)
-            else:
-                message = read(codecs, buffer)
+                return decode(buffer)
+            return read(codecs, buffer)
         except FAILURES as error:
-            message = recover(owner, buffer, error)
-        return message if cls is owner else as_subclass(cls, message)
+            failure = error
+        return recover(owner, buffer, failure)
 
     serialize.__doc__ = owner.serialize.__doc__
     deserialize.__doc__ = owner.deserialize.__doc__
     owner.serialize = serialize
-    owner.deserialize = classmethod(deserialize)
+    owner.deserialize = staticmethod(deserialize)
 
 
 def read(codecs: Codecs, buffer: Any) -> Any:
@@ -119,15 +117,17 @@ def read(codecs: Codecs, buffer: Any) -> Any:
     if type(buffer) is not bytes:
         buffer = memoryview(buffer).cast("B")
         if codecs(NATIVE).bulk:
-            return codecs(order_of(buffer), lenient_text).decode(buffer)
+            return codecs(order_of(buffer), text_of_view).decode(buffer)
         buffer = bytes(buffer)
     return codecs(order_of(buffer)).decode(buffer)
 
 
-def as_subclass(kind: Any, message: Any) -> Any:
-    """Return a message of a user's subclass with the fields of `message`."""
+def read_as_subclass(kind: Any, buffer: Any) -> Any:
+    """Return a message of a user's subclass."""
+    owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    message = owner.deserialize(buffer)
     result = kind.__new__(kind)
-    for slot in type(message).__slots__:
+    for slot in owner.__slots__:
         setattr(result, slot, getattr(message, slot))
     return result
 
@@ -146,20 +146,14 @@ def order_of(data: Any) -> str:
     )
 
 
-def recover(kind: Any, buffer: Any, error: Exception) -> Any:
-    """Return the message if only its UTF-8 is invalid; raise DecodeError otherwise."""
-    if isinstance(error, DecodeError):
-        raise error
-    data = bytes(buffer)
-    order = order_of(data)
-    if isinstance(error, UnicodeDecodeError):
-        try:
-            return kind._codec_(order, lenient_text).decode(data)
-        except FAILURES:
-            pass
-    from .explain import explain
+def recover(kind: type, buffer: Any, failure: Exception) -> Any:
+    """Return the message after all, if a middleware would; raise DecodeError otherwise."""
+    if isinstance(failure, DecodeError):
+        raise failure
+    from .careful import read_carefully
 
-    raise explain(kind, data, order) from None
+    data = bytes(buffer)
+    return read_carefully(kind, data, order_of(data))
 
 
 def encode_error(message: Message, byteorder: str, error: Exception) -> Exception:

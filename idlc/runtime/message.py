@@ -86,6 +86,9 @@ class MessageMeta(InterfaceMeta):
         """Return a message class, or a user's subclass of one."""
         fields = namespace.get("_fields_and_field_types")
         if fields is None:
+            if bases:
+                read = classmethod(codec.read_as_subclass)
+                namespace.setdefault("deserialize", read)
             return super().__new__(cls, name, bases, namespace)
         metaclass: Any = type(
             f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}

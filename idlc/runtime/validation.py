@@ -111,11 +111,7 @@ def _float(value: Any, primitive: Primitive, path: str) -> None:
         number = None
     if number is None:
         raise ValidationError(path, f"a number ({primitive.name})", value)
-    if (
-        primitive.high is None
-        or number != number
-        or number in (float("inf"), float("-inf"))
-    ):
+    if primitive.high is None or not math.isfinite(number):
         return
     if abs(number) > primitive.high:
         allowed = (
