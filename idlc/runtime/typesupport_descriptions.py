@@ -78,13 +78,18 @@ def load() -> Types:
 @cache
 def references(name: str) -> frozenset[str]:
     """Return all types that `name` refers to, directly or not, itself excluded."""
-    direct = {field.nested_type_name for field in load().types[name] if field.nested_type_name}
+    direct = {
+        field.nested_type_name for field in load().types[name] if field.nested_type_name
+    }
     return frozenset(direct.union(*map(references, direct)))
 
 
 def _field(field: Field) -> c.Field:
     kind = c.FieldType(
-        field.type_id, field.capacity, field.string_capacity, c.string(field.nested_type_name)
+        field.type_id,
+        field.capacity,
+        field.string_capacity,
+        c.string(field.nested_type_name),
     )
     return c.Field(c.string(field.name), kind, c.string(field.default_value))
 

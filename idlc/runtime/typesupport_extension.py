@@ -34,7 +34,8 @@ class Extension(NamedTuple):
     def message(self) -> dict[str, object]:
         """Return the five capsules of a message by the metaclass's attributes."""
         return {
-            attribute: self._capsule(prefix) for attribute, prefix in _MESSAGE_CAPSULES.items()
+            attribute: self._capsule(prefix)
+            for attribute, prefix in _MESSAGE_CAPSULES.items()
         }
 
     def service(self) -> object:
@@ -63,7 +64,7 @@ def _import(package: str) -> ModuleType | None:
         return None
 
 
-def _type_hash(support: object, structure: Any) -> str:  # noqa: ANN401
+def _type_hash(support: object, structure: Any) -> str:
     """Return the hash that a capsule's type support tells; its structure's type given."""
     pointer = c.capsule_pointer(support)
     ask = structure.from_address(pointer).about.type_hash
