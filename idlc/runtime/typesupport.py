@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ctypes import PYFUNCTYPE, py_object
 from functools import cache
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -26,13 +27,13 @@ _UNSUPPORTED = ("rmw_connextdds", "rmw_connextddsmicro")
 def _road() -> ModuleType:
     """Return the module that fits the middleware of this process."""
     try:
-        from rclpy.utilities import get_rmw_implementation_identifier
+        utilities = import_module("rclpy.utilities")
     except ImportError as error:
         raise ImportError(
             "type support needs rclpy: install it (for example `pip install ros-jazzy-rclpy "
             "ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 installation first"
         ) from error
-    middleware = get_rmw_implementation_identifier()
+    middleware = utilities.get_rmw_implementation_identifier()
     if middleware in _UNSUPPORTED:
         raise ImportError(
             f"idlc's type support does not know {middleware}: set RMW_IMPLEMENTATION to "
@@ -45,13 +46,13 @@ def _road() -> ModuleType:
     return road
 
 
-def _name(cls: Any) -> str:  # noqa: ANN401
+def _name(cls: Any) -> str:
     """Return the full name of a class as ROS 2 writes it."""
     kind = cls.__module__.split(".")[-2]
     return f"{load().package}/{kind}/{cls.__name__}"
 
 
-def _handle(cls: Any) -> int:  # noqa: ANN401
+def _handle(cls: Any) -> int:
     """Return the address of any class's type support, whoever made the class."""
     meta = type(cls)
     if meta._TYPE_SUPPORT is None:
@@ -67,7 +68,7 @@ def _capsules() -> tuple[object, object, object]:
     return c.capsule(destroy), c.capsule(convert_from_py), c.capsule(convert_to_py)
 
 
-def import_message(cls: Any) -> None:  # noqa: ANN401
+def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
     meta = type(cls)
     built = extension(cls, _name(cls))
@@ -83,11 +84,11 @@ def import_message(cls: Any) -> None:  # noqa: ANN401
 
 
 @cache
-def _message(cls: Any) -> c.MessageSupport:  # noqa: ANN401
+def _message(cls: Any) -> c.MessageSupport:
     return _road().message(cls, _name(cls))  # type: ignore[no-any-return]
 
 
-def import_service(cls: Any) -> None:  # noqa: ANN401
+def import_service(cls: Any) -> None:
     """Give `type(cls)` the capsule that rclpy reads from a service class."""
     built = extension(cls, _name(cls))
     if built:
@@ -100,7 +101,7 @@ def import_service(cls: Any) -> None:  # noqa: ANN401
     type(cls)._TYPE_SUPPORT = c.capsule(support)
 
 
-def import_action(cls: Any) -> None:  # noqa: ANN401
+def import_action(cls: Any) -> None:
     """Give `type(cls)` the capsule that rclpy reads from an action class."""
     built = extension(cls, _name(cls))
     if built:

@@ -14,9 +14,10 @@ import itertools
 import logging
 import opcode
 import operator
+import struct
 import sys
-from ctypes import c_char_p, c_int, c_size_t, c_uint8, c_uint64, c_void_p, py_object
 from collections.abc import Callable
+from ctypes import c_char_p, c_size_t, c_uint8, c_uint64, c_void_p, py_object
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
@@ -160,7 +161,7 @@ def pointer(value: ctypes.Structure) -> int:
     return ctypes.addressof(keep(value))
 
 
-def address(function: Any) -> int:  # noqa: ANN401 (ctypes has no type for "any function pointer")
+def address(function: Any) -> int:
     """Return where the code of a foreign function or callback is; the callback is kept."""
     return ctypes.cast(keep(function), c_void_p).value or 0
 
@@ -187,15 +188,10 @@ _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
 _capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
-READ, WRITE = 0x100, 0x200
-#: (address, size, READ or WRITE) -> memoryview.
-view_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t, c_int)(
-    ("PyMemoryView_FromMemory", ctypes.pythonapi)
-)
-#: (address, size) -> bytes.
-copy_memory = ctypes.PYFUNCTYPE(py_object, c_void_p, ctypes.c_ssize_t)(
-    ("PyBytes_FromStringAndSize", ctypes.pythonapi)
-)
+#: All memory of the process, by address, as bytes and as words: `MEMORY[start:stop]`,
+#: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C.
+MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")
+WORDS = MEMORY.cast("Q")
 #: Where the content of a `bytes` object begins, from its `id`; a terminating zero follows it.
 BYTES_OFFSET = bytes.__basicsize__ - 1
 
@@ -223,7 +219,7 @@ def _c_true() -> object:
     room = keep(ctypes.create_string_buffer(0x200))
     start = (ctypes.addressof(room) | 0xFF) + 2
     immortal = 0xFFFF_FFFF if sys.version_info >= (3, 12) else 1 << 60
-    (ctypes.c_size_t * 2).from_address(start)[:] = (immortal, id(object))
+    MEMORY[start : start + 16] = struct.pack("QQ", immortal, id(object))
     return ctypes.cast(start, py_object).value
 
 
@@ -243,7 +239,7 @@ class MessageSupport(NamedTuple):
     memory: Callable[[], object]
 
 
-def callback(prototype: Any, function: FunctionType) -> int:  # noqa: ANN401
+def callback(prototype: Any, function: Callable[..., object]) -> int:
     """Return the C function that calls `function`, which must catch every exception.
 
     Signal handlers run on entry of a Python function, before its first `try`, and what they
@@ -251,6 +247,7 @@ def callback(prototype: Any, function: FunctionType) -> int:  # noqa: ANN401
     function resumes inside a `yield from`, so the function is told that it does. (Python 3.10
     has no such instruction; it does not look before a leading `try` either.)
     """
+    assert isinstance(function, FunctionType)
     code = function.__code__
     raw = bytearray(code.co_code)
     resume = opcode.opmap.get("RESUME")

@@ -64,7 +64,7 @@ def _import(package: str) -> ModuleType | None:
         return None
 
 
-def _type_hash(support: object, structure: Any) -> str:  # noqa: ANN401
+def _type_hash(support: object, structure: Any) -> str:
     """Return the hash that a capsule's type support tells; its structure's type given."""
     pointer = c.capsule_pointer(support)
     ask = structure.from_address(pointer).about.type_hash

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_char_p, c_int, c_size_t, c_void_p
 from functools import cache
 from typing import Any, NamedTuple
+
+from . import typesupport_c as c
 
 _LIBRARIES = ("libfastcdr.so.2", "libfastcdr.2.dylib")
 _CDR = "_ZN8eprosima7fastcdr3Cdr"
@@ -30,14 +31,10 @@ _ADVICE = (
 
 
 class FastCdr(NamedTuple):
-    """How to use a `Cdr`: indices of words in it, and its `serialize_array(cdr, data, size)`.
-
-    `serialize_array` throws a C++ exception if there is no room: check before.
-    """
+    """Where a `Cdr` keeps its pointers: indices of machine words in it."""
 
     position: int
     end: int
-    serialize_array: Callable[[int, Any, int], int]
 
 
 def _load() -> ctypes.CDLL:
@@ -53,7 +50,7 @@ def _load() -> ctypes.CDLL:
 
 
 def _words(cdr: int) -> list[int]:
-    return list((c_size_t * _WORDS).from_address(cdr))
+    return c.WORDS[cdr >> 3 : (cdr >> 3) + _WORDS].tolist()
 
 
 def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
@@ -68,7 +65,7 @@ def fast_cdr() -> FastCdr:
     """Return how to use the loaded Fast CDR; raises ImportError if that cannot be found out."""
     library = _load()
 
-    def method(name: str, result: Any, *arguments: Any) -> Any:  # noqa: ANN401
+    def method(name: str, result: Any, *arguments: Any) -> Any:
         return PYFUNCTYPE(result, *arguments)((name, library))
 
     try:
@@ -94,14 +91,15 @@ def fast_cdr() -> FastCdr:
         position = position_of(here)
         indices.add(_find(_words(here), begin, (position, begin, begin + size)))
     index = indices.pop()
-    known = (
-        begin_of(here) == begin
-        and position == begin + 5
-        and data.value == b"\1\2\3\4\5"
-    )
-    if indices or index is None or not known:
+    if (
+        indices
+        or index is None
+        or begin_of(here) != begin
+        or data.value != b"\1\2\3\4\5"
+    ):
         raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    append_bytes = method(
-        f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t
-    )
-    return FastCdr(index + 1, index + 5, append_bytes)
+    found = FastCdr(index + 1, index + 5)
+    c.WORDS[(here >> 3) + found.position] = begin + 1
+    if position_of(here) != begin + 1:
+        raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
+    return found

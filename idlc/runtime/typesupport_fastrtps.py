@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from typing import Any
 
 from . import typesupport_c as c
 from . import typesupport_introspection as introspection
-from .cdr import NATIVE
+from .cdr import HEADERS, NATIVE
 from .codec import encode_error, install
 from .typesupport_descriptions import about
 from .typesupport_fastcdr import fast_cdr
@@ -26,50 +27,68 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 _HEADER = 4
 #: Received messages up to this size are copied into `bytes`, which decode faster than views.
 _SMALL = 4096
-#: How many `Cdr` objects are remembered; they live on the stack, at few different addresses.
-_MAX_VIEWS = 256
-_views: dict[int, memoryview] = {}
+#: Arrays with this many elements are not copied on their way to the middleware.
+_LARGE = 16384
 
 
 class Memory:
-    """Message memory: `message @ memory` encodes into it, `+memory` is the message itself.
+    """Message memory: `message @ memory` encodes into it, `+memory` is the message.
 
-    `__len__` is the encoded size. It is a slot that holds a function, so that no bytecode runs
-    where C asks for the size: an interrupt there could not be told.
+    `__len__` is the encoded size. It is a slot that holds a function, so that no bytecode
+    runs where C asks for the size: an interrupt there could not be told.
     """
 
-    __slots__ = ("length", "message", "parts")
+    __slots__ = ("body", "length", "message", "rest")
 
-    def __pos__(self) -> Any:  # noqa: ANN401
+    #: The encoded message without header: bytes, and buffers that follow them, if any.
+    body: bytes
+    rest: list[memoryview] | None
+    length: Callable[[], int]
+    message: Any
+
+    def __pos__(self) -> Any:
         """Return the message that was encoded or decoded last."""
         return self.message
 
 
-Memory.__len__ = Memory.length  # type: ignore[attr-defined]
+_memory: Any = Memory
+_memory.__len__ = _memory.length
 
 
-def _buffers(parts: list[Any]) -> list[Any]:
-    """Return the parts after the first as writable views of bytes, which have addresses."""
-    views = [memoryview(part) for part in parts[1:]]
-    bytewise = [view.cast("B") for view in views if view.nbytes]
-    return [memoryview(bytearray(view)) if view.readonly else view for view in bytewise]
+def _joined(parts: list[Any]) -> list[memoryview]:
+    """Return few parts: large arrays as they are, what lies between them joined."""
+    joined = []
+    small: list[Any] = []
+    for part in parts:
+        if len(part) < _LARGE:
+            small.append(part)
+        else:
+            joined += [memoryview(b"".join(small)), memoryview(part).cast("B")]
+            small = []
+    return [*joined, memoryview(b"".join(small))]
 
 
-def _memory_type(cls: Any) -> type[Memory]:  # noqa: ANN401
+def _memory_type(cls: Any) -> type[Memory]:
     """Return the memory of a message class, which encodes with the class's codec."""
     encode = cls._codec_(NATIVE).encode
     true = c.TRUE
 
-    def store(memory: Any, message: Any) -> object:  # noqa: ANN401
+    def store(memory: Any, message: Any) -> object:
+        rest = None
         try:
             parts = encode(message)
+            body = parts[0][_HEADER:]
+            if len(parts) > 1:
+                parts[0] = body
+                if sum(map(len, parts)) < _LARGE:
+                    body = b"".join(parts)
+                else:
+                    body, rest = b"", _joined(parts)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        size = len(parts[0]) - _HEADER
-        if len(parts) > 1:
-            parts[1:] = _buffers(parts)
-            size += sum([part.nbytes for part in parts[1:]])
-        memory.parts = parts
+        size = sum(map(len, rest)) if rest else len(body)
+        memory.body = body
+        memory.rest = rest
         memory.length = size.__index__
         memory.message = message
         return true
@@ -102,74 +121,70 @@ class _ServiceCallbacks(ctypes.Structure):
     )
 
 
-def _view(cdr: int) -> memoryview:
-    """Return the words of a `Cdr`."""
-    if len(_views) >= _MAX_VIEWS:
-        _views.clear()
-    words = (c_size_t * 64).from_address(cdr)
-    view = _views[cdr] = memoryview(words).cast("B").cast("N")
-    return view
-
-
 @cache
 def _serializer() -> int:
     """Return `cdr_serialize(memory, cdr)`."""
-    position, end, append = fast_cdr()
-    views = _views
-    body = c.BYTES_OFFSET + _HEADER
+    position, end = fast_cdr()
+    everything, words = c.MEMORY, c.WORDS
 
-    def serialize(memory: Any, cdr: int) -> bool:  # noqa: ANN401
+    def serialize(memory: Any, cdr: int) -> bool:
         try:
-            words = start = None
-            words = views.get(cdr) or _view(cdr)
-            start = words[position]
-            if words[end] - start < memory.length():
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.length()
+            if words[here + end] < stop:
                 return False
-            parts = memory.parts
-            append(cdr, id(parts[0]) + body, len(parts[0]) - _HEADER)
-            if len(parts) > 1:
-                for part in parts[1:]:
-                    append(cdr, ctypes.addressof(c_char.from_buffer(part)), len(part))
+            if memory.rest is None:
+                everything[start:stop] = memory.body
+            else:
+                for part in memory.rest:
+                    everything[start : start + len(part)] = part
+                    start += len(part)
+            words[here + position] = stop
             return True
-        except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
+        except BaseException as error:
             failure = error
         try:
             if c.interrupted(failure):
-                if start is not None:
-                    words[position] = start
                 return serialize(memory, cdr)
             c.report("a message was not sent", failure)
-        except BaseException:  # noqa: BLE001, S110
+        except BaseException:  # noqa: S110
             pass
         return False
 
     return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
 
 
-def _deserializer(name: str, cls: Any) -> int:  # noqa: ANN401
+def _deserializer(name: str, cls: Any) -> int:
     """Return `cdr_deserialize(cdr, memory)` for one class."""
-    position, end, _ = fast_cdr()
-    views = _views
+    position, end = fast_cdr()
+    everything, words = c.MEMORY, c.WORDS
     install(cls)
-    decode = cls.deserialize
+    _, decode, bulk = cls._codec_(NATIVE)
+    decode_any = cls.deserialize
+    native = HEADERS[NATIVE][1]
 
-    def deserialize(cdr: int, memory: Any) -> bool:  # noqa: ANN401
+    def deserialize(cdr: int, memory: Any) -> bool:
         try:
-            words = views.get(cdr) or _view(cdr)
-            start = words[position] - _HEADER
-            size = words[end] - start
-            if size <= _SMALL:
-                memory.message = decode(c.copy_memory(start, size))
-            else:
-                memory.message = decode(c.view_memory(start, size, c.READ))
+            here = cdr >> 3
+            view = everything[words[here + position] - _HEADER : words[here + end]]
+            large = bulk and len(view) > _SMALL
+            data: Any = view if large else view.tobytes()
+            if data[1] == native and not data[0]:
+                try:
+                    memory.message = decode(data)
+                    return True
+                except Exception:  # noqa: S110 (told exactly by what follows)
+                    pass
+            memory.message = decode_any(data)
             return True
-        except BaseException as error:  # noqa: BLE001
+        except BaseException as error:
             failure = error
         try:
             if c.interrupted(failure):
                 return deserialize(cdr, memory)
             c.report(f"a received {name} was dropped", failure)
-        except BaseException:  # noqa: BLE001, S110
+        except BaseException:  # noqa: S110
             pass
         return False
 
@@ -180,7 +195,7 @@ def _deserializer(name: str, cls: Any) -> int:  # noqa: ANN401
 def _unbounded() -> int:
     """Return `max_serialized_size(bounds_info)`, which says that there is no maximum."""
 
-    def maximum(bounds_info: Any) -> int:  # noqa: ANN401
+    def maximum(bounds_info: Any) -> int:
         bounds_info[0] = b"\0"
         return 0
 
@@ -193,7 +208,7 @@ def _identifier() -> int:
     return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
 
 
-def message(cls: Any, name: str) -> c.MessageSupport:  # noqa: ANN401
+def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     package, kind, short = name.split("/")
     callbacks = _Callbacks(

@@ -127,7 +127,7 @@ def structure(name: str) -> type[ctypes.Structure]:
     return type(name.replace("/", "__"), (ctypes.Structure,), {"_fields_": fields})
 
 
-def element_type(field: Field) -> Any:  # noqa: ANN401 (any ctypes type)
+def element_type(field: Field) -> Any:
     """Return the C type of one element of a field."""
     return (
         structure(field.nested_type_name)
@@ -136,16 +136,17 @@ def element_type(field: Field) -> Any:  # noqa: ANN401 (any ctypes type)
     )
 
 
-def _c_type(field: Field) -> Any:  # noqa: ANN401
+def _c_type(field: Field) -> Any:
     if field.shape == SCALAR:
         return element_type(field)
     return element_type(field) * field.capacity if field.shape == ARRAY else c.Sequence
 
 
-def offsets(name: str) -> list[int]:
-    """Return where each field begins, in bytes from the start of the structure."""
+def placed_fields(name: str) -> list[tuple[Field, int]]:
+    """Return a message's fields and where each begins in the C structure."""
     kind = structure(name)
-    return [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
+    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
+    return list(zip(load().types[name], offsets, strict=True))
 
 
 def _member(field: Field, offset: int) -> Member:
@@ -186,7 +187,7 @@ def _get(fixed: bool, size: int) -> int:
     def in_array(field: int, index: int) -> int:
         return field + index * size
 
-    def in_sequence(field: Any, index: int) -> int:  # noqa: ANN401
+    def in_sequence(field: Any, index: int) -> int:
         return field[0].data + index * size  # type: ignore[no-any-return]
 
     if fixed:
@@ -204,19 +205,17 @@ def _resize(name: str, size: int) -> int:
 
     def resize(field: int, count: int) -> bool:
         try:
-            many.free(transcode.area(field, ctypes.sizeof(c.Sequence)), 0)
+            many.free(field)
             if count:
-                ctypes.memset(
-                    transcode.allocate(field, count, size).address, 0, count * size
-                )
+                transcode.allocate(field, count, size, zero=True)
             return True
-        except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
+        except BaseException as error:
             failure = error
         try:
             if c.interrupted(failure):
                 return resize(field, count)
             c.report("a received message was dropped", failure)
-        except BaseException:  # noqa: BLE001, S110
+        except BaseException:  # noqa: S110
             pass
         return False
 
@@ -225,8 +224,8 @@ def _resize(name: str, size: int) -> int:
 
 def members(name: str, shift: int = 0) -> Members:
     """Return a message's members; `shift`: bytes before the structure in message memory."""
-    pairs = zip(load().types[name], offsets(name), strict=True)
-    table = [_member(field, offset + shift) for field, offset in pairs]
+    placed = placed_fields(name)
+    table = [_member(field, offset + shift) for field, offset in placed]
     package, kind, short = name.split("/")
     return c.keep(
         Members(

@@ -6,6 +6,7 @@ Both are made of the type support of their messages, so nothing here depends on 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from ctypes import (
     PYFUNCTYPE,
     c_bool,
@@ -16,7 +17,6 @@ from ctypes import (
     c_void_p,
     py_object,
 )
-from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -58,7 +58,7 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
     Both functions are needed as soon as there is a handle: rcl calls them without a look.
     """
 
-    def create(info: Any, _: int, request: int | None, response: int | None) -> int:  # noqa: ANN401
+    def create(info: Any, _: int, request: int | None, response: int | None) -> int:
         try:
             told = info.contents
             message = cls(request=_message_at(request), response=_message_at(response))
@@ -71,26 +71,26 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
             message @ memory
             ctypes.pythonapi.Py_IncRef(py_object(memory))
             return id(memory)
-        except BaseException as error:  # noqa: BLE001 (nothing may pass through C)
+        except BaseException as error:
             failure = error
         try:
             if c.interrupted(failure):
                 return create(info, _, request, response)
             c.report("a service event was not sent", failure)
-        except BaseException:  # noqa: BLE001, S110
+        except BaseException:  # noqa: S110
             pass
         return 0
 
-    def destroy(memory: Any, _: int) -> bool:  # noqa: ANN401
+    def destroy(memory: Any, _: int) -> bool:
         try:
             ctypes.pythonapi.Py_DecRef(py_object(memory))
-        except BaseException as error:  # noqa: BLE001
+        except BaseException as error:
             failure = error
         else:
             return True
-        try:
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
             c.interrupted(failure)
-        except BaseException:  # noqa: BLE001, S110
+        except BaseException:  # noqa: S110
             pass
         return True
 

@@ -22,36 +22,34 @@ _HEADER = 4
 
 
 @cache
-def _memory_type(cls: Any, name: str) -> type[bytes]:  # noqa: ANN401
+def _memory_type(cls: Any, name: str) -> type[bytes]:
     """Return the type of memory for a class: `message @ memory` fills it, `+memory` reads it."""
     encode = cls._codec_(NATIVE).encode
-    size = ctypes.sizeof(introspection.structure(name))
+    everything = transcode.whole(name)
     true = c.TRUE
 
-    def area(memory: bytes) -> transcode.Area:
-        return transcode.area(id(memory) + c.BYTES_OFFSET, size)
-
-    def store(memory: bytes, message: Any) -> object:  # noqa: ANN401
+    def store(memory: bytes, message: Any) -> object:
         try:
             data = b"".join(encode(message))
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        transcode.fill(name, memoryview(data)[_HEADER:], area(memory))
+        cursor = transcode.Cursor(memoryview(data)[_HEADER:])
+        everything.fill(cursor, id(memory) + c.BYTES_OFFSET)
         return true
 
     def fetch(memory: bytes) -> object:
         data = bytearray(HEADERS[NATIVE])
-        transcode.drain(name, area(memory), data)
+        everything.drain(id(memory) + c.BYTES_OFFSET, data)
         return cls.deserialize(data)
 
     def free(memory: bytes) -> None:
-        transcode.free(name, area(memory))
+        everything.free(id(memory) + c.BYTES_OFFSET)
 
     methods = {"__rmatmul__": store, "__pos__": fetch, "__del__": free}
     return type("Memory", (bytes,), methods)
 
 
-def message(cls: Any, name: str) -> c.MessageSupport:  # noqa: ANN401
+def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     zeros = bytes(ctypes.sizeof(introspection.structure(name)))
     handle = introspection.handle(name, c.BYTES_OFFSET)

@@ -1,9 +1,10 @@
 """CDR bytes to C structures and back, by type description alone.
 
-The generated codec checks and encodes a message; here its bytes are moved into the structure that
-rosidl's C generator would make for the type, and the other way. Byte order is the machine's.
-Both sides align numbers to their size, so most of a message moves in a few large runs. Memory
-belongs to rosidl_runtime_c's allocator, because the middleware allocates and frees there too.
+The generated codec checks and encodes a message; here its bytes are moved into the
+structure that rosidl's C generator would make for the type, and the other way. Byte order
+is the machine's. Both sides align numbers to their size, so most of a message moves in a
+few large runs. What is allocated comes from rosidl_runtime_c, whose allocator the
+middleware uses as well.
 """
 
 from __future__ import annotations
@@ -17,25 +18,12 @@ from typing import Any, NamedTuple, Protocol
 
 from . import typesupport_c as c
 from . import typesupport_introspection as introspection
-from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field, load
+from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field
 
 _HEADER = 4
 _COUNT = Struct("=I")
-#: data, size and capacity of a string or sequence.
-_TRIPLE = Struct("=QQQ")
+#: The type ids of wide strings.
 _WIDE = (18, 22)
-
-
-class Area(NamedTuple):
-    """Some C memory."""
-
-    address: int
-    view: memoryview
-
-
-def area(address: int, size: int) -> Area:
-    """Return writable memory."""
-    return Area(address, c.view_memory(address, size, c.WRITE))
 
 
 class Cursor:
@@ -65,7 +53,7 @@ def _put(out: bytearray, data: bytes | memoryview, align: int) -> None:
 
 
 class _Runtime(NamedTuple):
-    """Functions of rosidl_runtime_c; `init` and `fini` do for any sequence, counted in bytes."""
+    """rosidl_runtime_c; `init` and `fini` do for any sequence, counted in bytes."""
 
     assign: Any
     assign_wide: Any
@@ -76,30 +64,28 @@ class _Runtime(NamedTuple):
 @cache
 def _runtime() -> _Runtime:
     library = introspection.load_library("librosidl_runtime_c.so")
-    assign = PYFUNCTYPE(c_bool, c_void_p, c_char_p, c_size_t)
-    assign_wide = PYFUNCTYPE(c_bool, c_void_p, c_void_p, c_size_t)
+
+    def function(name: str, result: Any, *arguments: Any) -> Any:
+        return PYFUNCTYPE(result, *arguments)((f"rosidl_runtime_c__{name}", library))
+
     return _Runtime(
-        assign(("rosidl_runtime_c__String__assignn", library)),
-        assign_wide(("rosidl_runtime_c__U16String__assignn", library)),
-        PYFUNCTYPE(c_bool, c_void_p, c_size_t)(
-            ("rosidl_runtime_c__uint8__Sequence__init", library)
-        ),
-        PYFUNCTYPE(None, c_void_p)(
-            ("rosidl_runtime_c__uint8__Sequence__fini", library)
-        ),
+        function("String__assignn", c_bool, c_void_p, c_char_p, c_size_t),
+        function("U16String__assignn", c_bool, c_void_p, c_void_p, c_size_t),
+        function("uint8__Sequence__init", c_bool, c_void_p, c_size_t),
+        function("uint8__Sequence__fini", None, c_void_p),
     )
 
 
 class Step(Protocol):
-    """Moves one piece; `base` is where the structure begins in its area."""
+    """Moves one piece of a structure; `base` is the address of the structure."""
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:
+    def fill(self, cursor: Cursor, base: int) -> None:
         """Move from CDR to C memory that is zero."""
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:
+    def drain(self, base: int, out: bytearray) -> None:
         """Append to CDR what C memory holds."""
 
-    def free(self, memory: Area, base: int) -> None:
+    def free(self, base: int) -> None:
         """Free what the piece has allocated."""
 
 
@@ -109,54 +95,54 @@ class Run:
     def __init__(self, offset: int, size: int, align: int) -> None:
         self.offset, self.size, self.align = offset, size, align
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:  # noqa: D102
+    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         start = base + self.offset
-        memory.view[start : start + self.size] = cursor.take(self.size, self.align)
+        c.MEMORY[start : start + self.size] = cursor.take(self.size, self.align)
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
+    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
         start = base + self.offset
-        _put(out, memory.view[start : start + self.size], self.align)
+        _put(out, c.MEMORY[start : start + self.size], self.align)
 
-    def free(self, memory: Area, base: int) -> None:  # noqa: D102
+    def free(self, base: int) -> None:  # noqa: D102
         pass
 
 
 class Text:
-    """A string."""
+    """A string: data, size and capacity."""
 
     def __init__(self, offset: int) -> None:
         self.offset = offset
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:  # noqa: D102
+    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         text = bytes(cursor.take(cursor.count(), 1))[:-1]
-        _demand(_runtime().assign(memory.address + base + self.offset, text, len(text)))
+        _demand(_runtime().assign(base + self.offset, text, len(text)))
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
-        data, size, _ = _TRIPLE.unpack_from(memory.view, base + self.offset)
+    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
+        data, size = _data_and_size(base + self.offset)
         _put(out, _COUNT.pack(size + 1), 4)
-        out += (c.copy_memory(data, size) if size else b"") + b"\0"
+        out += c.MEMORY[data : data + size]
+        out += b"\0"
 
-    def free(self, memory: Area, base: int) -> None:  # noqa: D102
-        _free(memory, base + self.offset)
+    def free(self, base: int) -> None:  # noqa: D102
+        _release(base + self.offset)
 
 
 class WideText(Text):
     """A wstring: UTF-16 units, four bytes each in CDR and two in C."""
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:  # noqa: D102
+    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         count = cursor.count()
         units = array("H", cursor.take(4 * count, 1).cast("I"))
-        units.append(0)  # never without an address
-        start = units.buffer_info()[0]
+        units.append(0)  # an empty array has no address
         _demand(
-            _runtime().assign_wide(memory.address + base + self.offset, start, count)
+            _runtime().assign_wide(base + self.offset, units.buffer_info()[0], count)
         )
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
-        data, size, _ = _TRIPLE.unpack_from(memory.view, base + self.offset)
+    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
+        data, size = _data_and_size(base + self.offset)
         _put(out, _COUNT.pack(size), 4)
-        if size:
-            out += array("I", c.view_memory(data, 2 * size, c.READ).cast("H")).tobytes()
+        units = array("H", c.MEMORY[data : data + 2 * size].tobytes())
+        out += array("I", units).tobytes()
 
 
 class Repeat:
@@ -166,20 +152,20 @@ class Repeat:
         self.steps = steps
         self.starts = range(offset, offset + count * stride, stride)
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:  # noqa: D102
+    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         for start in self.starts:
             for step in self.steps:
-                step.fill(cursor, memory, base + start)
+                step.fill(cursor, base + start)
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
+    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
         for start in self.starts:
             for step in self.steps:
-                step.drain(memory, base + start, out)
+                step.drain(base + start, out)
 
-    def free(self, memory: Area, base: int) -> None:  # noqa: D102
+    def free(self, base: int) -> None:  # noqa: D102
         for start in self.starts:
             for step in self.steps:
-                step.free(memory, base + start)
+                step.free(base + start)
 
 
 class Many:
@@ -188,8 +174,9 @@ class Many:
     def __init__(self, steps: list[Step], offset: int, stride: int) -> None:
         self.steps, self.offset, self.stride = steps, offset, stride
         only = steps[0] if len(steps) == 1 else None
+        gapless = isinstance(only, Run) and only.size == stride
         #: Alignment of the numbers, if the elements are nothing but numbers without gaps.
-        self.align = only.align if isinstance(only, Run) and only.size == stride else 0
+        self.align = only.align if isinstance(only, Run) and gapless else 0
 
     def content(self, count: int) -> Step:
         """Return the step that moves `count` elements, from the first one on."""
@@ -197,25 +184,23 @@ class Many:
             return Run(0, count * self.stride, self.align)
         return Repeat(self.steps, 0, count, self.stride)
 
-    def fill(self, cursor: Cursor, memory: Area, base: int) -> None:  # noqa: D102
+    def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         count = cursor.count()
         if count:
-            content = allocate(memory.address + base + self.offset, count, self.stride)
-            if not self.align:
-                ctypes.memset(content.address, 0, count * self.stride)
-            self.content(count).fill(cursor, content, 0)
+            data = allocate(base + self.offset, count, self.stride, zero=not self.align)
+            self.content(count).fill(cursor, data)
 
-    def drain(self, memory: Area, base: int, out: bytearray) -> None:  # noqa: D102
-        data, count, _ = _TRIPLE.unpack_from(memory.view, base + self.offset)
+    def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
+        data, count = _data_and_size(base + self.offset)
         _put(out, _COUNT.pack(count), 4)
         if count:
-            self.content(count).drain(area(data, count * self.stride), 0, out)
+            self.content(count).drain(data, out)
 
-    def free(self, memory: Area, base: int) -> None:  # noqa: D102
-        data, count, _ = _TRIPLE.unpack_from(memory.view, base + self.offset)
-        if count:
-            self.content(count).free(area(data, count * self.stride), 0)
-        _free(memory, base + self.offset)
+    def free(self, base: int) -> None:  # noqa: D102
+        data, count = _data_and_size(base + self.offset)
+        if not self.align:
+            self.content(count).free(data)
+        _release(base + self.offset)
 
 
 def _demand(done: bool) -> None:
@@ -223,18 +208,26 @@ def _demand(done: bool) -> None:
         raise MemoryError
 
 
-def allocate(sequence: int, count: int, stride: int) -> Area:
-    """Give the empty sequence at an address `count` elements, not yet zero; return them."""
+def _data_and_size(address: int) -> tuple[int, int]:
+    """Return the first two members of a string or sequence."""
+    return c.WORDS[address >> 3], c.WORDS[(address >> 3) + 1]
+
+
+def allocate(sequence: int, count: int, stride: int, *, zero: bool) -> int:
+    """Give an empty sequence `count` elements and return the address of the first."""
     _demand(_runtime().init(sequence, count * stride))
-    data, *_ = words = (c_size_t * 3).from_address(sequence)
-    words[1:] = (count, count)
-    return area(data, count * stride)
+    word = sequence >> 3
+    data = c.WORDS[word]
+    if zero:
+        ctypes.memset(data, 0, count * stride)
+    c.WORDS[word + 1] = c.WORDS[word + 2] = count
+    return data
 
 
-def _free(memory: Area, start: int) -> None:
-    """Free the data of a string or sequence."""
-    if _TRIPLE.unpack_from(memory.view, start)[0]:
-        _runtime().fini(memory.address + start)
+def _release(address: int) -> None:
+    """Free the data of a string or sequence, which is empty then."""
+    if c.WORDS[address >> 3]:
+        _runtime().fini(address)
 
 
 def _element_steps(field: Field) -> list[Step]:
@@ -248,7 +241,7 @@ def _element_steps(field: Field) -> list[Step]:
 
 
 def _moved(step: Step, offset: int) -> Step:
-    """Return a step whose structure begins `offset` bytes later; not for use with areas."""
+    """Return a step for a structure that lies `offset` bytes further on."""
     if isinstance(step, Run):
         return Run(step.offset + offset, step.size, step.align)
     return Repeat([step], offset, 1, 1)
@@ -259,17 +252,16 @@ def _field_steps(field: Field, offset: int) -> list[Step]:
     stride = ctypes.sizeof(introspection.element_type(field))
     if field.shape == SCALAR:
         return [_moved(step, offset) for step in elements]
-    if field.shape != ARRAY:
-        return [Many(elements, offset, stride)]
-    content = Many(elements, 0, stride).content(field.capacity)
-    return [_moved(content, offset)]
+    if field.shape == ARRAY:
+        return [_moved(Many(elements, 0, stride).content(field.capacity), offset)]
+    return [Many(elements, offset, stride)]
 
 
 @cache
 def steps(name: str) -> tuple[Step, ...]:
     """Return how a type moves, neighbouring runs joined."""
     joined: list[Step] = []
-    for field, offset in zip(load().types[name], introspection.offsets(name)):
+    for field, offset in introspection.placed_fields(name):
         for step in _field_steps(field, offset):
             last = joined[-1] if joined else None
             if isinstance(step, Run) and isinstance(last, Run) and _follows(step, last):
@@ -288,20 +280,6 @@ def _follows(step: Run, last: Run) -> bool:
     )
 
 
-def fill(name: str, body: memoryview, memory: Area) -> None:
-    """Move a message from CDR without header into zeroed C memory."""
-    cursor = Cursor(body)
-    for step in steps(name):
-        step.fill(cursor, memory, 0)
-
-
-def drain(name: str, memory: Area, out: bytearray) -> None:
-    """Append a message in C memory to CDR that has only the header so far."""
-    for step in steps(name):
-        step.drain(memory, 0, out)
-
-
-def free(name: str, memory: Area) -> None:
-    """Free all that a message in C memory owns."""
-    for step in steps(name):
-        step.free(memory, 0)
+def whole(name: str) -> Step:
+    """Return the step that moves a whole message."""
+    return Repeat(list(steps(name)), 0, 1, 1)
