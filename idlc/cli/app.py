@@ -12,6 +12,7 @@ from idlc import __version__
 COMMANDS = {
     "gen": "Compile interface files into a Python package.",
     "check": "Report every problem of interface files.",
+    "breaking": "Report what breaks against another version.",
     "fmt": "Lay interface files out.",
     "hash": "Print type hashes (RIHS01).",
     "describe": "Print a type description, as ROS 2 installs it.",

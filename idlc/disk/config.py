@@ -8,7 +8,9 @@ from __future__ import annotations
 import os
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.disk.read import decode, is_file, read_bytes, shown
@@ -23,13 +25,19 @@ FILE = "pyproject.toml"
 
 
 class Config(NamedTuple):
-    """The settings found; what is absent is empty or `None`. Paths are as one would type them."""
+    """The settings found; what is absent is empty or `None`. Paths are as one would type them.
+
+    `tables` holds the tables of single commands, which are checked by `idlc.disk.tables`;
+    `source` is the file.
+    """
 
     paths: tuple[str, ...] = ()
     out: str | None = None
     package: str | None = None
     include: tuple[str, ...] = ()
     vendor_deps: bool = False
+    tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
+    source: Source | None = None
 
 
 _SHAPES = {
@@ -38,6 +46,8 @@ _SHAPES = {
     "out": "a string",
     "package": "a string",
     "vendor-deps": "true or false",
+    "breaking": "a table",
+    "check": "a table",
 }
 
 
@@ -87,14 +97,14 @@ def _broken(source: Source, message: str) -> Diagnostic:
 def _checked(table: object, source: Source, folder: Path, report: Report) -> Config:
     """Return the settings in a table; report each that is unknown or of the wrong type."""
     if not isinstance(table, dict):
-        report.add(_wrong(source, "idlc", "`tool.idlc` must be a table", None))
+        report.add(wrong(source, "idlc", "`tool.idlc` must be a table", None))
         return Config()
     found: dict[str, Any] = {}
     for key, value in table.items():
         if key not in _SHAPES:
-            report.add(_wrong(source, key, f"unknown setting `{key}` in [tool.idlc]", _close(key)))
+            report.add(wrong(source, key, f"unknown setting `{key}` in [tool.idlc]", _close(key)))
         elif not _fits(value, _SHAPES[key]):
-            report.add(_wrong(source, key, f"`{key}` in [tool.idlc] must be {_SHAPES[key]}", None))
+            report.add(wrong(source, key, f"`{key}` in [tool.idlc] must be {_SHAPES[key]}", None))
         else:
             found[key] = value
     return Config(
@@ -103,6 +113,8 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         package=found.get("package"),
         include=tuple(_typed(folder, path) for path in found.get("include", ())),
         vendor_deps=found.get("vendor-deps", False),
+        tables={key: value for key, value in found.items() if _SHAPES[key] == "a table"},
+        source=source,
     )
 
 
@@ -112,6 +124,8 @@ def _fits(value: object, shape: str) -> bool:
             return isinstance(value, list) and all(isinstance(item, str) for item in value)
         case "a string":
             return isinstance(value, str)
+        case "a table":
+            return isinstance(value, dict)
         case _:
             return isinstance(value, bool)
 
@@ -130,7 +144,8 @@ def _typed(folder: Path, path: str) -> str:
         return whole.as_posix()
 
 
-def _wrong(source: Source, key: str, message: str, hint: str | None) -> Diagnostic:
+def wrong(source: Source, key: str, message: str, hint: str | None = None) -> Diagnostic:
+    """Return the problem with a setting, at the place where it stands."""
     place = re.search(rf"(?m)^[ \t]*[\"']?({re.escape(key)})[\"']?[ \t]*=", source.text)
     if place is None:
         return codes.BAD_CONFIG.of(source.path, message, hint=hint)

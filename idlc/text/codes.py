@@ -94,6 +94,26 @@ WSTRING_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
 CONSTANT_MOVED = Code("IDL313", "repeated-section-constant", WARNING)
 FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
 
+# breaking changes
+INTERFACE_REMOVED = Code("IDL501", "interface-removed", ERROR)
+INTERFACE_RENAMED = Code("IDL502", "interface-renamed", ERROR)
+FIELD_REMOVED = Code("IDL503", "field-removed", ERROR)
+FIELD_RENAMED = Code("IDL504", "field-renamed", ERROR)
+FIELD_ADDED = Code("IDL505", "field-added", ERROR)
+FIELD_MOVED = Code("IDL506", "field-moved", ERROR)
+FIELD_TYPE = Code("IDL507", "field-type-changed", ERROR)
+FIELD_BOUND = Code("IDL508", "field-bound-changed", ERROR)
+FIELD_DEFAULT = Code("IDL509", "field-default-changed", ERROR)
+CONSTANT_REMOVED = Code("IDL510", "constant-removed", ERROR)
+CONSTANT_RENAMED = Code("IDL511", "constant-renamed", ERROR)
+CONSTANT_RETYPED = Code("IDL512", "constant-type-changed", ERROR)
+CONSTANT_VALUE = Code("IDL513", "constant-value-changed", ERROR)
+UNIT_CHANGED = Code("IDL514", "unit-changed", ERROR)
+USED_TYPE = Code("IDL515", "used-type-changed", ERROR)
+HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
+UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
+EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
+
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
 NO_SUCH_PATH = Code("IDL602", "no-such-path", ERROR)
@@ -114,6 +134,7 @@ DRIFT = Code("IDL616", "drift", ERROR)
 NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
 NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
 STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
+NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -133,6 +154,7 @@ USAGE: frozenset[str] = frozenset(
         BAD_LOCK,
         NO_SUCH_TYPE,
         STRUCTURE_TOO_LARGE,
+        NO_REVISION,
     )
 )
 

@@ -34,6 +34,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     `span` is the smallest guilty piece; a problem with a whole file or folder has none
     and names it in `path`. `hint` is something to do, in the imperative or as a question.
     `detail` is preformatted text of several lines, such as a diff.
+    `levels` is what a change between two versions breaks.
     """
 
     code: str
@@ -44,6 +45,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     labels: tuple[Label, ...] = ()
     hint: str | None = None
     detail: str = ""
+    levels: tuple[str, ...] = ()
 
     @property
     def where(self) -> tuple[str, int]:
@@ -61,7 +63,8 @@ class Report:
         """Add a problem unless the same code already stands at the same place."""
         path, start = diagnostic.where
         end = diagnostic.span.end if diagnostic.span else -1
-        about = "" if diagnostic.span else diagnostic.message
+        # what is gone has no place of its own
+        about = "" if diagnostic.span and not diagnostic.levels else diagnostic.message
         self._found.setdefault((path, diagnostic.code, start, end, about), diagnostic)
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:

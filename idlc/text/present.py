@@ -79,6 +79,9 @@ def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
         bar = f"{margin} {paint('frame', '|')}"
         yield bar
         yield from (f"{bar} {visible(line)}".rstrip() for line in diagnostic.detail.split("\n"))
+    if diagnostic.levels:
+        sign = paint("frame", "=")
+        yield f"{margin} {sign} {paint('hint', 'breaks')}: {', '.join(diagnostic.levels)}"
     if diagnostic.hint:
         yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {one_line(diagnostic.hint)}"
 
@@ -174,6 +177,7 @@ def _facts(diagnostic: Diagnostic) -> dict[str, object]:
         **_range(diagnostic.span, diagnostic.path),
         "hint": diagnostic.hint,
         "detail": diagnostic.detail or None,
+        **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
         "labels": [_label(label) for label in diagnostic.labels],
     }
 

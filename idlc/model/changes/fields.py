@@ -1,0 +1,291 @@
+"""What changed between the fields of two versions of one structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from idlc.model import ir
+from idlc.model.changes.change import Change, Level
+from idlc.model.changes.pairing import Pairing, pair
+from idlc.model.changes.wire import reads_alike, type_reads_alike
+from idlc.model.describe import individual
+from idlc.model.link import Model
+from idlc.model.spelling import spell, spell_value
+from idlc.text import codes
+from idlc.text.source import Span
+
+
+class Sides(NamedTuple):
+    """A structure in two versions, and all that each refers to."""
+
+    old: ir.Message
+    new: ir.Message
+    before: Model
+    after: Model
+
+    def subject(self, name: str) -> str:
+        """Return how an element is called in allow-lists."""
+        return f"{self.new.name}.{name}"
+
+    @property
+    def path(self) -> str:
+        """The file of the new version."""
+        return self.new.source.path if self.new.source else str(self.new.name)
+
+
+def field_changes(sides: Sides) -> Iterator[Change]:
+    """Yield what changed between the fields, in the order of the new version.
+
+    Whether bytes are still read right is decided for the structure as a whole: two changes can
+    make up for each other.
+    """
+    found = list(_changes(sides))
+    broken = not reads_alike(sides.old, sides.new, sides.before.messages, sides.after.messages)
+    if not broken:
+        found = [change.without("wire") for change in found]
+    elif not any("wire" in change.levels for change in found):
+        found = [
+            change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
+            for change in found
+        ]
+    yield from (change for change in found if change.levels)
+
+
+def _changes(sides: Sides) -> Iterator[Change]:
+    pairing = pair(sides.old.fields, sides.new.fields, lambda one, other: one.type == other.type)
+    for field in pairing.removed:
+        yield _removed(sides, pairing, field)
+    for old, new in pairing.renamed:
+        yield _renamed(sides, old, new)
+    for field in pairing.added:
+        yield _added(sides, pairing, field)
+    for old, new in pairing.kept:
+        if new.name in pairing.moved:
+            yield _moved(sides, old, new)
+    for old, new in (*pairing.kept, *pairing.renamed):
+        yield from _element_changes(sides, old, new)
+
+
+def _element_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:
+    if old.type != new.type:
+        yield _type(sides, old, new)
+    elif isinstance(target := ir.element_of(new.type), ir.Ref):
+        yield from _used_type(sides, old, new, str(target.target))
+    if _default(old) != _default(new):
+        yield _default_changed(sides, old, new)
+    if old.unit and new.unit and old.unit != new.unit:
+        yield _unit(sides, old, new)
+
+
+def _removed(sides: Sides, pairing: Pairing[ir.Field], field: ir.Field) -> Change:
+    stayed = {id(old) for old, _ in (*pairing.kept, *pairing.renamed)}
+    old_fields = sides.old.fields
+    behind = old_fields[next(at for at, one in enumerate(old_fields) if one is field) + 1 :]
+    levels: set[Level] = {"hash", "source"}
+    if any(id(one) in stayed for one in behind):
+        levels.add("wire")
+    followed = next((new for old, new in pairing.kept if any(old is one for one in behind)), None)
+    before = sides.new.fields[-1] if sides.new.fields else None
+    beside = followed or before
+    return Change(
+        codes.FIELD_REMOVED,
+        sides.subject(field.name),
+        f"field `{field.name}` was removed",
+        frozenset(levels),
+        span=_start_of(beside, sides),
+        old=field.name_span,
+        path=sides.path,
+        hint="keep it and say in its comment that it is no longer used",
+    )
+
+
+def _start_of(beside: ir.Field | None, sides: Sides) -> Span | None:
+    """Return a place in the new file for something that is no longer there."""
+    if beside is not None and beside.type_span is not None:
+        return beside.type_span
+    return Span(sides.new.source, 0, 0) if sides.new.source else None
+
+
+def _renamed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
+    return Change(
+        codes.FIELD_RENAMED,
+        sides.subject(old.name),
+        f"field `{old.name}` is called `{new.name}` now",
+        frozenset({"hash", "source"}),
+        span=new.name_span,
+        old=old.name_span,
+        path=sides.path,
+    )
+
+
+def _added(sides: Sides, pairing: Pairing[ir.Field], field: ir.Field) -> Change:
+    stayed = {id(new) for _, new in (*pairing.kept, *pairing.renamed)}
+    fields = sides.new.fields
+    behind = fields[next(at for at, one in enumerate(fields) if one is field) + 1 :]
+    levels: set[Level] = {"wire", "hash"}
+    if any(id(one) in stayed for one in behind):
+        levels.add("source")  # positional arguments and patterns mean other fields now
+    return Change(
+        codes.FIELD_ADDED,
+        sides.subject(field.name),
+        f"field `{field.name}` was added",
+        frozenset(levels),
+        span=field.name_span,
+        path=sides.path,
+        hint="a new message beside this one leaves robots in the field alone",
+    )
+
+
+def _moved(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
+    return Change(
+        codes.FIELD_MOVED,
+        sides.subject(new.name),
+        f"field `{new.name}` was moved",
+        frozenset({"wire", "hash", "source"}),
+        span=new.name_span,
+        old=old.name_span,
+        path=sides.path,
+        hint="put it back; the order of the fields is the order of the bytes",
+    )
+
+
+def _is_last(field: ir.Field, message: ir.Message) -> bool:
+    return field is message.fields[-1]
+
+
+def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
+    package = sides.new.name.package
+    levels: set[Level] = set()
+    at_end = _is_last(new, sides.new)
+    before, after = sides.before.messages, sides.after.messages
+    if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
+        levels.add("wire")
+    if _described(old) != _described(new):
+        levels.add("hash")
+    only_bounds = _without_bounds(old.type) == _without_bounds(new.type)
+    if not only_bounds or _container(old.type) != _container(new.type):
+        levels.add("source")
+    if _tighter(old.type, new.type):
+        levels.add("behaviour")
+    if _native(old.type) == _native(new.type):
+        levels -= {"source"}
+    return Change(
+        codes.FIELD_BOUND if only_bounds else codes.FIELD_TYPE,
+        sides.subject(new.name),
+        f"field `{new.name}` was `{spell(old.type, package)}` "
+        f"and is `{spell(new.type, package)}` now",
+        frozenset(levels),
+        span=new.type_span,
+        old=old.type_span,
+        path=sides.path,
+    )
+
+
+def _described(field: ir.Field) -> object:
+    """Return what the type hash sees of a field's type."""
+    message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
+    return individual(message)["fields"][0]["type"]
+
+
+def _without_bounds(type_: ir.FieldType) -> ir.FieldType:
+    match type_:
+        case ir.String():
+            return ir.String(type_.wide)
+        case ir.Sequence():
+            return ir.Sequence(_element_without_bounds(type_.element))
+        case ir.Array():
+            return ir.Array(_element_without_bounds(type_.element), 1)
+        case _:
+            return type_
+
+
+def _element_without_bounds(element: ir.Element) -> ir.Element:
+    return ir.String(element.wide) if isinstance(element, ir.String) else element
+
+
+def _container(type_: ir.FieldType) -> tuple[str, int | None]:
+    """Return what C++ has a type of its own for: sizes and bounds of arrays, not of strings."""
+    match type_:
+        case ir.Sequence():
+            return "sequence", type_.bound
+        case ir.Array():
+            return "array", type_.size
+        case _:
+            return "", None
+
+
+def _native(type_: ir.FieldType) -> object:
+    """Return a value that is equal for types that are one type in C++ and in Python."""
+    element = ir.element_of(type_)
+    if element == ir.Primitive("char"):
+        element = ir.Primitive("uint8")
+    return _container(type_), _element_without_bounds(element)
+
+
+def _tighter(old: ir.FieldType, new: ir.FieldType) -> bool:
+    """Tell whether text that was allowed is too long now."""
+    before, after = ir.element_of(old), ir.element_of(new)
+    if not isinstance(before, ir.String) or not isinstance(after, ir.String):
+        return False
+    return after.bound is not None and (before.bound is None or after.bound < before.bound)
+
+
+def _used_type(sides: Sides, old: ir.Field, new: ir.Field, target: str) -> Iterator[Change]:
+    levels: set[Level] = set()
+    if sides.before.describer.hash(target) != sides.after.describer.hash(target):
+        levels.add("hash")
+    before, after = sides.before.messages, sides.after.messages
+    at_end = _is_last(new, sides.new)
+    if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
+        levels.add("wire")
+    if levels:
+        yield Change(
+            codes.USED_TYPE,
+            sides.subject(new.name),
+            f"`{target}`, the type of field `{new.name}`, changed",
+            frozenset(levels),
+            span=new.type_span,
+            path=sides.path,
+            cause=target,
+        )
+
+
+def _default(field: ir.Field) -> str | None:
+    return None if field.default is None else repr(field.default.value)
+
+
+def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
+    levels: set[Level] = {"behaviour"}
+    if old.default is None:
+        what = f"field `{new.name}` has a default value now"
+    elif new.default is None:
+        what = f"field `{new.name}` lost its default value, {spell_value(old.default.value)}"
+        levels.add("source")
+    else:
+        what = (
+            f"the default of `{new.name}` was {spell_value(old.default.value)} "
+            f"and is {spell_value(new.default.value)} now"
+        )
+    return Change(
+        codes.FIELD_DEFAULT,
+        sides.subject(new.name),
+        what,
+        frozenset(levels),
+        span=new.default_span or new.name_span,
+        old=old.default_span,
+        path=sides.path,
+    )
+
+
+def _unit(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
+    return Change(
+        codes.UNIT_CHANGED,
+        sides.subject(new.name),
+        f"the unit of `{new.name}` was [{old.unit}] and is [{new.unit}] now",
+        frozenset({"behaviour"}),
+        span=new.name_span,
+        old=old.name_span,
+        path=sides.path,
+        hint="give the field another name, so that nobody uses the old unit by mistake",
+    )

@@ -1,0 +1,142 @@
+"""Two versions of a package → everything that changed between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from idlc.model import derive, ir
+from idlc.model.changes.change import LEVELS, Change
+from idlc.model.changes.constants import added, constant_changes
+from idlc.model.changes.fields import Sides, field_changes
+from idlc.model.link import Model
+from idlc.model.meaning import meaning
+from idlc.text import codes
+from idlc.text.suggest import edit_distance
+
+
+class Comparison(NamedTuple):
+    """What breaks something, and how many things were added that break nothing.
+
+    `differs` is whether anything at all is different, comments included.
+    """
+
+    changes: tuple[Change, ...]
+    additions: int = 0
+    differs: bool = False
+
+
+def together(comparisons: Iterable[Comparison]) -> Comparison:
+    """Return the comparisons of several packages as one."""
+    found = list(comparisons)
+    return Comparison(
+        tuple(change for one in found for change in one.changes),
+        sum(one.additions for one in found),
+        any(one.differs for one in found),
+    )
+
+
+def compare(before: Model, after: Model) -> Comparison:
+    """Return what changed in a package's own interfaces; both models must be free of errors."""
+    old = {interface.name: interface for interface in before.own}
+    new = {interface.name: interface for interface in after.own}
+    gone = [interface for name, interface in old.items() if name not in new]
+    come = [interface for name, interface in new.items() if name not in old]
+    renamed = dict(_renamed(gone, come))
+    changes = [_removed(one) for one in gone if one.name not in renamed]
+    changes += [_called(one, renamed[one.name]) for one in gone if one.name in renamed]
+    additions = len(come) - len(renamed)
+    differs = bool(gone or come)
+    for name in sorted(old.keys() & new.keys()):
+        differs = differs or meaning(old[name]) != meaning(new[name])
+        for sides in _sides(old[name], new[name], before, after):
+            changes += [*field_changes(sides), *constant_changes(sides)]
+            additions += added(sides)
+    return Comparison(tuple(changes), additions, differs or bool(changes))
+
+
+def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
+    for one, other in zip(derive.sections(old), derive.sections(new), strict=True):
+        yield Sides(one, other, before, after)
+
+
+def removed_package(before: Model) -> Comparison:
+    """Return the changes when a package is no longer there."""
+    return Comparison(tuple(map(_removed, before.own)), 0, bool(before.own))
+
+
+def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
+    """Return what changed since type hashes were recorded; nothing else is known of before."""
+    changes = []
+    sources = {str(own.name): own.source for own in after.own}
+    for name in sorted(recorded):
+        kind = name.split("/")[1]
+        if kind != "msg" and any(name.startswith(f"{own}_") for own in recorded):
+            continue  # follows from the interface that it is derived from
+        if name not in sources:
+            levels = frozenset(LEVELS[:3])
+            message = f"{_what(kind)} `{name}` was removed"
+            changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
+        elif recorded[name] != after.describer.hash(name):
+            source = sources[name]
+            changes.append(
+                Change(
+                    codes.HASH_CHANGED,
+                    name,
+                    f"the type hash of `{name}` changed",
+                    frozenset({"hash"}),
+                    path=source.path if source else name,
+                    hint="compare with a folder or a git revision to see what did it",
+                )
+            )
+    come = sum(name not in recorded for name in sources)
+    return Comparison(tuple(changes), come, bool(changes or come))
+
+
+def _what(kind: str) -> str:
+    return {"msg": "message", "srv": "service"}.get(kind, kind)
+
+
+def _path(interface: ir.Interface) -> str:
+    return interface.source.path if interface.source else str(interface.name)
+
+
+def _removed(interface: ir.Interface) -> Change:
+    return Change(
+        codes.INTERFACE_REMOVED,
+        str(interface.name),
+        f"{_what(interface.name.kind)} `{interface.name}` was removed",
+        frozenset(LEVELS[:3]),
+        path=_path(interface),
+    )
+
+
+def _called(old: ir.Interface, new: ir.Interface) -> Change:
+    return Change(
+        codes.INTERFACE_RENAMED,
+        str(old.name),
+        f"{_what(old.name.kind)} `{old.name}` is called `{new.name}` now",
+        frozenset({"hash", "source"}),
+        path=_path(new),
+    )
+
+
+def _renamed(
+    gone: list[ir.Interface], come: list[ir.Interface]
+) -> Iterator[tuple[ir.TypeName, ir.Interface]]:
+    """Yield each interface that disappeared with the one of the same content that appeared."""
+    left = list(come)
+    for old in gone:
+        alike = [new for new in left if _shape(new) == _shape(old) and _shape(old)[1]]
+        if alike:
+            best = min(alike, key=lambda new: edit_distance(old.name.name, new.name.name))
+            left.remove(best)
+            yield old.name, best
+
+
+def _shape(interface: ir.Interface) -> tuple[ir.Kind, tuple[tuple[str, ir.FieldType], ...]]:
+    return interface.name.kind, tuple(
+        (f"{number}.{field.name}", field.type)
+        for number, section in enumerate(derive.sections(interface))
+        for field in section.fields
+    )

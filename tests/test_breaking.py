@@ -1,0 +1,183 @@
+"""`idlc breaking`: what it compares with, and how changes are told apart."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+from evolution import compile_texts
+
+from idlc.cli.main import main
+from idlc.model.changes.packages import Comparison, compare
+from idlc.model.changes.version import part_to_raise, raised
+
+
+def found(old, new):
+    """Codes, subjects without package and levels of what changed in A.msg (and B and C)."""
+    texts = [side if isinstance(side, dict) else {"A": side} for side in (old, new)]
+    changes = compare(*(compile_texts({"B": "", "C": "", **text}) for text in texts)).changes
+    return {
+        (change.code.id, change.subject.removeprefix("p/msg/"), " ".join(sorted(change.levels)))
+        for change in changes
+    }
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("int8 a\n", "int8 a\n", set()),
+        ("int8 a\n", "# c\n\nint8   a  # x\n", set()),
+        # what stands at the end is not missed by whoever reads old bytes
+        ("int8 a\nint8 b\n", "int8 a\n", {("IDL503", "A.b", "hash source")}),
+        ("int8 a\n", "", {("IDL503", "A.a", "hash source")}),
+        ("", "int8 a\n", {("IDL505", "A.a", "hash")}),
+        ("", "int16 a\n", {("IDL505", "A.a", "hash wire")}),
+        # two changes that make up for each other
+        (
+            "int32 a\nint32 b\n",
+            "int32 c\nint32 b\n",
+            {("IDL504", "A.a", "hash source")},
+        ),
+        ("B b\n", "C b\n", {("IDL507", "A.b", "hash source")}),
+        ("char a\n", "uint8 a\n", set()),
+        ("byte a\n", "uint8 a\n", {("IDL507", "A.a", "hash source")}),
+        ("bool a\n", "uint8 a\n", {("IDL507", "A.a", "hash source")}),
+        ("uint8 a\n", "bool a\n", {("IDL507", "A.a", "hash source wire")}),
+        ("string<=9 a\n", "string a\n", {("IDL508", "A.a", "hash")}),
+        ("string a\n", "string<=9 a\n", {("IDL508", "A.a", "behaviour hash")}),
+        ("int8[] a\n", "int8[<=9] a\n", {("IDL508", "A.a", "hash source wire")}),
+        ("int8[<=3] a\n", "int8[<=9] a\n", {("IDL508", "A.a", "hash source")}),
+        ("int8[3] a\n", "int8[2] a\n", {("IDL508", "A.a", "hash source")}),
+        ("int8[3] a\nint8 b\n", "int8[2] a\nint8 b\n", {("IDL508", "A.a", "hash source wire")}),
+        ("int8[3] a\n", "int8[<=3] a\n", {("IDL507", "A.a", "hash source wire")}),
+        ("int8 a 1\n", "int8 a\n", {("IDL509", "A.a", "behaviour source")}),
+        ("int8 a\n", "int8 a 1\n", {("IDL509", "A.a", "behaviour")}),
+        ("int8 A=1\n", "int8 B=1\n", {("IDL511", "A.A", "source")}),
+        ("int8 A=1\n", "int8 B=2\n", {("IDL510", "A.A", "source")}),
+        ("char A=1\n", "uint8 A=1\n", set()),
+        ("float64 A=1\n", "float64 A=1.0\n", set()),
+        ("bool A=1\n", "bool A=true\n", set()),
+        ("int8 A=1\nint8 B=2\n", "int8 B=2\nint8 A=1\n", set()),
+        (
+            {"A": "B b\nint8 c\n", "B": "int8 x\nint8 y\n"},
+            {"A": "B b\nint8 c\n", "B": "int8 x\n"},
+            {("IDL503", "B.y", "hash source"), ("IDL515", "A.b", "hash wire")},
+        ),
+        # removed from the padding before a larger value: nothing moves
+        ("int8 a\nint8 b\nint32 c\n", "int8 a\nint32 c\n", {("IDL503", "A.b", "hash source")}),
+    ],
+)
+def test_changes(old, new, expected):
+    assert found(old, new) == expected
+
+
+def test_several_fields_removed_in_one_place_are_several_findings(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write("old/msg/A.msg", "int8 a\nint8 b\nint8 c\n")
+    write("new/msg/A.msg", "int8 c\n")
+    assert main(["breaking", "new", "--against", "old"]) == 1
+    assert capsys.readouterr().out.count("error[IDL503]") == 2
+
+
+def test_large_arrays_take_no_longer_than_small_ones():
+    old, new = ("B[1000000] b\nuint8[16000000] c\n", "B[1000000] b\nuint8[16000000] d\n")
+    texts = {"B": "int8 a\nint32 b\n"}
+    expected = {("IDL504", "A.c", "hash source")}
+    assert found({**texts, "A": old}, {**texts, "A": new}) == expected
+    texts["C"] = "B[5000000] b\n"
+    broken = {**texts, "B": "int32 a\nint8 b\n"}
+    assert ("IDL515", "C.b", "hash wire") in found(texts, broken)
+
+
+@pytest.mark.parametrize(
+    ("version", "part", "expected"),
+    [
+        ("1.2.3", "major", "2.0.0"),
+        ("1.2.3", "minor", "1.3.0"),
+        ("1.2.3", "patch", "1.2.4"),
+        ("0.2.3", "major", "0.3.0"),
+        ("0.2.3", "minor", "0.3.0"),
+        ("1.2", "major", None),
+    ],
+)
+def test_the_next_version(version, part, expected):
+    assert raised(version, part) == expected
+
+
+def test_the_part_to_raise():
+    assert part_to_raise(Comparison(())) is None
+    assert part_to_raise(Comparison((), 0, differs=True)) == "patch"
+    assert part_to_raise(Comparison((), 1, differs=True)) == "minor"
+
+
+def write(path, text):
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    Path(path).write_text(text, encoding="utf-8")
+
+
+def git(*words):
+    who = ["-c", "user.name=me", "-c", "user.email=me@example.org"]
+    command = ["git", *who, *words]
+    return subprocess.run(command, check=True, capture_output=True).stdout
+
+
+@pytest.fixture
+def repository(tmp_path, monkeypatch):
+    """Two packages in a workspace, the second using the first, both committed and tagged."""
+    monkeypatch.chdir(tmp_path)
+    write("src/base/package.xml", "<package><name>base</name><version>0.3.0</version></package>")
+    write("src/base/msg/Base.msg", "int32 x\n")
+    write("src/top/package.xml", "<package><name>top</name></package>")
+    write("src/top/msg/Top.msg", "base/Base base\nNear near\n")
+    write("src/top/msg/Near.msg", "int32 x\n")
+    git("init", "-q", "-b", "main")
+    git("add", ".")
+    git("commit", "-q", "-m", "first")
+    git("tag", "v1")
+    return tmp_path
+
+
+def run(capsys, *words):
+    status = main(["breaking", *words, "--format", "json"])
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    return status, [(line["code"], line["path"]) for line in lines if "code" in line]
+
+
+@pytest.mark.usefixtures("repository")
+def test_a_git_revision_is_compared_and_nothing_in_the_repository_touched(capsys):
+    assert run(capsys, "src", "--against", "git:v1") == (0, [])
+    assert git("status", "--short") == b""
+    write("src/base/msg/Base.msg", "int64 x\n")
+    expected = [("IDL507", "src/base/msg/Base.msg"), ("IDL515", "src/top/msg/Top.msg")]
+    assert run(capsys, "src", "--against", "git:HEAD") == (1, expected)
+    assert run(capsys, "src/base", "--against", "git:HEAD") == (1, expected[:1])
+
+
+@pytest.mark.usefixtures("repository")
+def test_a_package_that_the_revision_does_not_have_is_new(capsys):
+    write("src/young/msg/A.msg", "int32 x\n")
+    assert run(capsys, "src/young", "--against", "git:v1") == (0, [])
+
+
+def test_what_was_removed_is_found_in_the_revision(repository, capsys):
+    (repository / "src/top/msg/Top.msg").unlink()
+    assert run(capsys, "src", "--against", "git:v1") == (
+        1,
+        [("IDL501", "git:v1:src/top/msg/Top.msg")],
+    )
+
+
+@pytest.mark.usefixtures("repository")
+@pytest.mark.parametrize("name", ["nothing", "-h", "--output=x", "v1:src", ""])
+def test_a_revision_that_there_is_not(capsys, name):
+    assert run(capsys, "src", "--against", f"git:{name}") == (2, [("IDL630", "src")])
+
+
+@pytest.mark.usefixtures("repository")
+def test_the_level_decides_what_counts(capsys):
+    write("src/top/msg/Near.msg", "int32 y\n")
+    assert run(capsys, "src", "--against", "git:v1", "--level", "wire") == (0, [])
+    assert run(capsys, "src", "--against", "git:v1", "--level", "source") == (
+        1,
+        [("IDL504", "src/top/msg/Near.msg")],
+    )
