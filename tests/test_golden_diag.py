@@ -62,7 +62,9 @@ def tried(tmp_path, monkeypatch, capsys):
     def run(code: str, title: str) -> str:
         files, commands = parts(code, title)
         folder = tmp_path / title / "demo"
-        for path, text in {".git/HEAD": "", **files}.items():
+        # an empty repository ends the search for settings, unless the example makes a real one
+        ends = {} if any(line.startswith("git") for line in commands) else {".git/HEAD": ""}
+        for path, text in {**ends, **files}.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_text(text, encoding="utf-8")
         monkeypatch.chdir(folder)
