@@ -23,7 +23,9 @@ def known_texts() -> dict[str, list[str]]:
     texts: dict[str, list[str]] = {"msg": [], "srv": [], "action": []}
     for line in GOLDEN.read_text(encoding="utf-8").splitlines():
         case = json.loads(line)
-        if case["build_verdict"] == "accept" and "text" in case:
+        # rosidl's pattern for constants takes for ever on a long name once it is mutated
+        slow = "A" * 20 in case.get("text", "")
+        if case["build_verdict"] == "accept" and "text" in case and not slow:
             texts[case["kind"]].append(case["text"])
     return texts
 
