@@ -216,7 +216,9 @@ def call_service(peer, name, finish):
         if len(event.request) + len(event.response) != 1 or len(event.info.client_gid) != 16:
             peer.complain(name, f"the event {event}")
     for suffix, trees in (("_Request", requests), ("_Response", responses)):
-        found = sorted(json.dumps(Values(peer.shapes).plain(name + suffix, m)) for m in told[suffix])
+        found = sorted(
+            json.dumps(Values(peer.shapes).plain(name + suffix, m)) for m in told[suffix]
+        )
         if found != sorted(json.dumps(tree) for tree in trees * 2):
             peer.complain(name + suffix, "the events tell something else")
 

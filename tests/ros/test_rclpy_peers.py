@@ -9,8 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from generated import HERE, SHARE, generate
-from test_wire_agreement import interfaces, names_in
+from installed import HERE, SHARE, generate, interfaces, interfaces_in, names_in
 
 STANDARD = ("diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs")
 PACKAGES = (*STANDARD, "test_msgs")
@@ -19,7 +18,6 @@ OURS = {
     "every_kind": HERE / "every_kind",
     "my_robot_controller": HERE.parents[1] / "examples" / "my_robot_controller",
 }
-TIMEOUT = 240
 
 
 @pytest.fixture(scope="module")
@@ -95,16 +93,8 @@ def talk(ros_environment, tmp_path, path_of):
 @pytest.fixture(scope="module")
 def shapes(path_of, ros_environment):
     """Return the shape of every message, and the names of messages of idlc's own packages."""
-    ours = {
-        name: {
-            (kind, path.stem)
-            for kind in ("msg", "srv", "action")
-            for path in files.glob(f"{kind}/*.{kind}")
-        }
-        for name, files in OURS.items()
-    }
-    own_names = sorted(names_in(*ours, found=ours))
-    names = [*names_in(*interfaces()), *own_names]
+    own_names = names_in(OURS, interfaces_in(OURS.values()))
+    names = [*names_in(interfaces(), interfaces()), *own_names]
     done = subprocess.run(
         [sys.executable, str(HERE / "shapes.py"), *names],
         env={**ros_environment, "PYTHONPATH": path_of(*OURS)},
@@ -118,7 +108,7 @@ def shapes(path_of, ros_environment):
 @pytest.mark.parametrize("packages", [PACKAGES, ("nav_msgs", "test_msgs")], ids=["all", "mixed"])
 def test_messages_both_ways_with_rosidl(packages, talk, shapes):
     """Every message arrives, with the same type name and hash in the graph."""
-    names = names_in(*packages)
+    names = names_in(packages, interfaces())
     talk(names, shapes[0], ("messages", "messages"), packages, ())
 
 
@@ -127,18 +117,19 @@ def test_messages_of_own_packages(talk, shapes):
     talk(own_names, every, ("messages", "messages"), OURS, (*OURS, *STANDARD))
 
 
-def entities(kinds, packages):
+def entities(packages, found):
+    """Return the full names of services and actions."""
     return [
         f"{package}/{kind}/{name}"
         for package in packages
-        for kind, name in sorted(interfaces()[package])
-        if kind in kinds
+        for kind, name in found[package]
+        if kind != "msg"
     ]
 
 
 @pytest.mark.parametrize("direction", ["idlc serves", "rosidl serves"])
 def test_services_and_actions_with_rosidl(direction, talk, shapes):
-    names = entities(("srv", "action"), ("nav_msgs", "std_srvs", "test_msgs"))
+    names = entities(("nav_msgs", "std_srvs", "test_msgs"), interfaces())
     sides = [PACKAGES, ()]
     if direction == "rosidl serves":
         sides.reverse()
@@ -146,10 +137,5 @@ def test_services_and_actions_with_rosidl(direction, talk, shapes):
 
 
 def test_services_and_actions_of_own_packages(talk, shapes):
-    names = [
-        f"{package}/{kind}/{path.stem}"
-        for package, files in OURS.items()
-        for kind in ("srv", "action")
-        for path in sorted(files.glob(f"{kind}/*.{kind}"))
-    ]
+    names = entities(OURS, interfaces_in(OURS.values()))
     talk(names, shapes[0], ("serve", "call"), OURS, (*OURS, *STANDARD))
