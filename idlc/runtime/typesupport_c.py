@@ -1,9 +1,9 @@
-"""The C side of type support: structures, capsules, and callbacks that are safe to give to C.
+"""The C side of type support: structures, capsules, and callbacks that C may call.
 
-Everything given to C must live as long as the process, so it is handed to `keep`. An exception
-that leaves a ctypes callback leaves the result *uninitialised*, so callbacks whose result is a
-pointer are built from C callables only (`constant`, `resolver`): no bytecode runs in them, hence
-no signal handler either.
+Everything given to C must live as long as the process, so it is handed to `keep`. An
+exception that leaves a ctypes callback leaves the result *uninitialised*, so callbacks
+whose result is a pointer are built from C callables only (`constant`, `resolver`): no
+bytecode runs in them, hence no signal handler either.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ T = TypeVar("T")
 _AT_START, _IN_YIELD_FROM = 0, 2
 
 _FOREVER: list[object] = []
-# The module is torn down before the last C callback may come, so the list outlives its name.
+# The module is torn down before the last C callback may come, so the list outlives its
+# name.
 ctypes.pythonapi.Py_IncRef(py_object(_FOREVER))
 
 
@@ -172,10 +173,10 @@ def constant(pointer: int) -> int:
 
 
 def resolver(answers: dict[bytes, int]) -> int:
-    """Return the C function `f(handle, identifier)` that looks `identifier` up, else NULL.
+    """Return the C function `f(handle, identifier)` that gives an answer, else NULL.
 
-    A class attribute that is not a descriptor is called without `self`: the handle becomes an
-    object whose `[identifier]` is `answers.get(identifier)`, all of it in C.
+    A class attribute that is not a descriptor is called without `self`: the handle
+    becomes an object whose `[identifier]` is `answers.get(identifier)`, all of it in C.
     """
     handle = keep(type("Handle", (c_void_p,), {"__getitem__": answers.get}))
     prototype = ctypes.PYFUNCTYPE(c_void_p, handle, c_char_p)
@@ -192,7 +193,8 @@ _capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
 #: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C.
 MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")
 WORDS = MEMORY.cast("Q")
-#: Where the content of a `bytes` object begins, from its `id`; a terminating zero follows it.
+#: Where the content of a `bytes` object begins, from its `id`; a terminating zero
+#: follows it.
 BYTES_OFFSET = bytes.__basicsize__ - 1
 
 
@@ -209,10 +211,11 @@ def capsule_pointer(value: object) -> int:
 def _c_true() -> object:
     """Return an object that C code takes for `true` where it expects a `bool`.
 
-    A function of Python's C interface that stands in for a `bool` function returns a pointer,
-    and the caller looks at its low byte, or (clang, aarch64) at the lowest bit only. So the
-    object is put at an address that ends in 01; nothing ever frees it. Python 3.14 needs the
-    lowest bit for itself: there the low byte is just not zero, which x86-64's gcc accepts.
+    A function of Python's C interface that stands in for a `bool` function returns a
+    pointer, and the caller looks at its low byte, or (clang, aarch64) at the lowest bit
+    only. So the object is put at an address that ends in 01; nothing ever frees it.
+    Python 3.14 needs the lowest bit for itself: there the low byte is just not zero,
+    which x86-64's gcc accepts.
     """
     if sys.version_info >= (3, 14):
         return next(number for number in range(256) if id(number) & 0xFF)
@@ -242,10 +245,11 @@ class MessageSupport(NamedTuple):
 def callback(prototype: Any, function: Callable[..., object]) -> int:
     """Return the C function that calls `function`, which must catch every exception.
 
-    Signal handlers run on entry of a Python function, before its first `try`, and what they
-    raise would be lost with the result. The interpreter does not look for signals where a
-    function resumes inside a `yield from`, so the function is told that it does. (Python 3.10
-    has no such instruction; it does not look before a leading `try` either.)
+    Signal handlers run on entry of a Python function, before its first `try`, and what
+    they raise would be lost with the result. The interpreter does not look for signals
+    where a function resumes inside a `yield from`, so the function is told that it
+    does. (Python 3.10 has no such instruction; it does not look before a leading `try`
+    either.)
     """
     assert isinstance(function, FunctionType)
     code = function.__code__
@@ -267,7 +271,8 @@ def callback(prototype: Any, function: Callable[..., object]) -> int:
 def interrupted(error: BaseException) -> bool:
     """Return whether a callback should try again because only a signal came in between.
 
-    The signal is sent once more, by another thread: soon, but not before C code is left.
+    The signal is sent once more, by another thread: soon, but not before C code is
+    left.
     """
     if isinstance(error, Exception):
         return False

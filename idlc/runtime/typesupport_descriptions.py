@@ -1,7 +1,7 @@
 """What ROS 2 is told about a type: its hash, its description and its source text.
 
-The facts are in `types.json` beside this module, written with the package and read only when
-rclpy asks for type support:
+The facts are in `types.json` beside this module, written with the package and read only
+when rclpy asks for type support:
 
     {"package": "pkg",
      "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
@@ -9,17 +9,21 @@ rclpy asks for type support:
      "sources": {"pkg/msg/Name": "text of the interface file"}}
 
 `descriptions` and `hashes` hold every structure of the package, derived ones and the
-pseudo-structures of services and actions included, and all that these refer to; `sources` holds
-the files among them. A type id is a base plus 48 for a fixed array, 96 for a bounded, 144 for an
-unbounded sequence (rosidl's `type_description_interfaces/msg/FieldType`).
+pseudo-structures of services and actions included, and all that these refer to;
+`sources` holds the files among them. A type id is a base plus 48 for a fixed array, 96
+for a bounded, 144 for an unbounded sequence (rosidl's
+`type_description_interfaces/msg/FieldType`).
 """
 
 from __future__ import annotations
 
 import ctypes
 import json
+import os
 import pkgutil
+import sys
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 from . import typesupport_c as c
@@ -100,8 +104,21 @@ def _individual(name: str) -> c.IndividualDescription:
     return c.IndividualDescription(c.string(name), c.sequence(fields, c.Field))
 
 
+def _installed_text(name: str) -> str | None:
+    """Return another package's interface file, where ROS 2 has installed it."""
+    package, kind, short = name.split("/")
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    for prefix in filter(None, [*prefixes, sys.prefix]):
+        path = Path(prefix, "share", package, kind, f"{short}.{kind}")
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    return None
+
+
 def _source(name: str) -> c.Source:
-    text = load().sources.get(name)
+    """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
+    own = name.startswith(f"{load().package}/")
+    text = load().sources.get(name) if own else _installed_text(name)
     encoding = "implicit" if text is None else name.split("/")[1]
     return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
 

@@ -1,9 +1,10 @@
 """Access to Fast CDR's `Cdr` objects, whose layout is found out and never assumed.
 
-Reading and writing go through three pointers inside `Cdr`: where the next byte is, where the
-message began, and where the buffer ends. Each is the second word of a pair whose first word is
-the start of the buffer. `fast_cdr` makes a `Cdr` of its own and looks for these pairs; where it
-does not find them, it raises ImportError instead of touching anybody's memory.
+Reading and writing go through three pointers inside `Cdr`: where the next byte is,
+where the message began, and where the buffer ends. Each is the second word of a pair
+whose first word is the start of the buffer. `fast_cdr` makes a `Cdr` of its own and
+looks for these pairs; where it does not find them, it raises ImportError instead of
+touching anybody's memory.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The opaque road: rmw_fastrtps_cpp and others that use its type support.
 
-The middleware never looks into message memory here, so it is a `Memory`: the codec's bytes on the
-way out, the decoded object on the way in. Convert and destroy are functions of Python's own C
-interface, hence an exception reaches the caller of `publish` untouched.
+The middleware never looks into message memory here, so it is a `Memory`: the codec's
+bytes on the way out, the decoded object on the way in. Convert and destroy are
+functions of Python's own C interface, hence an exception reaches the caller of
+`publish` untouched.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
 #: The encapsulation header, which the middleware reads and writes itself.
 _HEADER = 4
-#: Received messages up to this size are copied into `bytes`, which decode faster than views.
+#: Received messages up to this size are copied into `bytes`, which decode faster than
+#: views.
 _SMALL = 4096
 #: Arrays with this many elements are not copied on their way to the middleware.
 _LARGE = 16384
@@ -34,8 +36,8 @@ _LARGE = 16384
 class Memory:
     """Message memory: `message @ memory` encodes into it, `+memory` is the message.
 
-    `__len__` is the encoded size. It is a slot that holds a function, so that no bytecode
-    runs where C asks for the size: an interrupt there could not be told.
+    `__len__` is the encoded size. It is a slot that holds a function, so that no
+    bytecode runs where C asks for the size: an interrupt there could not be told.
     """
 
     __slots__ = ("body", "length", "message", "rest")

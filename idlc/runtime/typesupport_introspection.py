@@ -1,7 +1,8 @@
 """Introspection members: field names, types and C offsets, as a middleware walks them.
 
-Both roads need them. Fast DDS describes types to its peers from them and never looks at the
-memory; introspection-based middlewares read and write the memory that they describe.
+Both roads need them. Fast DDS describes types to its peers from them and never looks at
+the memory; introspection-based middlewares read and write the memory that they
+describe.
 """
 
 from __future__ import annotations
@@ -97,7 +98,8 @@ def library() -> Library:
     """Return addresses in the libraries that define what introspection is.
 
     The identifier is rosidl's own string, because middlewares compare the pointers.
-    `same_handle` and `same_service` answer with the handle itself if the identifier fits.
+    `same_handle` and `same_service` answer with the handle itself if the identifier
+    fits.
     """
     introspection = load_library(f"lib{IDENTIFIER}.so")
     runtime = load_library("librosidl_runtime_c.so")

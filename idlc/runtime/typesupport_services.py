@@ -1,6 +1,7 @@
 """Type support of services and actions, and the events of service introspection.
 
-Both are made of the type support of their messages, so nothing here depends on the road.
+Both are made of the type support of their messages, so nothing here depends on the
+road.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def _message_at(memory: int | None) -> list[object]:
 
 
 def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
-    """Return how rcl makes and frees event messages; `cls` is the service's Event class.
+    """Return how rcl makes and frees messages of a service's Event class.
 
     Both functions are needed as soon as there is a handle: rcl calls them without a look.
     """

@@ -1,8 +1,9 @@
 """The introspection road: rmw_cyclonedds_cpp and others that walk over C structures.
 
-Message memory is a `bytes` object in which the C structure lies. The middleware is given the
-object itself, with a member table whose offsets are shifted to where the content of `bytes`
-begins. So convert and destroy are functions of Python's own C interface, as on the other road.
+Message memory is a `bytes` object in which the C structure lies. The middleware is
+given the object itself, with a member table whose offsets are shifted to where the
+content of `bytes` begins. So convert and destroy are functions of Python's own C
+interface, as on the other road.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """CDR bytes to C structures and back, by type description alone.
 
 The generated codec checks and encodes a message; here its bytes are moved into the
-structure that rosidl's C generator would make for the type, and the other way. Byte order
-is the machine's. Both sides align numbers to their size, so most of a message moves in a
-few large runs. What is allocated comes from rosidl_runtime_c, whose allocator the
-middleware uses as well.
+structure that rosidl's C generator would make for the type, and the other way. Byte
+order is the machine's. Both sides align numbers to their size, so most of a message
+moves in a few large runs. What is allocated comes from rosidl_runtime_c, whose
+allocator the middleware uses as well.
 """
 
 from __future__ import annotations
@@ -175,7 +175,8 @@ class Many:
         self.steps, self.offset, self.stride = steps, offset, stride
         only = steps[0] if len(steps) == 1 else None
         gapless = isinstance(only, Run) and only.size == stride
-        #: Alignment of the numbers, if the elements are nothing but numbers without gaps.
+        #: Alignment of the numbers, if the elements are nothing but numbers without
+        #: gaps.
         self.align = only.align if isinstance(only, Run) and gapless else 0
 
     def content(self, count: int) -> Step:

@@ -44,6 +44,12 @@ def class_of(package, kind, name):
     return getattr(module, name)
 
 
+def attribute(cls, field):
+    """Return a field's name in Python: idlc puts an underscore behind keywords."""
+    clash = field + "_"
+    return clash if hasattr(cls, clash) else field
+
+
 def _element(type_):
     from rosidl_parser import definition as idl
 
@@ -82,7 +88,9 @@ class Values:
     def build(self, name, tree):
         cls = class_of(*name.split("/"))
         fields = self.shapes[name].items()
-        return cls(**{field: self._build(shape, tree[field]) for field, shape in fields})
+        return cls(
+            **{attribute(cls, field): self._build(shape, tree[field]) for field, shape in fields}
+        )
 
     def _build(self, shape, tree):
         container, _, element = shape
@@ -100,7 +108,7 @@ class Values:
     # object -> plain tree
     def plain(self, name, message):
         return {
-            field: self._plain(shape, getattr(message, field))
+            field: self._plain(shape, getattr(message, attribute(type(message), field)))
             for field, shape in self.shapes[name].items()
         }
 
