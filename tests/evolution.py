@@ -99,13 +99,13 @@ class Evolution:
         }
 
 
-def compile_texts(texts):
+def compile_texts(texts, package="p"):
     report = Report()
     own = [
-        lower(parse(Source(f"{name}.msg", text)), ir.TypeName("p", "msg", name), report)
+        lower(parse(Source(f"{name}.msg", text)), ir.TypeName(package, "msg", name), report)
         for name, text in texts.items()
     ]
-    model = link("p", own, catalog, report)
+    model = link(package, own, catalog, report)
     assert not report.had_errors, (texts, list(report))
     return model
 
