@@ -75,7 +75,7 @@ def maker(kind: type) -> Callable[[], Any]:
         return partial(object.__new__, kind)
 
     def make() -> Any:
-        made = object.__new__(kind)
+        made: Any = object.__new__(kind)
         made._check_fields = False
         return made
 
