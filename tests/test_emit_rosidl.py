@@ -26,9 +26,7 @@ def test_a_class_looks_as_rosidls(standard, fact):
     assert cls.get_fields_and_field_types() == fact["fields_and_field_types"]
     assert [*cls.__slots__, "_check_fields"] == fact["slots"]
     assert repr(message) == fact["default_repr"]
-    for slot, (name, kind) in zip(
-        cls.__slots__, fact["default_python_types"].items(), strict=True
-    ):
+    for slot, (name, kind) in zip(cls.__slots__, fact["default_python_types"].items(), strict=True):
         assert python_type(getattr(message, slot)) == kind, name
 
 
@@ -70,7 +68,9 @@ def test_defaults_and_constants_are_rosidls(standard, fact):
         assert plain(getattr(message, name)) == value
         if isinstance(value, list):
             assert getattr(cls, name) is not found
-    assert not [n for n in dir(cls) if n.endswith("__DEFAULT") and n not in fact["default_constants"]]
+    assert not [
+        n for n in dir(cls) if n.endswith("__DEFAULT") and n not in fact["default_constants"]
+    ]
 
 
 @EACH
