@@ -1,0 +1,166 @@
+"""Buffers that somebody else made: a value or DecodeError, in memory bounded by the buffer."""
+
+import random
+import tracemalloc
+
+import generated
+import pytest
+import values
+
+from idlc.model import catalog, derive
+from idlc.model.link import link
+from idlc.model.lower import lower
+from idlc.syntax.parse import parse
+from idlc.text.diagnostics import Report
+
+INTERFACES = catalog.interfaces()
+#: Mutations of each structure; raise it for a longer search.
+BUDGET = 40
+HUGE = [b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\xff\xff\0\0", b"\0\0\0\1"]
+#: Bytes of memory that one byte of a buffer may cost: an object for each byte.
+PER_BYTE = 400
+BULKY = [
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "sensor_msgs/msg/PointCloud2",
+    "nav_msgs/msg/Path",
+    "idlc_fixtures/msg/Sequences",
+    "idlc_fixtures/msg/WithDeps",
+]
+
+
+def structures(name):
+    report = Report()
+    own = lower(parse(catalog.source(name)), name, report)
+    link(name.package, [own], catalog, report)
+    return [str(message.name) for message in derive.messages(own)]
+
+
+def mutated(raw, rng):
+    raw = bytearray(raw)
+    for _ in range(rng.choice([1, 1, 2, 5])):
+        kind = rng.randrange(4)
+        at = rng.randrange(4, len(raw)) if len(raw) > 4 else 0
+        if kind == 0 and raw:
+            raw[at] = rng.randrange(256)
+        elif kind == 1:
+            del raw[at:]
+        elif kind == 2:
+            at -= at % 4
+            raw[at : at + 4] = rng.choice(HUGE)
+        else:
+            raw[at:at] = bytes(rng.randrange(256) for _ in range(rng.randrange(1, 9)))
+    return bytes(raw)
+
+
+@pytest.mark.parametrize("name", INTERFACES, ids=str)
+def test_mutated_buffers_end_in_a_value_or_in_decode_error(standard, name):
+    rng = random.Random(str(name))
+    for full_name in structures(name):
+        cls = generated.class_of(full_name)
+        message = values.randomized(cls(), rng)
+        error = __import__(f"{name.package}._idlc")._idlc.DecodeError
+        for order in ("little", "big"):
+            raw = message.serialize(byteorder=order)
+            for _ in range(BUDGET // 2):
+                buffer = mutated(raw, rng)
+                try:
+                    found = cls.deserialize(buffer)
+                except error as caught:
+                    assert 0 <= caught.offset <= len(buffer) + 16
+                    assert str(caught.offset) in str(caught)
+                else:
+                    assert type(found) is cls
+
+
+def test_memory_is_bounded_by_the_buffer(standard):
+    rng = random.Random(1)
+    for name in BULKY:
+        cls = generated.class_of(name)
+        raw = values.randomized(cls(), rng).serialize()
+        with pytest.raises(ValueError, match="left"):  # loads what explains an error
+            cls.deserialize(raw[:6])
+        for _ in range(300):
+            buffer = mutated(raw, rng)
+            tracemalloc.start()
+            try:
+                cls.deserialize(buffer)
+            except ValueError:
+                pass
+            peak = tracemalloc.get_traced_memory()[1]
+            tracemalloc.stop()
+            assert peak < PER_BYTE * len(buffer) + 100_000
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "path", "offset", "words"),
+    [
+        ("std_msgs/msg/String", "00010000 ffffffff 00", "data", 8, "4294967295 bytes of text"),
+        ("std_msgs/msg/String", "00010000 05000000 6162", "data", 8, "5 bytes of text"),
+        ("std_msgs/msg/String", "00010000 0500", "data", 4, "number of bytes of text"),
+        ("std_msgs/msg/String", "0001", "", 0, "encapsulation header needs 4 bytes"),
+        ("std_msgs/msg/String", "", "", 0, "encapsulation header needs 4 bytes"),
+        ("std_msgs/msg/String", "00030000 01000000 00", "", 0, "unknown encapsulation 0003"),
+        ("std_msgs/msg/String", "01010000 01000000 00", "", 0, "unknown encapsulation 0101"),
+        ("std_msgs/msg/Int64", "00010000 0102", "data", 4, "8 bytes expected"),
+        ("std_msgs/msg/Empty", "00010000", "std_msgs/msg/Empty", 4, "1 byte expected"),
+        ("sensor_msgs/msg/JointState", "00010000" + "00" * 8 + "01000000 00 000000 ffffffff",
+         "name", 24, "4294967295 elements"),
+        ("nav_msgs/msg/Path", "00000000" + "00" * 8 + "00000001 00 000000 ffffffff",
+         "poses", 24, "4294967295 elements"),
+        ("geometry_msgs/msg/PoseStamped", "00010000" + "00" * 8 + "01000000 00 000000" + "00" * 12,
+         "pose.position.y", 28, "8 bytes expected"),
+        ("idlc_fixtures/msg/BoundedSequences", "00010000 04000000 00000000", "bools", 4,
+         "4 elements where at most 3 are allowed"),
+    ],
+)  # fmt: skip
+def test_an_error_names_the_field_and_the_byte(standard, name, raw, path, offset, words):
+    cls = generated.class_of(name)
+    with pytest.raises(ValueError, match=words) as caught:
+        cls.deserialize(bytes.fromhex(raw))
+    assert type(caught.value).__name__ == "DecodeError"
+    assert (caught.value.path, caught.value.offset) == (path, offset)
+    assert str(caught.value).startswith(f"{path}: " if path else words.split()[0][:3]) or not path
+
+
+@pytest.mark.parametrize(
+    ("raw", "text"),
+    [
+        ("00010000 00000000", ""),
+        ("00010000 01000000 00", ""),
+        ("00010000 02000000 6100", "a"),
+        ("00010000 02000000 6162", "ab"),
+        ("00010000 04000000 61006200", "a\0b"),
+        ("00010000 03000000 61ff00", "a\ufffd"),
+        ("00010000 04000000 eda08000", "\ufffd\ufffd\ufffd"),
+        ("00000000 00000002 6100 ffffff", "a"),
+        ("000100ff 02000000 6100", "a"),
+    ],
+)
+def test_what_middlewares_take_is_taken(standard, raw, text):
+    string = generated.class_of("std_msgs/msg/String")
+    for buffer in (bytes.fromhex(raw), bytearray.fromhex(raw), memoryview(bytes.fromhex(raw))):
+        assert string.deserialize(buffer).data == text
+
+
+@pytest.mark.parametrize(
+    ("units", "text"),
+    [
+        ("3dd80000 00de0000", "\U0001f600"),
+        ("3dd80000", "\ufffd"),
+        ("00de0000 41000000", "\ufffdA"),
+        ("00000000", "\0"),
+        ("00000100", None),
+        ("ffffffff", None),
+    ],
+)
+def test_wide_text_is_utf16_in_words(standard, units, text):
+    cls = generated.class_of("idlc_fixtures/msg/AllPrimitives")
+    body = cls().serialize()[:-4]
+    count = len(bytes.fromhex(units)) // 4
+    raw = body + count.to_bytes(4, "little") + bytes.fromhex(units)
+    if text is None:
+        with pytest.raises(ValueError, match="UTF-16") as caught:
+            cls.deserialize(raw)
+        assert caught.value.path == "a_wstring"
+    else:
+        assert cls.deserialize(raw).a_wstring == text
