@@ -41,6 +41,7 @@ FUNCTION_BUDGET = 40
 #: path, or path:function, that is over budget -> why it stays so.
 OVER_BUDGET: dict[str, str] = {
     "idlc/emit/decode.py": "one method for each step of a layout plan, over one state",
+    "idlc/runtime/typesupport_services.py:event": "two callbacks over what they close over",
     "idlc/emit/encode.py": "one method for each step of a layout plan, over one state",
 }
 

@@ -92,3 +92,15 @@ def _closure(own: set[ir.TypeName], messages: layout.Messages) -> set[ir.TypeNam
                 found.add(name)
                 waiting.append(name)
     return found
+
+
+def wrapped(statements: list[str]) -> list[str]:
+    """Break import statements that are too long inside a block."""
+    result = []
+    for statement in statements:
+        head, _, names = statement.partition(" import ")
+        if len(statement) + 8 <= 88:
+            result.append(statement)
+        else:
+            result += [f"{head} import (", *(f"    {n}," for n in names.split(", ")), ")"]
+    return result

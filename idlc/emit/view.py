@@ -12,7 +12,7 @@ from idlc.emit import code, documentation, fields, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
 from idlc.emit.pretty import WIDTH, Group, assign, call, lines
-from idlc.emit.references import References, referred
+from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
 
@@ -107,22 +107,10 @@ def _imports(
         relative.append("from .._idlc import arrays as _arrays")
     result = [*standard, *([""] if standard else []), *relative, *inside]
     if outside:
-        result += ["", "with _idlc.importing():", *(f"    {line}" for line in _wrap(outside))]
+        result += ["", "with _idlc.importing():", *(f"    {line}" for line in wrapped(outside))]
     if references.implied:
         _, implied = references.imports(references.implied, kind)
-        result += ["", "if TYPE_CHECKING:", *(f"    {line}" for line in _wrap(implied))]
-    return result
-
-
-def _wrap(statements: list[str]) -> list[str]:
-    """Break import statements that are too long inside a block."""
-    result = []
-    for statement in statements:
-        head, _, names = statement.partition(" import ")
-        if len(statement) + 8 <= 88:
-            result.append(statement)
-        else:
-            result += [f"{head} import (", *(f"    {n}," for n in names.split(", ")), ")"]
+        result += ["", "if TYPE_CHECKING:", *(f"    {line}" for line in wrapped(implied))]
     return result
 
 
@@ -181,11 +169,11 @@ def _codec_imports(
     inside, outside = references.imports(needed, kind)
     if arrays:
         inside.insert(0, "from .._idlc import arrays as _arrays")
-    result = [f"    {line}" for line in _wrap(inside)]
+    result = [f"    {line}" for line in wrapped(inside)]
     if outside:
         result += [""] if inside else []
         result.append("    with _idlc.importing():")
-        result += [f"        {line}" for line in _wrap(outside)]
+        result += [f"        {line}" for line in wrapped(outside)]
     return [*result, ""] if result else []
 
 
