@@ -326,7 +326,7 @@ def test_what_needs_ros_fails_only_when_used():
         lambda: action.Impl.CancelGoalService,
         lambda: action.Impl.GoalStatusMessage,
     ):
-        with pytest.raises(ImportError, match="pip install ros-jazzy-.*--vendor-deps") as caught:
+        with pytest.raises(ImportError, match=r"pip install ros-jazzy-.*--vendor-deps") as caught:
             use()
         assert caught.value.name
 
