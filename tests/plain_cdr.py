@@ -6,10 +6,21 @@ A shape is a list of (name, type); a type is a primitive's name, "string", "wstr
 
 import struct
 
-CODES = dict(
-    bool="?", byte="B", char="B", int8="b", uint8="B", int16="h", uint16="H", int32="i",
-    uint32="I", int64="q", uint64="Q", float32="f", float64="d",
-)  # fmt: skip
+CODES = {
+    "bool": "?",
+    "byte": "B",
+    "char": "B",
+    "float32": "f",
+    "float64": "d",
+    "int8": "b",
+    "int16": "h",
+    "int32": "i",
+    "int64": "q",
+    "uint8": "B",
+    "uint16": "H",
+    "uint32": "I",
+    "uint64": "Q",
+}
 
 
 class Writer:

@@ -19,7 +19,8 @@ def test_every_structure_of_the_recorded_packages_is_there():
 
 
 @EACH
-def test_a_class_looks_as_rosidls(standard, fact):
+@pytest.mark.usefixtures("standard")
+def test_a_class_looks_as_rosidls(fact):
     cls = generated.class_of(fact["name"])
     message = cls()
     assert f"{cls.__module__}.{cls.__name__}" == fact["python_class"]
@@ -50,7 +51,8 @@ def plain(value):
 
 
 @EACH
-def test_defaults_and_constants_are_rosidls(standard, fact):
+@pytest.mark.usefixtures("standard")
+def test_defaults_and_constants_are_rosidls(fact):
     cls = generated.class_of(fact["name"])
     message = cls()
     assert plain(message) == fact["default_values"]
@@ -74,7 +76,8 @@ def test_defaults_and_constants_are_rosidls(standard, fact):
 
 
 @EACH
-def test_bytes_are_equal_both_ways(standard, fact):
+@pytest.mark.usefixtures("standard")
+def test_bytes_are_equal_both_ways(fact):
     cls = generated.class_of(fact["name"])
     assert cls().serialize().hex() == fact["default_cdr"]
     assert cls.deserialize(bytes.fromhex(fact["default_cdr"])) == cls()
@@ -116,7 +119,8 @@ def dumped(tmp_path_factory):
 
 
 @pytest.mark.parametrize("dump", DUMPS, ids=[f"{d['type']}-{d['endian']}" for d in DUMPS])
-def test_fast_cdrs_bytes_are_equal_both_ways(dumped, dump):
+@pytest.mark.usefixtures("dumped")
+def test_fast_cdrs_bytes_are_equal_both_ways(dump):
     cls = generated.class_of(f"dumped_msgs/msg/{dump['type']}")
     message = values.fill(cls(), dump["value"])
     raw = bytes.fromhex(dump["hex"])

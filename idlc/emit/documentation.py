@@ -11,18 +11,32 @@ def message(structure: ir.Message, summary: str) -> list[str]:
     lines = [literals.prose(line) for line in structure.comment] or [summary]
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
+    described = [c for c in structure.constants if c.comment or c.unit]
     if structure.fields:
         lines += ["", "Attributes:"]
         for field in structure.fields:
             lines += literals.wrapped(_field(field), 8, 4)
+    if described:
+        lines += ["", "Constants:"]
+        for constant in described:
+            lines += literals.wrapped(_constant(constant), 8, 4)
     return lines
 
 
 def _field(field: ir.Field) -> str:
-    facts = ", ".join(filter(None, (type_text(field.type), *_limits(field.type))))
-    unit = f" [{literals.prose(field.unit)}]" if field.unit else ""
-    words = " ".join(literals.prose(line).strip() for line in field.comment).strip()
-    return f"{pynames.field(field.name)}: {facts}{unit}." + (f" {words}" if words else "")
+    facts = ", ".join((type_text(field.type), *_limits(field.type)))
+    return f"{pynames.field(field.name)}: {facts}{_rest(field)}"
+
+
+def _constant(constant: ir.Constant) -> str:
+    return f"{constant.name}: {type_text(constant.type)}{_rest(constant)}"
+
+
+def _rest(described: ir.Field | ir.Constant) -> str:
+    """Return the unit and the comment of a field or constant."""
+    unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
+    words = " ".join(literals.prose(line).strip() for line in described.comment)
+    return f"{unit}. {words}".rstrip()
 
 
 def type_text(type_: ir.FieldType) -> str:

@@ -1,7 +1,8 @@
 """Values and text from interface files as Python source that cannot be anything else.
 
-Whatever stands in a comment, a default or a constant comes out as one literal, one comment line or
-one docstring: quotes, backslashes and characters that do not print are escaped.
+Whatever stands in a comment, a default or a constant comes out as one literal or in a docstring:
+quotes, backslashes and characters that do not print are escaped. It never comes out as a comment,
+where tools look for directives.
 """
 
 from __future__ import annotations
@@ -57,12 +58,6 @@ def printable(character: str) -> str:
     if character.isprintable() and unicodedata.category(character) not in {"Cf", "Zl", "Zp"}:
         return character
     return repr(character)[1:-1] if not character.isprintable() else f"\\u{ord(character):04x}"
-
-
-def comment(lines: tuple[str, ...]) -> list[str]:
-    """Return comment lines, empty ones left out."""
-    shown = ("".join(map(printable, line)).strip() for line in lines)
-    return [f"# {line}" for line in shown if line]
 
 
 def prose(line: str) -> str:

@@ -248,8 +248,6 @@ def _types(steps: tuple[layout.Step, ...]) -> list[ir.TypeName]:
 def _constants(structure: ir.Message) -> list[str]:
     result = []
     for constant in structure.constants:
-        unit = (f"[{constant.unit}]",) if constant.unit else ()
-        result += [f"    {line}" for line in literals.comment((*constant.comment, *unit))]
         result += assign(constant.name, literals.scalar(constant.type, constant.value), 4)
     for field in structure.fields:
         if field.default is not None:

@@ -61,7 +61,7 @@ def codec_for(kind: Any) -> Callable[[Make], Make]:
                 found = made[order, text] = make(order, text)
             return found
 
-        kind._codec_ = codecs
+        kind._codec_ = staticmethod(codecs)
         return make
 
     return give

@@ -46,7 +46,7 @@ def to_array(code: str, values: Any) -> Any:
         if view.nbytes:
             result.frombytes(view.cast("B") if view.c_contiguous else view.tobytes())
     else:
-        result.extend(view.tolist())
+        result.extend(values.tolist() if hasattr(values, "tolist") else values)
     return result
 
 
