@@ -1,0 +1,153 @@
+"""idlc's classes on the real rclpy: what its users, and their mistakes, do to it.
+
+Each behaviour runs in a process of its own, because it might crash it.
+"""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+import pytest
+from installed import HERE, SHARE, generate
+
+QUIET = [
+    "nothing_is_loaded_before_rclpy_asks",
+    "rclpy_accepts_the_classes",
+    "raw_latched_and_waited_for",
+    "wrong_values_raise_where_they_are_published",
+    "garbage_is_dropped",
+    "received_garbage_is_dropped",
+    "many_threads",
+    "ends_with_messages_pending",
+]
+TIMEOUT = 120
+
+
+@pytest.fixture(scope="module")
+def classes(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("classes")
+    for package in ("std_msgs", "std_srvs"):
+        generate(SHARE / package, folder / package)
+    return folder
+
+
+@pytest.fixture
+def start(classes, ros_environment):
+    """Start a behaviour; it is ended with the test."""
+    processes = []
+
+    def begin(*words, path=classes):
+        process = subprocess.Popen(
+            [sys.executable, str(HERE / "behaviour.py"), *words],
+            env={**ros_environment, "PYTHONPATH": str(path)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def finish(process):
+    """Return what a behaviour printed; fail with what it complained about."""
+    out, complaints = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 0, f"{process.returncode}: {complaints}"
+    return out, complaints
+
+
+@pytest.mark.parametrize("behaviour", QUIET)
+def test_behaviour(behaviour, start):
+    assert finish(start(behaviour)) == ("", "")
+
+
+def test_memory_stays_flat(start):
+    assert finish(start("memory_stays_flat", "200000")) == ("", "")
+
+
+def test_one_interrupt_ends_a_busy_node(start):
+    process = start("spins_until_interrupted")
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    assert finish(process)[0] == "interrupted\n"
+
+
+def test_a_flood_of_interrupts_is_survived_and_seen(start):
+    process = start("survives_a_flood_of_interrupts", "6")
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(0.5)
+    end = time.monotonic() + 5
+    while time.monotonic() < end:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.003)
+    out, complaints = finish(process)
+    # of Python code, rclpy's own included, there may be some
+    assert "ctypes" not in complaints
+    seen, received, *_ = out.split()
+    assert int(seen) > 100
+    assert int(received) > 100
+    assert "AssertionError" not in out
+
+
+def test_the_type_description_is_the_installed_one(start):
+    response = json.loads(finish(start("tells_its_type_description"))[0])
+    installed = json.loads((SHARE / "std_msgs" / "msg" / "Header.json").read_text("utf-8"))
+    assert response["successful"], response
+    assert response["type_description"] == installed["type_description_msg"]
+    assert response["type_sources"] == [
+        {
+            "type_name": f"{package}/msg/{name}",
+            "encoding": "msg",
+            "raw_file_contents": (SHARE / package / "msg" / f"{name}.msg").read_text("utf-8"),
+        }
+        for package, name in (("std_msgs", "Header"), ("builtin_interfaces", "Time"))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("case", "words"),
+    [
+        ("middleware", ["rmw_connextdds", "RMW_IMPLEMENTATION", "colcon"]),
+        ("layout", ["Fast CDR", "unknown", "RMW_IMPLEMENTATION"]),
+        ("symbol", ["Fast CDR", "no_such_symbol", "colcon"]),
+        ("fast cdr", ["libfastcdr.so.1", "RMW_IMPLEMENTATION"]),
+        ("library", ["librosidl_typesupport_elsewhere_c.so", "source your ROS 2"]),
+    ],
+)
+def test_an_error_says_what_to_do(case, words, start):
+    out, _ = finish(start("says_what_to_do", case))
+    assert [word for word in words if word not in out] == [], out
+
+
+@pytest.fixture
+def mixed(classes, tmp_path) -> Path:
+    """Return a folder where std_msgs has rosidl's extension modules beside idlc's classes."""
+    shutil.copytree(classes / "std_msgs", tmp_path / "std_msgs")
+    for file in Path(sysconfig.get_path("purelib"), "std_msgs").glob("std_msgs_s__*"):
+        shutil.copy(file, tmp_path / "std_msgs")
+    return tmp_path
+
+
+def test_the_packages_own_extension_is_preferred(start, mixed):
+    out, _ = finish(start("uses_the_extension", path=mixed))
+    assert out == "string True\nheader True\n"
+
+
+def test_an_outdated_extension_is_not_used(start, mixed):
+    types = mixed / "std_msgs" / "_idlc" / "types.json"
+    known = json.loads(types.read_text("utf-8"))
+    known["hashes"]["std_msgs/msg/String"] = "RIHS01_" + 64 * "0"
+    types.write_text(json.dumps(known), "utf-8")
+    out, _ = finish(start("uses_the_extension", path=mixed))
+    assert out == "string False\nheader True\n"
