@@ -258,7 +258,7 @@ def _constants(structure: ir.Message) -> list[str]:
 def _groups(interface: ir.Interface) -> list[GroupView]:
     views = [
         GroupView(
-            name=service.name.name,
+            name=pynames.class_(service.name),
             base="_idlc.Service",
             body=(
                 *literals.docstring([f"The service {service.name}."], 4),
@@ -276,7 +276,7 @@ def _groups(interface: ir.Interface) -> list[GroupView]:
 def _action(action: ir.Action) -> GroupView:
     name = action.name.name
     return GroupView(
-        name=name,
+        name=pynames.class_(action.name),
         base="_idlc.Action",
         body=(
             *literals.docstring([f"The action {action.name}."], 4),
