@@ -128,6 +128,7 @@ from comments_msgs.msg import Gauge
 from comments_msgs.srv import Reset
 from layouts_msgs.msg import Everything, Inner
 from names_msgs.msg import Odd, Point
+from numpy.typing import NDArray
 from typing_extensions import assert_type
 
 gauge = Gauge(1.0, 2, label="x", samples=[1, 2], covariance=[0.0] * 9)
@@ -135,13 +136,13 @@ gauge.samples = range(3)
 gauge.samples = np.zeros(3, np.int16)
 gauge.covariance = np.eye(3).ravel()
 gauge.notes.append("note")
-assert_type(gauge.samples, array[int])
+assert_type(gauge.samples, "array[int]")
 assert_type(gauge.rate, float)
 assert_type(gauge.flags, bytes)
 assert_type(gauge.notes, list[str])
-assert_type(gauge.covariance.sum(), np.float64)
-assert_type(Gauge.FULL, int)
-assert_type(Gauge.RATE__DEFAULT, float)
+assert_type(Gauge().covariance, "NDArray[np.float64]")
+full: int = Gauge.FULL
+rate_default: float = Gauge.RATE__DEFAULT
 assert_type(Gauge.deserialize(gauge.serialize()), Gauge)
 assert_type(Gauge.deserialize(bytearray()), Gauge)
 assert_type(Gauge.from_dict(gauge.to_dict()), Gauge)
