@@ -377,7 +377,7 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         end = at + count
         if end > limit:
             raise ValueError("too short")
-        for item_4_values in rows_1(view[at:end]):
+        for _ in rows_1(view[at:end]):
             item_4 = new_nothing()
             nothings.append(item_4)
         at = end + 3 & -4
