@@ -258,7 +258,7 @@ class _Decoder:
             wanted = count if least == 1 else f"{least} * {count}"
             if least:
                 self.short_if(f"{self.here.text()} + {wanted} > limit")
-        self.line("[]", step.place.local)
+        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
         self.line(step.place.local, step.place.text)
         return count
 
@@ -301,7 +301,7 @@ class _Decoder:
             else:
                 self.fixed(part, run)
         reader = self.tables.rows("".join(run.fields))
-        values = self.tables.local(f"{step.item}_values")
+        values = self.tables.local(f"{step.item}_values") if run.targets else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
         stored = [Line(values, Group("", tuple(run.targets)))] if run.targets else []
         body = (

@@ -208,16 +208,13 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
     )
 
 
-def default_constant(field: ir.Field, qualify: bool) -> list[str]:
+def default_constant(field: ir.Field) -> list[str]:
     """Return the lines of the class attribute FIELD__DEFAULT."""
     name = f"{field.name.upper()}__DEFAULT"
     if isinstance(field.type, (ir.Primitive, ir.String)):
         return assign(name, _scalar_default(field), 4)
-    if support(field.type):
-        fresh = _fresh_numbers(field)
-        assert isinstance(fresh, Group)
-        make, arguments = fresh.before, fresh.items
-    else:
-        make, arguments = "list", (_tuple(_values(field) or ()),)
-        make = f"_builtins.{make}" if qualify else make
-    return assign(name, call("_idlc.Fresh", make, *arguments), 4)
+    if not support(field.type):
+        return assign(name, call("_idlc.FreshList", *(_values(field) or ())), 4)
+    fresh = _fresh_numbers(field)
+    assert isinstance(fresh, Group)
+    return assign(name, call("_idlc.Fresh", fresh.before, *fresh.items), 4)

@@ -50,6 +50,7 @@ class ModuleView(msgspec.Struct, frozen=True):
     groups: tuple[GroupView, ...]
 
 
+ACTION_PARTS = ("Goal", "Result", "Feedback")
 SERVICE_PARTS = ("Request", "Response", "Event")
 TYPES = "_ClassVar[dict[str, str]]"
 PRAGMAS = (
@@ -251,7 +252,7 @@ def _constants(structure: ir.Message) -> list[str]:
         result += assign(constant.name, literals.scalar(constant.type, constant.value), 4)
     for field in structure.fields:
         if field.default is not None:
-            result += fields.default_constant(field, fields.shadows(structure))
+            result += fields.default_constant(field)
     return result
 
 
@@ -263,7 +264,10 @@ def _groups(interface: ir.Interface) -> list[GroupView]:
             body=(
                 *literals.docstring([f"The service {service.name}."], 4),
                 "",
-                *(f"    {part} = {service.name.name}_{part}" for part in SERVICE_PARTS),
+                *(
+                    f"    {part}: _idlc.TypeAlias = {service.name.name}_{part}"
+                    for part in SERVICE_PARTS
+                ),
             ),
         )
         for service in derive.services(interface)
@@ -281,7 +285,7 @@ def _action(action: ir.Action) -> GroupView:
         body=(
             *literals.docstring([f"The action {action.name}."], 4),
             "",
-            *(f"    {part} = {name}_{part}" for part in ("Goal", "Result", "Feedback")),
+            *(f"    {part}: _idlc.TypeAlias = {name}_{part}" for part in ACTION_PARTS),
             "",
             "    class Impl:",
             '        """What rclpy needs of the action."""',

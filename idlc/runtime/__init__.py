@@ -34,7 +34,7 @@ from .codec import Codec, Text, codec_for, maker
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
-from .message import Fresh, Message, dataclass
+from .message import Fresh, FreshList, Message, dataclass
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -68,6 +68,7 @@ __all__ = [
     "Float64Sequence",
     "Floats",
     "Fresh",
+    "FreshList",
     "Imported",
     "Int8Sequence",
     "Int16Sequence",
@@ -78,6 +79,7 @@ __all__ = [
     "Service",
     "Text",
     "Texts",
+    "TypeAlias",
     "UInt8Sequence",
     "UInt16Sequence",
     "UInt32Sequence",

@@ -44,6 +44,7 @@ class Codecs(Protocol):
 
     def __call__(self, order: str, text: Text = bytes.decode) -> Codec:
         """Return the codec whose `decode` makes strings by `text`."""
+        ...
 
 
 Make = Callable[[str, Text], Codec]

@@ -40,6 +40,13 @@ class Fresh(Generic[Value]):
         return self._make(*self._arguments)
 
 
+class FreshList(Fresh[list[Value]]):
+    """A class attribute whose value is a new list of the same values at each access."""
+
+    def __init__(self, *values: Value) -> None:
+        super().__init__(list, values)
+
+
 class _SlotTypes:
     """The field types as rosidl_parser.definition objects, made on first access."""
 
@@ -209,4 +216,4 @@ class Message(metaclass=MessageMeta):
         return f"{package}.{kind.__name__}({', '.join(parts)})"
 
 
-__all__ = ["Fresh", "InterfaceMeta", "Message", "MessageMeta", "dataclass"]
+__all__ = ["Fresh", "FreshList", "InterfaceMeta", "Message", "MessageMeta", "dataclass"]

@@ -26,6 +26,9 @@ class Primitive(NamedTuple):
     high: float | None = None
 
 
+#: The package that this support package is part of.
+OWN = __name__.rpartition(".")[0].rpartition(".")[0]
+
 #: Largest finite float32.
 FLOAT32_MAX = 3.4028234663852886e38
 
@@ -101,8 +104,7 @@ def type_name(kind: type) -> str:
             kind = base
             break
     path = kind.__module__.split(".")
-    own = __package__.rpartition(".")[0]
-    package = types()["package"] if kind.__module__.startswith(own + ".") else path[-3]
+    package = types()["package"] if kind.__module__.startswith(OWN + ".") else path[-3]
     return f"{package}/{path[-2]}/{kind.__name__}"
 
 
@@ -132,8 +134,7 @@ def _field(field: dict[str, Any]) -> FieldInfo:
 def class_of(name: str) -> Any:
     """Return the class of a type by its full name, of this package or of another."""
     package, kind, short = name.split("/")
-    own = __package__.rpartition(".")[0]
-    root = own if package == types()["package"] else package
+    root = OWN if package == types()["package"] else package
     with importing():
         return getattr(import_module(f"{root}.{kind}"), short)
 

@@ -65,7 +65,7 @@ class Types(NamedTuple):
 @cache
 def load() -> Types:
     """Return the facts about this package's types."""
-    text = pkgutil.get_data(__package__, "types.json")
+    text = pkgutil.get_data(__package__ or "", "types.json")
     if text is None:
         raise ImportError(f"{__package__} has no types.json: run `idlc gen` again")
     data = json.loads(text)

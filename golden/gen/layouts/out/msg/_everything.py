@@ -136,7 +136,7 @@ class Everything(_idlc.Message):
 
 
 @_idlc.codec_for(Everything)
-def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Everything in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
@@ -324,7 +324,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
         (count,) = read_2(data, end)
         if end + 4 + 17 * count > limit:
             raise ValueError("too short")
-        inners = []
+        inners: list[_idlc.Any] = []
         message._inners = inners
         end = end + 4
         for _ in range(count):
@@ -348,7 +348,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if end + 4 + 9 * count > limit:
             raise ValueError("too short")
-        rows = []
+        rows: list[_idlc.Any] = []
         message._rows = rows
         at = end + 4
         for _ in range(count):
@@ -358,7 +358,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
             item_2._a, item_2._b, item_2_c = read_5(data, at)
             item_2._c = array_uint8_3(item_2_c)
             at = at + 9
-        pair = []
+        pair: list[_idlc.Any] = []
         message._pair = pair
         for _ in range(2):
             item_3 = new_row()
@@ -372,12 +372,12 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
         struct = read_6[at & 7]
         (count,) = struct.unpack_from(data, at)
         at = at + struct.size
-        nothings = []
+        nothings: list[_idlc.Any] = []
         message._nothings = nothings
         end = at + count
         if end > limit:
             raise ValueError("too short")
-        for item_4_values in rows_1(view[at:end]):
+        for _ in rows_1(view[at:end]):
             item_4 = new_nothing()
             nothings.append(item_4)
         at = end + 3 & -4
@@ -417,7 +417,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
         message._octets = read_octets(octets)
         if at + 4 * count > limit:
             raise ValueError("too short")
-        texts = []
+        texts: list[_idlc.Any] = []
         message._texts = texts
         end = at - 1
         for _ in range(count):
@@ -427,7 +427,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
             if data[end]:
                 raise ValueError("text without end")
             texts.append(text(data[at + 4 : end]))
-        wides = []
+        wides: list[_idlc.Any] = []
         message._wides = wides
         end = end + 1
         for _ in range(2):
@@ -439,7 +439,7 @@ def _everything(order: str, text: _idlc.Text) -> _idlc.Codec:
             wides.append(read_wide_text(data[at + 4 : end]))
         at = end + 3 & -4
         (count,) = read_2(data, at)
-        stamps = []
+        stamps: list[_idlc.Any] = []
         message._stamps = stamps
         end = at + 4 + 8 * count
         if end > limit:

@@ -46,7 +46,7 @@ class Inner(_idlc.Message):
 
 
 @_idlc.codec_for(Inner)
-def _inner(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _inner_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Inner in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)

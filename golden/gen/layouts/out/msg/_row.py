@@ -45,7 +45,7 @@ class Row(_idlc.Message):
 
 
 @_idlc.codec_for(Row)
-def _row(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _row_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Row in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)

@@ -73,7 +73,7 @@ class Odd(_idlc.Message):
 
     SERIALIZE__DEFAULT = 3
     INT__DEFAULT = 4
-    STR__DEFAULT = _idlc.Fresh(_builtins.list, ("a", 'b "c"'))
+    STR__DEFAULT = _idlc.FreshList("a", 'b "c"')
     ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
 
     class_: _builtins.int
@@ -134,7 +134,7 @@ class Odd(_idlc.Message):
 
 
 @_idlc.codec_for(Odd)
-def _odd(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4siiiiiI*c?fI", align=4)
@@ -222,7 +222,7 @@ def _odd(order: str, text: _idlc.Text) -> _idlc.Codec:
         at = end + 1 + struct.size
         if at + 4 * count > limit:
             raise ValueError("too short")
-        str_2 = []
+        str_2: list[_idlc.Any] = []
         message._str = str_2
         end = at - 1
         for _ in range(count):
@@ -234,7 +234,7 @@ def _odd(order: str, text: _idlc.Text) -> _idlc.Codec:
             str_2.append(text(data[at + 4 : end]))
         at = end + 4 & -4
         message._message, message._data, message._at, count = read_4(data, at)
-        item = []
+        item: list[_idlc.Any] = []
         message._item = item
         at = at + 16
         if count:

@@ -48,7 +48,7 @@ class Text(_idlc.Message):
 
 
 @_idlc.codec_for(Text)
-def _text(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _text_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Text in one byte order."""
     with _idlc.importing():
         from geometry_msgs.msg import Pose, Quaternion
@@ -110,7 +110,7 @@ def _text(order: str, text: _idlc.Text) -> _idlc.Codec:
         other._x, other._y, other._z, own._x, own._y, count = read_1(data, 4)
         if count > 2:
             raise ValueError("too many elements")
-        any_2 = []
+        any_2: list[_idlc.Any] = []
         message._any = any_2
         at = 48
         if count:

@@ -37,7 +37,7 @@ class Countdown_Goal(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Goal)
-def _countdown__goal(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__goal_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack
@@ -84,7 +84,7 @@ class Countdown_Result(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Result)
-def _countdown__result(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__result_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si?").pack
@@ -123,7 +123,7 @@ class Countdown_Feedback(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Feedback)
-def _countdown__feedback(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__feedback_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack
@@ -172,7 +172,7 @@ class Countdown_SendGoal_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Request)
-def _countdown__send_goal__request(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -239,7 +239,7 @@ class Countdown_SendGoal_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Response)
-def _countdown__send_goal__response(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
@@ -300,7 +300,7 @@ class Countdown_SendGoal_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Event)
-def _countdown__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -379,7 +379,7 @@ def _countdown__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
             raise ValueError("too short")
-        request = []
+        request: list[_idlc.Any] = []
         message._request = request
         at = 48
         for _ in range(count):
@@ -397,7 +397,7 @@ def _countdown__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
             raise ValueError("too short")
-        response = []
+        response: list[_idlc.Any] = []
         message._response = response
         at = at + 4
         for _ in range(count):
@@ -442,7 +442,7 @@ class Countdown_GetResult_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Request)
-def _countdown__get_result__request(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -500,7 +500,7 @@ class Countdown_GetResult_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Response)
-def _countdown__get_result__response(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sbi?").pack
@@ -565,7 +565,7 @@ class Countdown_GetResult_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Event)
-def _countdown__get_result__event(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -650,7 +650,7 @@ def _countdown__get_result__event(order: str, text: _idlc.Text) -> _idlc.Codec:
         info._client_gid = array_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
-        request = []
+        request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
         if end > limit:
@@ -667,7 +667,7 @@ def _countdown__get_result__event(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if end + 4 + 6 * count > limit:
             raise ValueError("too short")
-        response = []
+        response: list[_idlc.Any] = []
         message._response = response
         at = end + 4
         for _ in range(count):
@@ -718,7 +718,7 @@ class Countdown_FeedbackMessage(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_FeedbackMessage)
-def _countdown__feedback_message(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads Countdown_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -761,25 +761,25 @@ def _countdown__feedback_message(order: str, text: _idlc.Text) -> _idlc.Codec:
 class Countdown_SendGoal(_idlc.Service):
     """The service tutorial_msgs/action/Countdown_SendGoal."""
 
-    Request = Countdown_SendGoal_Request
-    Response = Countdown_SendGoal_Response
-    Event = Countdown_SendGoal_Event
+    Request: _idlc.TypeAlias = Countdown_SendGoal_Request
+    Response: _idlc.TypeAlias = Countdown_SendGoal_Response
+    Event: _idlc.TypeAlias = Countdown_SendGoal_Event
 
 
 class Countdown_GetResult(_idlc.Service):
     """The service tutorial_msgs/action/Countdown_GetResult."""
 
-    Request = Countdown_GetResult_Request
-    Response = Countdown_GetResult_Response
-    Event = Countdown_GetResult_Event
+    Request: _idlc.TypeAlias = Countdown_GetResult_Request
+    Response: _idlc.TypeAlias = Countdown_GetResult_Response
+    Event: _idlc.TypeAlias = Countdown_GetResult_Event
 
 
 class Countdown(_idlc.Action):
     """The action tutorial_msgs/action/Countdown."""
 
-    Goal = Countdown_Goal
-    Result = Countdown_Result
-    Feedback = Countdown_Feedback
+    Goal: _idlc.TypeAlias = Countdown_Goal
+    Result: _idlc.TypeAlias = Countdown_Result
+    Feedback: _idlc.TypeAlias = Countdown_Feedback
 
     class Impl:
         """What rclpy needs of the action."""

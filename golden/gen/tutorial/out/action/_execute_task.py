@@ -37,7 +37,7 @@ class ExecuteTask_Goal(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Goal)
-def _execute_task__goal(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__goal_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*")
@@ -82,7 +82,7 @@ class ExecuteTask_Result(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Result)
-def _execute_task__result(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__result_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4s?").pack
@@ -121,7 +121,7 @@ class ExecuteTask_Feedback(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Feedback)
-def _execute_task__feedback(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__feedback_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*")
@@ -182,7 +182,9 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Request)
-def _execute_task__send_goal__request(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__send_goal__request_codec(
+    order: str, text: _idlc.Text
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -260,7 +262,9 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Response)
-def _execute_task__send_goal__response(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__send_goal__response_codec(
+    order: str, text: _idlc.Text
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
@@ -321,7 +325,7 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Event)
-def _execute_task__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -410,7 +414,7 @@ def _execute_task__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
             raise ValueError("too short")
-        request = []
+        request: list[_idlc.Any] = []
         message._request = request
         end = 47
         for _ in range(count):
@@ -434,7 +438,7 @@ def _execute_task__send_goal__event(order: str, text: _idlc.Text) -> _idlc.Codec
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
             raise ValueError("too short")
-        response = []
+        response: list[_idlc.Any] = []
         message._response = response
         at = at + 4
         for _ in range(count):
@@ -479,7 +483,9 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Request)
-def _execute_task__get_result__request(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__get_result__request_codec(
+    order: str, text: _idlc.Text
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -537,7 +543,9 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Response)
-def _execute_task__get_result__response(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__get_result__response_codec(
+    order: str, text: _idlc.Text
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sb?").pack
@@ -595,7 +603,7 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Event)
-def _execute_task__get_result__event(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -671,7 +679,7 @@ def _execute_task__get_result__event(order: str, text: _idlc.Text) -> _idlc.Code
         info._client_gid = array_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
-        request = []
+        request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
         if end > limit:
@@ -686,7 +694,7 @@ def _execute_task__get_result__event(order: str, text: _idlc.Text) -> _idlc.Code
         (count,) = read_2(data, end)
         if count > 1:
             raise ValueError("too many elements")
-        response = []
+        response: list[_idlc.Any] = []
         message._response = response
         at = end + 4
         end = at + 2 * count
@@ -734,7 +742,7 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_FeedbackMessage)
-def _execute_task__feedback_message(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -784,25 +792,25 @@ def _execute_task__feedback_message(order: str, text: _idlc.Text) -> _idlc.Codec
 class ExecuteTask_SendGoal(_idlc.Service):
     """The service tutorial_msgs/action/ExecuteTask_SendGoal."""
 
-    Request = ExecuteTask_SendGoal_Request
-    Response = ExecuteTask_SendGoal_Response
-    Event = ExecuteTask_SendGoal_Event
+    Request: _idlc.TypeAlias = ExecuteTask_SendGoal_Request
+    Response: _idlc.TypeAlias = ExecuteTask_SendGoal_Response
+    Event: _idlc.TypeAlias = ExecuteTask_SendGoal_Event
 
 
 class ExecuteTask_GetResult(_idlc.Service):
     """The service tutorial_msgs/action/ExecuteTask_GetResult."""
 
-    Request = ExecuteTask_GetResult_Request
-    Response = ExecuteTask_GetResult_Response
-    Event = ExecuteTask_GetResult_Event
+    Request: _idlc.TypeAlias = ExecuteTask_GetResult_Request
+    Response: _idlc.TypeAlias = ExecuteTask_GetResult_Response
+    Event: _idlc.TypeAlias = ExecuteTask_GetResult_Event
 
 
 class ExecuteTask(_idlc.Action):
     """The action tutorial_msgs/action/ExecuteTask."""
 
-    Goal = ExecuteTask_Goal
-    Result = ExecuteTask_Result
-    Feedback = ExecuteTask_Feedback
+    Goal: _idlc.TypeAlias = ExecuteTask_Goal
+    Result: _idlc.TypeAlias = ExecuteTask_Result
+    Feedback: _idlc.TypeAlias = ExecuteTask_Feedback
 
     class Impl:
         """What rclpy needs of the action."""

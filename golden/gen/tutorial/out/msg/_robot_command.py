@@ -58,7 +58,7 @@ class RobotCommand(_idlc.Message):
 
 
 @_idlc.codec_for(RobotCommand)
-def _robot_command(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _robot_command_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*ff", align=4)

@@ -39,7 +39,7 @@ class AddTwoInts_Request(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Request)
-def _add_two_ints__request(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sqq").pack
@@ -78,7 +78,7 @@ class AddTwoInts_Response(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Response)
-def _add_two_ints__response(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sq").pack
@@ -132,7 +132,7 @@ class AddTwoInts_Event(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Event)
-def _add_two_ints__event(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -208,7 +208,7 @@ def _add_two_ints__event(order: str, text: _idlc.Text) -> _idlc.Codec:
         info._client_gid = array_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
-        request = []
+        request: list[_idlc.Any] = []
         message._request = request
         at = 48
         if count:
@@ -223,7 +223,7 @@ def _add_two_ints__event(order: str, text: _idlc.Text) -> _idlc.Codec:
         (count,) = read_2(data, end)
         if count > 1:
             raise ValueError("too many elements")
-        response = []
+        response: list[_idlc.Any] = []
         message._response = response
         at = end + 4
         if count:
@@ -243,6 +243,6 @@ def _add_two_ints__event(order: str, text: _idlc.Text) -> _idlc.Codec:
 class AddTwoInts(_idlc.Service):
     """The service tutorial_msgs/srv/AddTwoInts."""
 
-    Request = AddTwoInts_Request
-    Response = AddTwoInts_Response
-    Event = AddTwoInts_Event
+    Request: _idlc.TypeAlias = AddTwoInts_Request
+    Response: _idlc.TypeAlias = AddTwoInts_Response
+    Event: _idlc.TypeAlias = AddTwoInts_Event
