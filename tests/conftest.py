@@ -1,5 +1,12 @@
 import generated
 import pytest
+from hypothesis import HealthCheck, settings
+
+# The same examples in every run, and no verdict that depends on how busy the machine is.
+settings.register_profile(
+    "idlc", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("idlc")
 
 
 @pytest.fixture(scope="session")
