@@ -185,8 +185,8 @@ def test_repr_is_rosidls():
 
 def test_names_that_python_needs_get_an_underscore_and_stay_on_the_wire():
     cls = get("msg/Odd")
-    message = cls(class_=1, self_=2, list="x", bytes=b"y", item=[get("msg/Point")(3.0)])
-    assert (message.class_, message.serialize_, message.self_, message.int) == (1, 3, 2, 4)
+    message = cls(class_=1, self=2, list="x", bytes=b"y", item=[get("msg/Point")(3.0)])
+    assert (message.class_, message.serialize_, message.self, message.int) == (1, 3, 2, 4)
     assert message.to_dict()["class"] == 1
     assert "class" in cls.get_fields_and_field_types()
     message.fields_and_field_types = 7
@@ -318,6 +318,14 @@ def test_services_and_actions_are_names_for_their_messages():
     assert type(type(service)) is type
 
 
+@pytest.fixture
+def without_ros(monkeypatch):
+    for package in ("action_msgs", "service_msgs", "std_msgs", "unique_identifier_msgs"):
+        for module in (package, f"{package}.msg", f"{package}.srv"):
+            monkeypatch.setitem(sys.modules, module, None)
+
+
+@pytest.mark.usefixtures("without_ros")
 def test_what_needs_ros_fails_only_when_used():
     service, action = get("srv/Go"), get("action/Walk")
     for use in (
@@ -331,6 +339,7 @@ def test_what_needs_ros_fails_only_when_used():
         assert caught.value.name
 
 
+@pytest.mark.usefixtures("without_ros")
 def test_a_missing_dependency_is_explained(tmp_path):
     files = {"msg/Stamped.msg": "std_msgs/Header header\n"}
     generated.write_package(tmp_path, "lonely_msgs", files)

@@ -69,7 +69,7 @@ def page(text, *more):
         constants=(ir.Constant(name="C", type=string, value=text, comment=lines, unit=text),),
     )
     model = link.Model("hostile_msgs", (message,), {message.name: message})
-    return render.module_file(message, model).text
+    return render.module_file(message, model, {message.name: "_it"}).text
 
 
 def shape(code):

@@ -64,10 +64,13 @@ def idl_text(type_: ir.FieldType) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def view(field: ir.Field, references: References, qualify: bool) -> FieldView:
-    """Return the view of a field; `qualify` spells builtin types as attributes."""
+def view(field: ir.Field, references: References, receiver: str, qualify: bool) -> FieldView:
+    """Return the view of a field; `qualify` spells builtin types as attributes.
+
+    `receiver` is what the constructor calls the object.
+    """
     name = pynames.field(field.name)
-    slot = f"self.{pynames.slot(field.name)}"
+    slot = f"{receiver}.{pynames.slot(field.name)}"
     prefix = "_builtins." if qualify else ""
     needs = support(field.type)
     if isinstance(field.type, (ir.Primitive, ir.String)):
@@ -82,9 +85,7 @@ def view(field: ir.Field, references: References, qualify: bool) -> FieldView:
         return _numeric(field, name, slot)
     if isinstance(field.type, ir.Ref):
         annotation = _element(field.type, references)
-        implied = field.type.target in references.implied
-        fresh: Node = _fresh_message(field.type.target, references)
-        del implied
+        fresh = _fresh_message(field.type.target, references)
     else:
         element = _element(ir.element_of(field.type), references)
         inner = prefix + element if element in BUILTINS else element

@@ -34,10 +34,10 @@ def _order(item: tuple[str, object]) -> list[tuple[int, str]]:
     return pynames.natural(item[0])
 
 
-def package(model: link.Model, kind: ir.Kind) -> PackageView:
+def package(model: link.Model, kind: ir.Kind, modules: pynames.Modules) -> PackageView:
     """Return the view of one kind's package."""
     found = {
-        name: str(pynames.module(interface.name))
+        name: str(modules[interface.name])
         for interface in model.own
         if interface.name.kind == kind
         for name in exported(interface)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import builtins
 import keyword
 import re
-from typing import NewType
+from collections.abc import Iterable, Mapping
+from typing import NewType, TypeAlias
 
 from idlc.model import ir
+from idlc.model.names import snake_case
 from idlc.runtime.names import public_name, slot_name
 
 ModuleName = NewType("ModuleName", str)
@@ -15,6 +17,7 @@ ClassName = NewType("ClassName", str)
 FieldName = NewType("FieldName", str)
 SlotName = NewType("SlotName", str)
 LocalName = NewType("LocalName", str)
+Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
@@ -23,21 +26,24 @@ CODEC_NAMES = frozenset(
 )
 
 
-def snake(name: str) -> str:
-    """Return rosidl's snake case of a CamelCase name (spec 7.1)."""
-    name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
-    return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()
-
-
 def natural(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts numbers in names by their value, as linters do."""
     parts = re.findall(r"\d+|\D+", name)
     return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
 
 
-def module(name: ir.TypeName) -> ModuleName:
-    """Return the module that holds an interface, without its package."""
-    return ModuleName("_" + snake(name.name))
+def modules(names: Iterable[ir.TypeName]) -> Modules:
+    """Return the module that holds each interface, without its package.
+
+    Names that rosidl would put into one module, such as FooBar and FOOBar, get one each.
+    """
+    taken: dict[tuple[ir.Kind, str], int] = {}
+    found: dict[ir.TypeName, ModuleName] = {}
+    for name in sorted(names):
+        module = f"_{snake_case(name.name)}"
+        number = taken[name.kind, module] = taken.get((name.kind, module), 0) + 1
+        found[name] = ModuleName(module if number == 1 else f"{module}_{number}")
+    return found
 
 
 def class_(name: ir.TypeName) -> ClassName:

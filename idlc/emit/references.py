@@ -17,7 +17,10 @@ class References:
     be used without them.
     """
 
-    def __init__(self, interface: ir.Interface, messages: layout.Messages) -> None:
+    def __init__(
+        self, interface: ir.Interface, messages: layout.Messages, modules: pynames.Modules
+    ) -> None:
+        self._modules = modules
         self.package = interface.name.package
         self.own = {message.name for message in derive.messages(interface)}
         written = {message.name for message in derive.sections(interface)}
@@ -65,9 +68,9 @@ class References:
             if type_.package != self.package:
                 outside[f"{type_.package}.{type_.kind}"].add(target)
             elif type_.kind == kind:
-                inside.add((1, f".{pynames.module(type_)}", target))
+                inside.add((1, f".{self._modules[type_]}", target))
             else:
-                inside.add((0, f"..{type_.kind}.{pynames.module(type_)}", target))
+                inside.add((0, f"..{type_.kind}.{self._modules[type_]}", target))
         return (
             [f"from {module} import {target}" for _, module, target in sorted(inside)],
             [

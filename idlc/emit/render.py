@@ -12,7 +12,7 @@ from pathlib import Path
 import jinja2
 import msgspec
 
-from idlc.emit import listing, types_json, view
+from idlc.emit import listing, pynames, types_json, view
 from idlc.model import ir, link
 
 PACKAGE = Path(__file__).parent.parent
@@ -52,9 +52,11 @@ def runtime_files() -> tuple[RenderedFile, ...]:
     )
 
 
-def module_file(interface: ir.Interface, model: link.Model) -> RenderedFile:
+def module_file(
+    interface: ir.Interface, model: link.Model, modules: pynames.Modules
+) -> RenderedFile:
     """Return the module of one interface."""
-    page = view.module(interface, model.messages)
+    page = view.module(interface, model.messages, modules)
     return RenderedFile(page.path, _template("module.py.jinja").render(module=page))
 
 
@@ -63,9 +65,10 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
 
     The model must be without errors: no `Unknown` type, nothing that is not found.
     """
-    files = [module_file(interface, model) for interface in model.own]
+    modules = pynames.modules(interface.name for interface in model.own)
+    files = [module_file(interface, model, modules) for interface in model.own]
     for kind in sorted({interface.name.kind for interface in model.own}):
-        page = listing.package(model, kind)
+        page = listing.package(model, kind, modules)
         text = _template("package.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
     data = json.dumps(types_json.content(model), ensure_ascii=True, separators=(",", ":"))

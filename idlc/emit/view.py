@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import msgspec
 
-from idlc.emit import code, documentation, fields, layout, literals, pynames
+from idlc.emit import code, documentation, fields, groups, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
 from idlc.emit.pretty import WIDTH, Group, assign, call, lines
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
+from idlc.model.names import snake_case
 
 
 class MessageView(msgspec.Struct, frozen=True):
@@ -30,14 +31,6 @@ class MessageView(msgspec.Struct, frozen=True):
     result: str
 
 
-class GroupView(msgspec.Struct, frozen=True):
-    """A service or action class."""
-
-    name: str
-    base: str
-    body: tuple[str, ...]
-
-
 class ModuleView(msgspec.Struct, frozen=True):
     """The module of one interface."""
 
@@ -47,11 +40,9 @@ class ModuleView(msgspec.Struct, frozen=True):
     summary: str
     imports: tuple[str, ...]
     messages: tuple[MessageView, ...]
-    groups: tuple[GroupView, ...]
+    groups: tuple[groups.GroupView, ...]
 
 
-ACTION_PARTS = ("Goal", "Result", "Feedback")
-SERVICE_PARTS = ("Request", "Response", "Event")
 TYPES = "_ClassVar[dict[str, str]]"
 PRAGMAS = (
     '# mypy: disable-error-code="import-not-found,import-untyped"',
@@ -64,13 +55,15 @@ def origin(name: ir.TypeName) -> str:
     return f"{name}.{name.kind}"
 
 
-def module(interface: ir.Interface, messages: layout.Messages) -> ModuleView:
-    """Return the view of an interface's module."""
+def module(
+    interface: ir.Interface, messages: layout.Messages, modules: pynames.Modules
+) -> ModuleView:
+    """Return the view of an interface's module; `modules` names all of its package."""
     name = interface.name
-    references = References(interface, messages)
+    references = References(interface, messages, modules)
     structures = derive.messages(interface)
     return ModuleView(
-        path=f"{name.kind}/{pynames.module(name)}.py",
+        path=f"{name.kind}/{modules[name]}.py",
         origin=origin(name),
         pragmas=PRAGMAS if _has_others(references, messages) else (),
         summary=f"The classes of {name}.",
@@ -78,7 +71,7 @@ def module(interface: ir.Interface, messages: layout.Messages) -> ModuleView:
         messages=tuple(
             _message(structure, interface, references, messages) for structure in structures
         ),
-        groups=tuple(_groups(interface)),
+        groups=tuple(groups.views(interface)),
     )
 
 
@@ -147,7 +140,7 @@ def _message(
 
 def _codec_head(name: ir.TypeName) -> tuple[str, ...]:
     # with a suffix, or the codec of a message `Arrays` would hide the import `_arrays`
-    function = f"def _{pynames.snake(name.name)}_codec"
+    function = f"def _{snake_case(name.name)}_codec"
     head = f"{function}(order: str, text: _idlc.Text) -> _idlc.Codec:"
     if len(head) <= WIDTH:
         return (head,)
@@ -180,7 +173,6 @@ def _codec_imports(
 
 def _body(structure: ir.Message, references: References) -> list[str]:
     """Return the class's docstring, names, constants and fields."""
-    qualify = fields.shadows(structure)
     public = [f'"{pynames.field(field.name)}"' for field in structure.fields]
     types = tuple(f'"{field.name}": "{fields.idl_text(field.type)}"' for field in structure.fields)
     doc = documentation.message(structure, f"{structure.name}.")
@@ -190,9 +182,7 @@ def _body(structure: ir.Message, references: References) -> list[str]:
         *_tuple("__match_args__", tuple(public)),
         *lines(Group("", types, brackets="{}"), 4, f"_fields_and_field_types: {TYPES} = "),
         *_separated(_constants(structure)),
-        *_separated(
-            [f"    {fields.view(f, references, qualify).declaration}" for f in structure.fields]
-        ),
+        *_separated([f"    {v.declaration}" for v in _field_views(structure, references)]),
     ]
 
 
@@ -200,15 +190,24 @@ def _separated(block: list[str]) -> list[str]:
     return ["", *block] if block else []
 
 
+def _field_views(structure: ir.Message, references: References) -> list[fields.FieldView]:
+    receiver, qualify = _receiver(structure), fields.shadows(structure)
+    return [fields.view(field, references, receiver, qualify) for field in structure.fields]
+
+
+def _receiver(structure: ir.Message) -> str:
+    # no field can begin with an underscore
+    return "_self" if any(field.name == "self" for field in structure.fields) else "self"
+
+
 def _init(structure: ir.Message, references: References) -> list[str]:
     """Return the constructor."""
     if not structure.fields:
         return ["    def __init__(self) -> None:", "        pass"]
-    qualify = fields.shadows(structure)
-    views = [fields.view(field, references, qualify) for field in structure.fields]
+    views = _field_views(structure, references)
     return [
         "    def __init__(",
-        "        self,",
+        f"        {_receiver(structure)},",
         *(f"        {view.parameter}," for view in views),
         "    ) -> None:",
         *(line for view in views for line in view.stores),
@@ -229,7 +228,7 @@ def _makers(
     for type_ in (own, *_types(steps)):
         if type_ not in makers:
             name = references.name(type_)
-            wanted = f"new_{pynames.snake(type_.name)}".replace("__", "_")
+            wanted = f"new_{snake_case(type_.name)}".replace("__", "_")
             maker = call("_idlc.maker", name)
             makers[type_] = tables.define(wanted, f"maker {name}", maker)
     known = references.own | references.direct
@@ -254,46 +253,3 @@ def _constants(structure: ir.Message) -> list[str]:
         if field.default is not None:
             result += fields.default_constant(field)
     return result
-
-
-def _groups(interface: ir.Interface) -> list[GroupView]:
-    views = [
-        GroupView(
-            name=pynames.class_(service.name),
-            base="_idlc.Service",
-            body=(
-                *literals.docstring([f"The service {service.name}."], 4),
-                "",
-                *(
-                    f"    {part}: _idlc.TypeAlias = {service.name.name}_{part}"
-                    for part in SERVICE_PARTS
-                ),
-            ),
-        )
-        for service in derive.services(interface)
-    ]
-    if isinstance(interface, ir.Action):
-        views.append(_action(interface))
-    return views
-
-
-def _action(action: ir.Action) -> GroupView:
-    name = action.name.name
-    return GroupView(
-        name=pynames.class_(action.name),
-        base="_idlc.Action",
-        body=(
-            *literals.docstring([f"The action {action.name}."], 4),
-            "",
-            *(f"    {part}: _idlc.TypeAlias = {name}_{part}" for part in ACTION_PARTS),
-            "",
-            "    class Impl:",
-            '        """What rclpy needs of the action."""',
-            "",
-            f"        SendGoalService = {name}_SendGoal",
-            f"        GetResultService = {name}_GetResult",
-            f"        FeedbackMessage = {name}_FeedbackMessage",
-            '        CancelGoalService = _idlc.Imported("action_msgs.srv", "CancelGoal")',
-            '        GoalStatusMessage = _idlc.Imported("action_msgs.msg", "GoalStatusArray")',
-        ),
-    )

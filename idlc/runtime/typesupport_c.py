@@ -243,13 +243,12 @@ class MessageSupport(NamedTuple):
 
 
 def callback(prototype: Any, function: Callable[..., object]) -> int:
-    """Return the C function that calls `function`, which must catch every exception.
+    """Return the C function that calls `function`, a `try` that catches everything.
 
     Signal handlers run on entry of a Python function, before its first `try`, and what
     they raise would be lost with the result. The interpreter does not look for signals
-    where a function resumes inside a `yield from`, so the function is told that it
-    does. (Python 3.10 has no such instruction; it does not look before a leading `try`
-    either.)
+    where a function resumes inside a `yield from`, so the function is told that it does.
+    (Python 3.10 has no such instruction; it does not look before a leading `try` either.)
     """
     assert isinstance(function, FunctionType)
     code = function.__code__

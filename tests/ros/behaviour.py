@@ -173,8 +173,8 @@ def memory_stays_flat(count):
     node, publisher = node_and_string()
     arrays = node.create_publisher(UInt8MultiArray, "arrays", 1)
     subscriptions = [
-        node.create_subscription(String, "topic", print, 1),
-        node.create_subscription(UInt8MultiArray, "arrays", print, 1),
+        node.create_subscription(String, "topic", [].append, 1),
+        node.create_subscription(UInt8MultiArray, "arrays", [].append, 1),
     ]
     text, numbers = String("hello"), UInt8MultiArray(data=array.array("B", bytes(20_000)))
     wrong = String(5)
@@ -234,7 +234,7 @@ def many_threads():
 
 def ends_with_messages_pending():
     node, publisher = node_and_string()
-    node.create_subscription(String, "topic", print, LATCHED)
+    node.create_subscription(String, "topic", [].append, LATCHED)
     for _ in range(5):
         publisher.publish(String("pending"))
     # neither destroyed nor shut down

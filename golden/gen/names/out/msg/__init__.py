@@ -9,12 +9,21 @@ from .. import _idlc
 
 if TYPE_CHECKING:
     from ._any import Any
+    from ._foo_bar import FOOBar
+    from ._foo_bar_2 import FooBar
     from ._odd import Odd
     from ._point import Point
     from ._text import Text
 
-__all__ = ["Any", "Odd", "Point", "Text"]
+__all__ = ["Any", "FOOBar", "FooBar", "Odd", "Point", "Text"]
 
-_MODULES = {"Any": "_any", "Odd": "_odd", "Point": "_point", "Text": "_text"}
+_MODULES = {
+    "Any": "_any",
+    "FOOBar": "_foo_bar",
+    "FooBar": "_foo_bar_2",
+    "Odd": "_odd",
+    "Point": "_point",
+    "Text": "_text",
+}
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

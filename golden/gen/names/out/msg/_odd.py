@@ -18,7 +18,7 @@ class Odd(_idlc.Message):
     Attributes:
         class_: int32, -2147483648 to 2147483647.
         serialize_: int32, -2147483648 to 2147483647.
-        self_: int32, -2147483648 to 2147483647.
+        self: int32, -2147483648 to 2147483647.
         fields_and_field_types: int32, -2147483648 to 2147483647.
         int: int32, -2147483648 to 2147483647.
         list: string.
@@ -37,7 +37,7 @@ class Odd(_idlc.Message):
     __match_args__ = (
         "class_",
         "serialize_",
-        "self_",
+        "self",
         "fields_and_field_types",
         "int",
         "list",
@@ -78,7 +78,7 @@ class Odd(_idlc.Message):
 
     class_: _builtins.int
     serialize_: _builtins.int
-    self_: _builtins.int
+    self: _builtins.int
     fields_and_field_types: _builtins.int
     int: _builtins.int
     list: _builtins.str
@@ -94,10 +94,10 @@ class Odd(_idlc.Message):
     order: _arrays.Int32Array = _arrays.Int32Array(3)
 
     def __init__(
-        self,
+        _self,
         class_: _builtins.int = 0,
         serialize_: _builtins.int = 3,
-        self_: _builtins.int = 0,
+        self: _builtins.int = 0,
         fields_and_field_types: _builtins.int = 0,
         int: _builtins.int = 4,
         list: _builtins.str = "",
@@ -112,25 +112,25 @@ class Odd(_idlc.Message):
         array: Point | None = None,
         order: _arrays.Values | None = None,
     ) -> None:
-        self._class = class_
-        self._serialize = serialize_
-        self._self = self_
-        self._fields_and_field_types_ = fields_and_field_types
-        self._int = int
-        self._list = list
-        self._bytes = bytes
-        self._bool = bool
-        self._float = float
-        self._str = ["a", 'b "c"'] if str is None else str
-        self._message = message
-        self._data = data
-        self._at = at
-        self._item = [] if item is None else item
-        self._array = Point() if array is None else array
+        _self._class = class_
+        _self._serialize = serialize_
+        _self._self = self
+        _self._fields_and_field_types_ = fields_and_field_types
+        _self._int = int
+        _self._list = list
+        _self._bytes = bytes
+        _self._bool = bool
+        _self._float = float
+        _self._str = ["a", 'b "c"'] if str is None else str
+        _self._message = message
+        _self._data = data
+        _self._at = at
+        _self._item = [] if item is None else item
+        _self._array = Point() if array is None else array
         if order is None:
-            self._order = _arrays.array((1, 2, 3), _arrays.INT32)
+            _self._order = _arrays.array((1, 2, 3), _arrays.INT32)
         else:
-            self._order = _arrays.to_ndarray(_arrays.INT32, 3, order)
+            _self._order = _arrays.to_ndarray(_arrays.INT32, 3, order)
 
 
 @_idlc.codec_for(Odd)
