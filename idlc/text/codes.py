@@ -167,6 +167,8 @@ DRIFT = Code("IDL616", "drift", ERROR)
 NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
 NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
 STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
+EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
+CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 
 # idlc itself
