@@ -4,11 +4,10 @@ import ast
 import subprocess
 import sys
 
-import generated
-import jinja2.nodes as nodes
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from jinja2 import UndefinedError
 
 from idlc.emit import literals, render
 from idlc.model import ir, link
@@ -138,73 +137,6 @@ def test_pages_of_hostile_text_are_formatted_and_clean(hostile_folder):
         assert result.returncode == 0, result.stdout + result.stderr
 
 
-# Templates only lay out; Python decides.
-
-ALLOWED = (
-    nodes.Template,
-    nodes.Output,
-    nodes.TemplateData,
-    nodes.Name,
-    nodes.Getattr,
-    nodes.For,
-    nodes.If,
-    nodes.Macro,
-    nodes.FromImport,
-    nodes.Import,
-)
-
-
-def violations(source):
-    """Return what a template does beyond laying out."""
-    tree = render.environment().parse(source)
-    found = [type(node).__name__ for node in tree.find_all(nodes.Node) if not fine(node)]
-    nested = [inner for outer in tree.find_all(nodes.If) for inner in outer.find_all(nodes.If)]
-    return found + ["nested if" for _ in nested]
-
-
-def fine(node):
-    if isinstance(node, nodes.Filter):
-        return node.name == "indent"
-    if isinstance(node, nodes.Call):
-        return isinstance(node.node, nodes.Name)
-    if isinstance(node, nodes.For):
-        return not node.else_ and node.test is None and not node.recursive
-    if isinstance(node, nodes.If):
-        return isinstance(node.test, (nodes.Name, nodes.Getattr))
-    return isinstance(node, ALLOWED)
-
-
-TEMPLATES = sorted((generated.ROOT / "templates").glob("*.py.jinja"))
-
-
-@pytest.mark.parametrize("path", TEMPLATES, ids=lambda path: path.name)
-def test_a_template_only_lays_out(path):
-    source = path.read_text(encoding="utf-8")
-    assert violations(source) == []
-    assert len(source.splitlines()) <= 80
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "{% set a = 1 %}",
-        "{{ a + 1 }}",
-        "{{ a ~ b }}",
-        "{{ a == b }}",
-        "{{ a.b() }}",
-        "{{ a | upper }}",
-        "{% if a %}{% if b %}{% endif %}{% endif %}",
-        "{% if a == 1 %}{% endif %}",
-        "{{ a[0] }}",
-        "{{ 'text' }}",
-    ],
-)
-def test_the_rule_for_templates_finds_logic(source):
-    assert violations(source)
-
-
 def test_an_unknown_name_in_a_template_is_an_error():
-    from jinja2 import UndefinedError
-
     with pytest.raises(UndefinedError):
         render.environment().from_string("{{ nothing }}").render()

@@ -18,6 +18,8 @@ from idlc.model import ir
 def text(value: str) -> str:
     """Return a string literal with the quotes that formatters choose."""
     quote = '"' if value.count('"') <= value.count("'") else "'"
+    if value.isascii() and value.isprintable():
+        return quote + value.replace("\\", "\\\\").replace(quote, "\\" + quote) + quote
     return quote + "".join(_escaped(c, quote) for c in value) + quote
 
 
@@ -62,7 +64,10 @@ def printable(character: str) -> str:
 
 def prose(line: str) -> str:
     """Return a line of a docstring."""
-    shown = "".join("\\\\" if c == "\\" else printable(c) for c in line.expandtabs(4))
+    if line.isascii() and line.isprintable():
+        shown = line.replace("\\", "\\\\")
+    else:
+        shown = "".join("\\\\" if c == "\\" else printable(c) for c in line.expandtabs(4))
     return shown.replace('"""', '\\"\\"\\"').rstrip()
 
 
@@ -86,6 +91,8 @@ def _safe_start(line: str) -> str:
 
 def wrapped(words: str, indent: int, first: int) -> list[str]:
     """Return words wrapped for a docstring of class members, hanging by four columns."""
+    if first + len(words) <= WIDTH - 4:
+        return [" " * first + words]
     return textwrap.wrap(
         words,
         WIDTH - 4,

@@ -114,6 +114,7 @@ def _message(
     references: References,
     messages: layout.Messages,
 ) -> MessageView:
+    views = _field_views(structure, references)
     names = pynames.Locals()
     steps = layout.steps(structure, messages, names)
     tables = Tables(names)
@@ -128,8 +129,8 @@ def _message(
     bulk = ", bulk=True" if is_bulk(steps) else ""
     return MessageView(
         name=references.name(structure.name),
-        body=tuple(_body(structure, references)),
-        init=tuple(_init(structure, references)),
+        body=tuple(_body(structure, views)),
+        init=tuple(_init(structure, views)),
         codec=_codec_head(structure.name),
         tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
@@ -171,7 +172,7 @@ def _codec_imports(
     return [*result, ""] if result else []
 
 
-def _body(structure: ir.Message, references: References) -> list[str]:
+def _body(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
     """Return the class's docstring, names, constants and fields."""
     public = [f'"{pynames.field(field.name)}"' for field in structure.fields]
     types = tuple(f'"{field.name}": "{fields.idl_text(field.type)}"' for field in structure.fields)
@@ -182,7 +183,7 @@ def _body(structure: ir.Message, references: References) -> list[str]:
         *_tuple("__match_args__", tuple(public)),
         *lines(Group("", types, brackets="{}"), 4, f"_fields_and_field_types: {TYPES} = "),
         *_separated(_constants(structure)),
-        *_separated([f"    {v.declaration}" for v in _field_views(structure, references)]),
+        *_separated([f"    {view.declaration}" for view in views]),
     ]
 
 
@@ -200,11 +201,10 @@ def _receiver(structure: ir.Message) -> str:
     return "_self" if any(field.name == "self" for field in structure.fields) else "self"
 
 
-def _init(structure: ir.Message, references: References) -> list[str]:
+def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
     """Return the constructor."""
     if not structure.fields:
         return ["    def __init__(self) -> None:", "        pass"]
-    views = _field_views(structure, references)
     return [
         "    def __init__(",
         f"        {_receiver(structure)},",
