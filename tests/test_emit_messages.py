@@ -70,6 +70,8 @@ def test_it_is_a_dataclass():
     other = dataclasses.replace(message, name="you", ids=[1])
     assert (other.name, other.ids, other.goal.x) == ("you", array("i", [1]), 2.0)
     assert message.name == "me"
+    if sys.version_info >= (3, 13):
+        assert copy.replace(message, name="you").name == "you"
     assert dataclasses.asdict(message)["goal"] == {"x": 2.0, "y": 1.5}
     match message:
         case cls("me", mode, goal=goal):
