@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 FORMATS = ("text", "json")
+REPORT_FORMATS = (*FORMATS, "github", "sarif", "junit", "gitlab")
+
+if TYPE_CHECKING:
+    from idlc.checks.select import Selection
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -44,3 +48,30 @@ def style(command: Command) -> Command:
         show_default=True,
         help="For people, or one JSON object per line.",
     )(command)
+
+
+def report_style(command: Command) -> Command:
+    """Add --format with the formats that CI systems read."""
+    return click.option(
+        "--format",
+        "style",
+        type=click.Choice(REPORT_FORMATS),
+        default="text",
+        show_default=True,
+        help="For people, one JSON object per line, or what a CI system reads.",
+    )(command)
+
+
+def selection(configured: Selection, select: str | None, ignore: str | None) -> Selection:
+    """Return which warnings are wanted: what pyproject.toml says, and what was typed."""
+    from idlc.checks.select import is_selector
+
+    for words in (select, ignore):
+        for word in (words or "").split(","):
+            if word and not is_selector(word):
+                raise click.UsageError(f"{word!r} means no rule; see `idlc explain` for codes")
+    if select:
+        configured = configured._replace(select=tuple(select.split(",")))
+    if ignore:
+        configured = configured._replace(ignore=(*configured.ignore, *ignore.split(",")))
+    return configured

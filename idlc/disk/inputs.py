@@ -121,7 +121,7 @@ def one_package(
     if package is None:
         package = absolute(out).name
         origin = "the folder given with -o"
-    if not _accept_name(package, origin, report):
+    if not accept_name(package, origin, report):
         return None
     return _load(package, files, report)
 
@@ -148,7 +148,8 @@ def _reject_several(homes: Mapping[Path, list[InterfaceFile]], report: Report) -
     )
 
 
-def _accept_name(name: str, origin: str, report: Report) -> bool:
+def accept_name(name: str, origin: str, report: Report) -> bool:
+    """Return whether a package can be called so and imported; reports IDL607."""
     if not is_package_name(name):
         what = "is not a package name: lower-case letters, digits and single underscores"
     elif keyword.iskeyword(name):

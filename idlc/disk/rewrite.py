@@ -6,14 +6,16 @@ import contextlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.disk.read import reason
 from idlc.text import codes
+from idlc.text.edits import apply
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Report
+    from idlc.text.diagnostics import Edit, Report
 
 
 def replace(path: Path, name: str, data: bytes, report: Report) -> bool:
@@ -37,3 +39,16 @@ def replace(path: Path, name: str, data: bytes, report: Report) -> bool:
         report.add(codes.CANNOT_WRITE.of(name, f"cannot write `{name}`: {reason(error)}"))
         return False
     return True
+
+
+def mend(edits: Iterable[Edit], report: Report) -> int:
+    """Make edits in the files that they are for; return how many were made."""
+    by_path: dict[str, list[Edit]] = {}
+    for edit in edits:
+        by_path.setdefault(edit.span.source.path, []).append(edit)
+    done = 0
+    for name, own in by_path.items():
+        text, number = apply(own[0].span.source.text, own)
+        if replace(Path(name), name, text.encode("utf-8"), report):
+            done += number
+    return done

@@ -11,6 +11,7 @@ from idlc.text.codes import BAD_CONFIG, CODES
 from idlc.text.suggest import did_you_mean
 
 if TYPE_CHECKING:
+    from idlc.checks.select import Selection
     from idlc.model.changes.allow import Allowance
     from idlc.text.diagnostics import Report
 
@@ -37,6 +38,28 @@ def against(config: Config, report: Report) -> str | None:
         _complain(config, "against", "`against` in [tool.idlc.breaking] must be a string", report)
         return None
     return value
+
+
+def selection(config: Config, report: Report) -> Selection:
+    """Return which warnings `[tool.idlc.check]` asks for."""
+    from idlc.checks.select import is_selector, selection
+
+    table = _table(config, "check", ("select", "ignore", "per-path"), report)
+    per_path = table.get("per-path", {})
+    if not isinstance(per_path, dict):
+        _complain(config, "per-path", "`per-path` in [tool.idlc.check] must be a table", report)
+        return selection({})
+    lists = [(key, table[key]) for key in ("select", "ignore") if key in table]
+    for key, words in (*lists, *per_path.items()):
+        if not isinstance(words, list) or not all(isinstance(word, str) for word in words):
+            message = f"`{key}` in [tool.idlc.check] must be a list of strings"
+            _complain(config, key, message, report)
+            return selection({})
+        for word in words:
+            if not is_selector(word):
+                message = f"`{key}` in [tool.idlc.check] has `{word}`, which means no rule"
+                _complain(config, key, message, report)
+    return selection(table)
 
 
 def _complain(config: Config, key: str, message: str, report: Report) -> None:

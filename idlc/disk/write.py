@@ -20,7 +20,7 @@ from idlc.disk import lock
 from idlc.disk.plan import Change, Plan, emptied
 from idlc.disk.read import is_file, is_folder, reason
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Diagnostic, Report
 
 STAGE = ".idlc-stage-"
 #: Seconds after which a staging folder counts as abandoned where processes cannot be asked.
@@ -73,13 +73,24 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
                 os.utime(lock_path)
             _sweep(plan.out)
             return True
-        transaction = _Transaction(plan.out)
     except OSError as error:
-        report.add(codes.CANNOT_WRITE.of(name, f"cannot write to `{name}`: {reason(error)}"))
+        report.add(_failure(name, error))
         return False
     change = Change(lock.FILE, old_lock, new_lock)
+    return _carry_out(plan.out, (*plan.changes, change), new_lock, name, report)
+
+
+def _carry_out(
+    out: Path, changes: tuple[Change, ...], journal: bytes, name: str, report: Report
+) -> bool:
+    """Make all changes or none; report IDL612 and return `False` on a failure."""
     try:
-        transaction.run((*plan.changes, change), new_lock)
+        transaction = _Transaction(out)
+    except OSError as error:
+        report.add(_failure(name, error))
+        return False
+    try:
+        transaction.run(changes, journal)
     except BaseException as error:
         torn = transaction.undo()
         if not isinstance(error, OSError):
@@ -88,8 +99,19 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
         message = f"cannot write `{where}`: {reason(error)}"
         report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
         return False
-    _sweep(plan.out)
+    _sweep(out)
     return True
+
+
+def _failure(name: str, error: OSError) -> Diagnostic:
+    return codes.CANNOT_WRITE.of(name, f"cannot write to `{name}`: {reason(error)}")
+
+
+def apply_changes(plan: Plan, name: str, report: Report) -> bool:
+    """Make changes in a folder that has no lock; report IDL612 and return `False` on a failure."""
+    if not plan.changes:
+        return True
+    return _carry_out(plan.out, plan.changes, b"", name, report)
 
 
 def _outcome(torn: list[str], name: str) -> str:
@@ -147,6 +169,8 @@ class _Transaction:
             if change.new is None:
                 target.unlink()
             else:
+                if change.old is not None:
+                    (self._stage / str(number)).chmod(target.stat().st_mode & 0o7777)
                 self._make_folder(target.parent)
                 (self._stage / str(number)).replace(target)
             self._done.append((change.path, change.old))

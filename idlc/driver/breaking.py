@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from idlc.disk import inputs, lock
 from idlc.disk.find import InterfaceFile, find
-from idlc.disk.manifest import statements
 from idlc.disk.package import manifest
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out
+from idlc.disk.statements import statements
 from idlc.driver.stages import models_of, stage
 from idlc.model.changes.allow import Allowance, without_allowed
 from idlc.model.changes.change import LEVELS

@@ -1,4 +1,4 @@
-"""The pipelines of the commands that answer: check, hash and describe."""
+"""The pipelines of the commands that answer: hash and describe."""
 
 from __future__ import annotations
 
@@ -16,14 +16,6 @@ from idlc.text.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-
-
-def check(paths: Sequence[str], package: str | None, include: Sequence[str], report: Report) -> int:
-    """Report every problem of the files that paths mean; return how many files that are."""
-    files = find(paths, report)
-    for _ in models_of(inputs.packages(files, package, report), include, report):
-        pass
-    return len(files)
 
 
 def hashes(

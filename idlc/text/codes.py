@@ -1,6 +1,6 @@
 """Every code that idlc can report: stable, never renumbered, never reused.
 
-1xx syntax, 2xx names and references, 3xx types, bounds and values, 4xx style, 5xx breaking
+1xx syntax, 2xx names and references, 3xx types, bounds and values, 4xx advice, 5xx breaking
 changes, 6xx files and projects, 9xx idlc itself. `explain/<id>.md` holds each one's page.
 """
 
@@ -94,6 +94,39 @@ WSTRING_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
 CONSTANT_MOVED = Code("IDL313", "repeated-section-constant", WARNING)
 FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
 
+# style
+STAMPED_WITHOUT_HEADER = Code("IDL401", "stamped-without-header", WARNING)
+UNDOCUMENTED_INTERFACE = Code("IDL402", "undocumented-interface", WARNING)
+UNDOCUMENTED_FIELD = Code("IDL403", "undocumented-field", WARNING)
+MISSING_UNIT = Code("IDL404", "missing-unit", WARNING)
+UNUSUAL_UNIT = Code("IDL405", "unusual-unit", WARNING)
+CONSTANT_PREFIX = Code("IDL406", "constant-without-prefix", WARNING)
+REDUNDANT_SUFFIX = Code("IDL407", "redundant-suffix", WARNING)
+
+# surprises of ROS 2's pipeline
+SEVERAL_UNITS = Code("IDL411", "several-units", WARNING)
+
+# portability
+WIDE_STRING = Code("IDL421", "wide-string", WARNING)
+CHAR_TYPE = Code("IDL422", "char-type", WARNING)
+NESTED_BOUND = Code("IDL423", "unenforced-bound", WARNING)
+
+# the package around the interfaces
+MISSING_DEPENDENCY = Code("IDL451", "missing-dependency", WARNING)
+UNUSED_DEPENDENCY = Code("IDL452", "unused-dependency", WARNING)
+NO_INTERFACE_GROUP = Code("IDL453", "not-in-interface-group", WARNING)
+NO_GENERATORS = Code("IDL454", "no-interface-generators", WARNING)
+NOT_INSTALLED = Code("IDL455", "interfaces-not-installed", WARNING)
+NO_RESOURCE_MARKER = Code("IDL456", "no-resource-marker", WARNING)
+BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING)
+NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING)
+UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING)
+STALE_OUTPUT = Code("IDL460", "stale-generated-code", WARNING)
+
+# remarks that silence others
+UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
+IGNORE_WITHOUT_REASON = Code("IDL491", "ignore-without-reason", WARNING)
+
 # breaking changes
 INTERFACE_REMOVED = Code("IDL501", "interface-removed", ERROR)
 INTERFACE_RENAMED = Code("IDL502", "interface-renamed", ERROR)
@@ -134,6 +167,8 @@ DRIFT = Code("IDL616", "drift", ERROR)
 NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
 NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
 STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
+EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
+CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 
 # idlc itself

@@ -28,13 +28,20 @@ class Label(msgspec.Struct, frozen=True):
     text: str
 
 
+class Edit(msgspec.Struct, frozen=True):
+    """A replacement that mends a problem and does no harm."""
+
+    span: Span
+    text: str
+
+
 class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     """One problem.
 
     `span` is the smallest guilty piece; a problem with a whole file or folder has none
     and names it in `path`. `hint` is something to do, in the imperative or as a question.
     `detail` is preformatted text of several lines, such as a diff.
-    `levels` is what a change between two versions breaks.
+    `levels` is what a change between two versions breaks, `edits` is what `check --fix` does.
     """
 
     code: str
@@ -46,6 +53,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     hint: str | None = None
     detail: str = ""
     levels: tuple[str, ...] = ()
+    edits: tuple[Edit, ...] = ()
 
     @property
     def where(self) -> tuple[str, int]:

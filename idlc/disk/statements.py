@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
+from idlc.checks.facts import Statement
 from idlc.disk.read import read_source
-from idlc.text.source import Span
+from idlc.text.source import Source, Span
 
 if TYPE_CHECKING:
     from idlc.text.diagnostics import Report
 
 
-class Statement(NamedTuple):
-    """An element directly below <package>, or below its <export>; `span` is its start tag."""
-
-    tag: str
-    text: str
-    span: Span
-
-
 def statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
     """Return what a package.xml says, in order; empty for a file that cannot be read as XML."""
     source = read_source(path, name, report)
-    if source is None:
-        return ()
+    return () if source is None else read_statements(source)
+
+
+def read_statements(source: Source) -> tuple[Statement, ...]:
+    """Return what the text of a package.xml says, in order; empty if it is no XML."""
     data = source.text.encode("utf-8")
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
@@ -55,12 +51,3 @@ def statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
     except (expat.ExpatError, ValueError):
         return ()
     return tuple(found)
-
-
-def declared(statements: tuple[Statement, ...], *tags: str) -> dict[str, Statement]:
-    """Return the statements with one of these tags by their text, the first of each."""
-    found: dict[str, Statement] = {}
-    for statement in statements:
-        if statement.tag in tags:
-            found.setdefault(statement.text, statement)
-    return found

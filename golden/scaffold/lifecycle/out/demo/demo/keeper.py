@@ -1,0 +1,162 @@
+"""The lifecycle node keeper."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import sys
+import time
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args, try_shutdown
+from std_msgs.msg import Empty
+from std_srvs.srv import Empty as std_srvs_srv_Empty
+from std_srvs.srv import SetBool
+
+
+class Keeper(LifecycleNode):
+    """The lifecycle node keeper."""
+
+    def __init__(self, given: argparse.Namespace) -> None:
+        """Create what the node consists of."""
+        super().__init__('keeper')
+        self.given = given
+        self.timeout: float = given.server_timeout
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Create what is there in every state but the first."""
+        self.beat_publisher = self.create_lifecycle_publisher(Empty, 'beat', 10)
+        self.switch_client = self.create_client(SetBool, 'switch')
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start to work."""
+        self.beat_timer = self.create_timer(1.0, self.publish_beat)
+        self.beat_subscription = self.create_subscription(Empty, 'beat', self.receive_beat, 10)
+        self.reset_service = self.create_service(std_srvs_srv_Empty, 'reset', self.handle_reset)
+        self.tick_timer = self.create_timer(3.0, self.tick)
+        if self.executor is not None:
+            self.executor.create_task(self.call_switch, switch_request(self.given))
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop working."""
+        self.destroy_timer(self.beat_timer)
+        self.destroy_subscription(self.beat_subscription)
+        self.destroy_service(self.reset_service)
+        self.destroy_timer(self.tick_timer)
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Remove what `on_configure` created."""
+        self.destroy_lifecycle_publisher(self.beat_publisher)
+        self.destroy_client(self.switch_client)
+        return super().on_cleanup(state)
+
+    def publish_beat(self) -> None:
+        """Publish a message on beat."""
+        message = Empty()
+        self.beat_publisher.publish(message)
+
+    def receive_beat(self, message: Empty) -> None:
+        """Act on a message from beat."""
+        self.get_logger().info('beat: message received')
+
+    def handle_reset(
+        self, request: std_srvs_srv_Empty.Request, response: std_srvs_srv_Empty.Response
+    ) -> std_srvs_srv_Empty.Response:
+        """Answer a request to reset."""
+        self.get_logger().info('reset: request received')
+        return response
+
+    async def call_switch(self, request: SetBool.Request) -> bool:
+        """Call switch once; return whether it answered in time."""
+        if not await self.until(self.switch_client.service_is_ready):
+            self.get_logger().error('switch: there is no server')
+            return False
+        answer = self.switch_client.call_async(request)
+        if not await self.until(answer.done):
+            self.get_logger().error('switch: no answer in time')
+            return False
+        response: SetBool.Response | None = answer.result()
+        if response is None:
+            return False
+        self.get_logger().info(
+            f'switch: success={response.success!r} message={response.message!r}'
+        )
+        return True
+
+    def tick(self) -> None:
+        """Do what is to be done again and again."""
+        self.get_logger().info('tick')
+
+    async def until(self, condition: Callable[[], bool]) -> bool:
+        """Wait until a condition holds; return whether it did so in time."""
+        deadline = time.monotonic() + self.timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            await self.pause(0.05)
+        return True
+
+    async def pause(self, seconds: float) -> None:
+        """Wait without blocking: other callbacks run in the meantime."""
+        over: Future = Future()
+        timer = self.create_timer(seconds, lambda: over.set_result(None))
+        await over
+        self.destroy_timer(timer)
+
+
+def parse_arguments(args: list[str] | None) -> argparse.Namespace:
+    """Return what the command line says, ROS 2's own arguments left out."""
+    parser = argparse.ArgumentParser(
+        description='The lifecycle node keeper.',
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        '--server-timeout',
+        type=float,
+        default=5.0,
+        metavar='SECONDS',
+        help='How long to wait for a server and for its answer.',
+    )
+    parser.add_argument(
+        '--data',
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help='data',
+    )
+    words = remove_ros_args(sys.argv if args is None else args)
+    return parser.parse_args(words[1:])
+
+
+def switch_request(given: argparse.Namespace) -> SetBool.Request:
+    """Return the request that the command line asks for."""
+    return SetBool.Request(
+        data=given.data,
+    )
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node until it is asked to end."""
+    given = parse_arguments(args)
+    rclpy.init(args=args)
+    try:
+        node = Keeper(given)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

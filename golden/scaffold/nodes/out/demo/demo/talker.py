@@ -1,0 +1,95 @@
+"""The node talker publishes command and listens to ~/words."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+from demo.msg import Command
+from geometry_msgs.msg import Twist, Vector3
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.utilities import try_shutdown
+from std_msgs.msg import String
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Talker(Node):
+    """The node talker publishes command and listens to ~/words."""
+
+    def __init__(self) -> None:
+        """Create what the node consists of."""
+        super().__init__('talker')
+        self.declare_parameter('speed', 0.5)
+        self.declare_parameter('names', ['a', 'b'])
+        self.command_publisher = self.create_publisher(Command, 'command', LATCHED)
+        self.command_timer = self.create_timer(0.1, self.publish_command)
+        self.words_subscription = self.create_subscription(
+            String,
+            '~/words',
+            self.receive_words,
+            qos_profile_sensor_data,
+        )
+        self.tick_timer = self.create_timer(0.25, self.tick)
+
+    @property
+    def param_speed(self) -> float:
+        """Return the parameter `speed`, as it is now."""
+        value: float = self.get_parameter('speed').value
+        return value
+
+    @property
+    def param_names(self) -> list[str]:
+        """Return the parameter `names`, as it is now."""
+        value: list[str] = list(self.get_parameter('names').value)
+        return value
+
+    def publish_command(self) -> None:
+        """Publish a message on command."""
+        message = Command(
+            command=Command.STOP,
+            # where to [m/s]
+            twist=Twist(
+                linear=Vector3(
+                    x=0.0,
+                    y=0.0,
+                    z=0.0,
+                ),
+                angular=Vector3(
+                    x=0.0,
+                    y=0.0,
+                    z=0.0,
+                ),
+            ),
+            colour=[0] * 3,
+        )
+        self.command_publisher.publish(message)
+
+    def receive_words(self, message: String) -> None:
+        """Act on a message from ~/words."""
+        self.get_logger().info(f'~/words: data={message.data!r}')
+
+    def tick(self) -> None:
+        """Do what is to be done again and again."""
+        self.get_logger().info('tick')
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node until it is asked to end."""
+    rclpy.init(args=args)
+    try:
+        node = Talker()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

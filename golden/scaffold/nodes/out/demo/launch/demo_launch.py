@@ -1,0 +1,19 @@
+"""Start the nodes of demo."""
+
+from launch import LaunchDescription
+from launch_ros.actions import Node
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return the nodes to start."""
+    return LaunchDescription(
+        [
+            # the nodes
+            Node(package='demo', executable='talker', output='screen'),
+            Node(package='demo', executable='oracle', output='screen'),
+            Node(package='demo', executable='asker', output='screen'),
+            Node(package='demo', executable='station', output='screen'),
+            Node(package='demo', executable='ship', output='screen'),
+            Node(package='demo', executable='both', output='screen'),
+        ]
+    )

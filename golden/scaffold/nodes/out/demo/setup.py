@@ -1,0 +1,51 @@
+"""Install demo: `colcon build` and `pip install` both come here."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+package_name = 'demo'
+
+try:
+    from idlc.build import compile_interfaces
+except ImportError:
+    pass  # what was compiled last is installed
+else:
+    compile_interfaces(package_name)
+
+setup(
+    name=package_name,
+    version='0.1.0',
+    packages=find_packages(exclude=['test']),
+    package_data={'': ['*.json', 'idlc.lock', 'py.typed']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        (
+            'share/ament_index/resource_index/rosidl_interfaces',
+            glob('resource/rosidl_interfaces/*'),
+        ),
+        ('share/' + package_name, ['package.xml']),
+        ('share/' + package_name + '/launch', glob('launch/*launch.*')),
+        ('share/' + package_name + '/msg', glob('msg/*.msg') + glob('resource/msg/*')),
+        ('share/' + package_name + '/srv', glob('srv/*.srv') + glob('resource/srv/*')),
+        ('share/' + package_name + '/action', glob('action/*.action') + glob('resource/action/*')),
+    ],
+    install_requires=['numpy', 'setuptools'],
+    zip_safe=False,
+    maintainer='Your Name',
+    maintainer_email='you@example.com',
+    description='The package demo.',
+    license='Apache-2.0',
+    extras_require={'test': ['pytest']},
+    entry_points={
+        'console_scripts': [
+            # 'command = demo.module:function',
+            'talker = demo.talker:main',
+            'oracle = demo.oracle:main',
+            'asker = demo.asker:main',
+            'station = demo.station:main',
+            'ship = demo.ship:main',
+            'both = demo.both:main',
+        ],
+    },
+)

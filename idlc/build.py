@@ -1,0 +1,43 @@
+"""What the setup.py of a scaffolded package calls: its interfaces compiled before it is built."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+from idlc.cli import terminal
+from idlc.disk.find import find
+from idlc.disk.inputs import one_package
+from idlc.disk.project import Project
+from idlc.driver.gen import GenOptions, gen
+from idlc.driver.query import describe
+from idlc.text.diagnostics import Report
+
+#: Where the files are that ROS 2's tools look up when the package is installed.
+RESOURCE = "resource"
+INDEX = "rosidl_interfaces"
+
+
+def compile_interfaces(package: str) -> None:
+    """Bring the package's classes, and what ROS 2 installs beside interfaces, up to date.
+
+    Works in the working folder, and writes nothing where nothing changed. A rejected interface ends
+    the build with a report.
+    """
+    report = Report()
+    given = one_package(find((".",), Report()), package, package, report)
+    if given is None:
+        return
+    gen(GenOptions(paths=(".",), out=package, package=package), report)
+    project = Project(".", report)
+    files = {f"{RESOURCE}/{INDEX}/{package}": "".join(f"{key}\n" for key in sorted(given.digests))}
+    for one in given.files:
+        if not report.had_errors:
+            content = json.dumps(describe(one.file.shown, package, (), report), indent=2)
+            files[f"{RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
+    planned = None if report.had_errors else project.plan({}, files)
+    if planned is not None:
+        project.apply(planned[0])
+    terminal.show(report, "text", sys.stderr)
+    if report.had_errors:
+        raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")

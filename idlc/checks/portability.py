@@ -1,0 +1,97 @@
+"""What ROS 2 accepts and then treats differently here and there."""
+
+from __future__ import annotations
+
+import msgspec
+
+from idlc.checks.scope import sections
+from idlc.checks.units import BRACKETS, REMARK, is_unit
+from idlc.model import ir
+from idlc.model.link import Model
+from idlc.text import codes
+from idlc.text.diagnostics import Edit, Report
+from idlc.text.source import Span
+
+
+def wide_strings(model: Model, report: Report) -> None:
+    """`wstring` is not used: its encoding differs between middlewares and platforms."""
+    for message in sections(model):
+        for field in message.fields:
+            if _is_string(field.type, wide=True) and field.type_span:
+                report.add(
+                    codes.WIDE_STRING.at(
+                        field.type_span,
+                        "middlewares and platforms disagree on how a wstring is sent",
+                        hint="use `string`, which is UTF-8",
+                    )
+                )
+
+
+def _is_string(type_: ir.FieldType, *, wide: bool) -> bool:
+    element = ir.element_of(type_)
+    return isinstance(element, ir.String) and element.wide == wide
+
+
+def chars(model: Model, report: Report) -> None:
+    """`char` is not used: it is a uint8 that looks like a text."""
+    for message in sections(model):
+        spans = [field.type_span for field in message.fields if _is_char(field.type)]
+        spans += [_constant_type(one) for one in message.constants if _is_char(one.type)]
+        for span in spans:
+            if span is not None:
+                found = codes.CHAR_TYPE.at(
+                    span,
+                    "`char` is an unsigned number of one byte in ROS 2, not a character",
+                    hint="write `uint8`; bytes, hash and code stay the same",
+                )
+                report.add(msgspec.structs.replace(found, edits=(Edit(span, "uint8"),)))
+
+
+def _is_char(type_: ir.FieldType) -> bool:
+    return ir.element_of(type_) == ir.Primitive("char")
+
+
+def _constant_type(constant: ir.Constant) -> Span | None:
+    """Return where a constant's type stands: at the beginning of its line."""
+    span = constant.name_span
+    if span is None:
+        return None
+    line, _ = span.source.position(span.start)
+    start = span.source.line_starts[line - 1]
+    return Span(span.source, start, start + len("char"))
+
+
+def nested_bounds(model: Model, report: Report) -> None:
+    """Bounded texts are not elements of arrays: no middleware looks at their length there."""
+    for message in sections(model):
+        for field in message.fields:
+            element = ir.element_of(field.type)
+            bound = element.bound if isinstance(element, ir.String) else None
+            if bound is not None and element is not field.type and field.type_span:
+                report.add(
+                    codes.NESTED_BOUND.at(
+                        field.type_span,
+                        f"no middleware enforces that each text has at most {bound} characters",
+                        hint="check the length in code; the bound still is part of the type hash",
+                    )
+                )
+
+
+def several_units(model: Model, report: Report) -> None:
+    """A comment has one pair of brackets: of several, ROS 2 takes none as the unit."""
+    for message in sections(model):
+        for field in message.fields:
+            text = "\n".join(field.comment)
+            found = BRACKETS.findall(text)
+            meant = any(is_unit(one[1:-1]) for one in found)
+            if len(found) > 1 and meant and field.unit is None and field.name_span:
+                report.add(
+                    codes.SEVERAL_UNITS.at(
+                        field.name_span,
+                        f"`{field.name}` has no unit for ROS 2, because its comment has several "
+                        f"pairs of brackets: {', '.join(found)}",
+                        hint="write the remark with round ones, as in `ignore(IDL405)`"
+                        if REMARK.search(text)
+                        else "keep brackets for the unit alone",
+                    )
+                )

@@ -1,0 +1,149 @@
+"""Advice on names, comments and units; nothing of it changes what a file means."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+
+from idlc.checks import units
+from idlc.checks.scope import sections
+from idlc.model import derive, ir
+from idlc.model.link import Model
+from idlc.text import codes
+from idlc.text.diagnostics import Report
+from idlc.text.source import Span
+
+HEADER = ir.Ref(ir.TypeName("std_msgs", "msg", "Header"))
+_SUFFIXES = {
+    "msg": ("Msg", "Message", "Msgs"),
+    "srv": ("Srv", "Service"),
+    "action": ("Action",),
+}
+
+
+def stamped(model: Model, report: Report) -> None:
+    """A message called …Stamped begins with `std_msgs/Header header`."""
+    for interface in model.own:
+        if not isinstance(interface, ir.Message) or not interface.name.name.endswith("Stamped"):
+            continue
+        first = interface.fields[0] if interface.fields else None
+        if first is None or first.name != "header" or first.type != HEADER:
+            report.add(
+                codes.STAMPED_WITHOUT_HEADER.at(
+                    _top(interface, first),
+                    f"`{interface.name.name}` does not begin with a header",
+                    hint="make `std_msgs/Header header` the first field; tools such as tf and "
+                    "message filters look for it",
+                )
+            )
+
+
+def _top(interface: ir.Interface, first: ir.Field | None = None) -> Span:
+    if first is not None and first.type_span is not None:
+        return first.type_span
+    assert interface.source is not None
+    return Span(interface.source, 0, 0)
+
+
+def documented_interfaces(model: Model, report: Report) -> None:
+    """Every file begins with a comment that says what it is for."""
+    for interface in model.own:
+        if interface.source and not any(part.comment for part in derive.sections(interface)):
+            what = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
+            report.add(
+                codes.UNDOCUMENTED_INTERFACE.at(
+                    _top(interface),
+                    f"nothing says what {what} `{interface.name.name}` is for",
+                    hint="begin the file with a comment and an empty line",
+                )
+            )
+
+
+def documented_fields(model: Model, report: Report) -> None:
+    """Every field has a comment or a unit, or stands in a message whose comment is all there is."""
+    for message in sections(model):
+        for field in message.fields:
+            if not field.comment and not units.unit_of(field) and field.name_span:
+                report.add(
+                    codes.UNDOCUMENTED_FIELD.at(
+                        field.name_span,
+                        f"nothing says what `{field.name}` means",
+                        hint="write a comment before or behind it",
+                    )
+                )
+
+
+def _quantities(model: Model) -> Iterable[ir.Field]:
+    """Return the fields that hold floating-point numbers."""
+    floats = (ir.Primitive("float32"), ir.Primitive("float64"))
+    for message in sections(model):
+        yield from (field for field in message.fields if ir.element_of(field.type) in floats)
+
+
+def missing_units(model: Model, report: Report) -> None:
+    """A number that is a physical quantity by its name says its unit."""
+    for field in _quantities(model):
+        unit = units.expected(field.name)
+        if unit and not units.unit_of(field) and field.name_span and not _says(field.comment, unit):
+            report.add(
+                codes.MISSING_UNIT.at(
+                    field.name_span,
+                    f"`{field.name}` has no unit",
+                    hint=f"write it in brackets, as in `# [{unit}]`",
+                )
+            )
+
+
+def _says(comment: Iterable[str], unit: str) -> bool:
+    """Tell whether a comment names a unit without the brackets."""
+    return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
+
+
+def unusual_units(model: Model, report: Report) -> None:
+    """Units are those of REP 103: metres, radians, seconds."""
+    for field in _quantities(model):
+        on_earth = "latitude" in field.name or "longitude" in field.name
+        unit = units.unit_of(field)
+        usual = units.usual(unit) if unit and not on_earth else None
+        if usual and field.name_span:
+            report.add(
+                codes.UNUSUAL_UNIT.at(
+                    field.name_span,
+                    f"`{field.name}` is in [{unit}]",
+                    hint=f"ROS uses [{usual}] (REP 103)",
+                )
+            )
+
+
+def constant_prefixes(model: Model, report: Report) -> None:
+    """Constants that are values of one thing share the first word of their names."""
+    for message in sections(model):
+        firsts = Counter(constant.name.partition("_")[0] for constant in message.constants)
+        names = {word.upper() for field in message.fields for word in field.name.split("_")}
+        whole = [constant for constant in message.constants if isinstance(constant.value, int)]
+        for constant in whole:
+            first = constant.name.partition("_")[0]
+            alone = firsts[first] == 1 and len(whole) > 1 and first not in names
+            if alone and constant.name_span:
+                report.add(
+                    codes.CONSTANT_PREFIX.at(
+                        constant.name_span,
+                        f"`{constant.name}` does not say what it is a value of",
+                        hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",
+                    )
+                )
+
+
+def suffixes(model: Model, report: Report) -> None:
+    """The name of a file does not repeat what its extension says."""
+    for interface in model.own:
+        name, kind = interface.name.name, interface.name.kind
+        suffix = next((one for one in _SUFFIXES[kind] if name.endswith(one) and name != one), None)
+        if suffix and interface.source:
+            report.add(
+                codes.REDUNDANT_SUFFIX.of(
+                    interface.source.path,
+                    f"`{name}.{kind}` says twice that it is a .{kind} file",
+                    hint=f"call it `{name.removesuffix(suffix)}.{kind}`",
+                )
+            )

@@ -1,0 +1,68 @@
+"""`idlc scaffold package`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from idlc.cli.scaffold import common, finish
+
+EPILOG = """\
+Example:
+
+\b
+  idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com
+"""
+BUILD_TYPES = ("ament_python", "ament_cmake")
+LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
+
+
+@click.command("package", epilog=EPILOG)
+@click.argument("name", metavar="NAME")
+@click.option("--description", default="", help="What the package is for, in a sentence.")
+@click.option("--maintainer", default="Your Name", help="Who answers for it.")
+@click.option("--email", default="you@example.com", help="The maintainer's address.")
+@click.option("--license", "licence", type=click.Choice(LICENSES), default=LICENSES[0])
+@click.option("--interfaces-only", is_flag=True, help="Only interfaces, for nodes in any language.")
+@click.option(
+    "--build-type",
+    type=click.Choice(BUILD_TYPES),
+    help="ament_python is for nodes in Python and their interfaces; ament_cmake compiles "
+    "interfaces for C++ as well, and goes with --interfaces-only.",
+)
+@click.option("-C", "--folder", metavar="DIR", default=".", help="Where to make it.")
+@common
+def command(
+    name: str, interfaces_only: bool, build_type: str | None, folder: str, **given: Any
+) -> int:
+    """Write a package that builds with colcon and installs with pip.
+
+    Interfaces in its msg/, srv/ and action/ folders are compiled whenever it is built.
+    """
+    from idlc.disk.inputs import accept_name
+    from idlc.driver import scaffold
+    from idlc.scaffold.package import Package
+    from idlc.text.diagnostics import Report
+
+    if build_type == "ament_cmake" and not interfaces_only:
+        raise click.UsageError("--build-type ament_cmake goes with --interfaces-only")
+    if interfaces_only and build_type != "ament_cmake":
+        raise click.UsageError(
+            "--interfaces-only goes with --build-type ament_cmake: an ament_python package can "
+            "have interfaces anyway"
+        )
+    report = Report()
+    if not accept_name(name, "NAME", report):
+        return finish(None, report)
+    wanted = Package(
+        name,
+        given["description"] or f"The package {name}.",
+        given["maintainer"],
+        given["email"],
+        given["licence"],
+        build_type or BUILD_TYPES[0],
+    )
+    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
+    result = scaffold.package(wanted, folder, settings, report)
+    return finish(result, report, (f"cd {name}", "idlc scaffold interface --help"))

@@ -1,0 +1,42 @@
+"""A new interface file, from the fields given on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from idlc.model import names
+
+SEPARATOR = "---"
+
+
+def check_name(name: str) -> str:
+    """Return an interface's name if it can be one."""
+    if not names.is_message_name(name) or "_" in name:
+        raise ValueError(f"`{name}` cannot be an interface: {names.MESSAGE_HINT}")
+    return name
+
+
+def text(kind: str, fields: Sequence[str], comment: str = "") -> str:
+    """Return the text of an interface file; missing parts of a service or action are empty."""
+    parts: list[list[str]] = [[]]
+    for field in fields:
+        if field.strip() == SEPARATOR:
+            parts.append([])
+        else:
+            parts[-1].append(field.strip())
+    wanted = {"msg": 1, "srv": 2, "action": 3}[kind]
+    if len(parts) > wanted:
+        rule = f"a .{kind} file has {wanted} part{'s' * (wanted > 1)}"
+        raise ValueError(f"{rule}, here are {len(parts)}: there is one `---` too many")
+    parts += [[] for _ in range(wanted - len(parts))]
+    head = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
+    gap = "\n" if head and parts[0] else ""
+    body = f"{SEPARATOR}\n".join("".join(f"{line}\n" for line in part) for part in parts)
+    return head + gap + body
+
+
+def check_fields(fields: Sequence[str]) -> None:
+    """Raise ValueError for a field that would be more than one line of the file."""
+    for field in fields:
+        if len(field.splitlines()) > 1:
+            raise ValueError(f"a field is one line, not {field!r}")

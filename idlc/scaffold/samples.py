@@ -1,0 +1,232 @@
+"""Sensible values for the fields of messages, as Python source that spells every field out."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from idlc.emit import pynames
+from idlc.model import ir
+
+WIDTH = 99
+INDENT = "    "
+#: Nested messages are spelled out as long as a message has at most so many values.
+LEAVES = 16
+_TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
+_QUATERNION = ir.TypeName("geometry_msgs", "msg", "Quaternion")
+#: Values of string fields that mean the same in every message.
+_STRINGS = {"frame_id": "base_link", "child_frame_id": "base_link", "data": "hello"}
+#: Fields that hold one of the constants of their message.
+_CHOICES = ("type", "state", "status", "mode", "kind", "level", "command", "action", "code")
+
+Messages = Mapping[ir.TypeName, ir.Message]
+
+
+class Page:
+    """What one module of Python imports of interfaces, and how it calls what it imports.
+
+    `clock` is the source of the time now, where there is a clock. `taken` names mean other things.
+    """
+
+    def __init__(
+        self, messages: Messages, *, clock: str | None = None, taken: Iterable[str] = ()
+    ) -> None:
+        self.messages = messages
+        self.clock = clock
+        self._names: dict[tuple[str, str], str] = {}
+        self._taken = set(taken)
+
+    def use(self, name: ir.TypeName) -> str:
+        """Return how a class is called here, and import it."""
+        base, part = _spoken(name)
+        key = (f"{name.package}.{name.kind}", base)
+        if key not in self._names:
+            called = base if base not in self._taken else f"{name.package}_{name.kind}_{base}"
+            self._names[key] = called
+            self._taken.add(called)
+        return self._names[key] + part
+
+    @property
+    def names(self) -> set[str]:
+        """The names that are imported."""
+        return set(self._names.values())
+
+    def imports(self) -> dict[str, set[str]]:
+        """Return, for each module, what is imported from it."""
+        found: dict[str, set[str]] = {}
+        for (module, base), called in self._names.items():
+            what = base if called == base else f"{base} as {called}"
+            found.setdefault(module, set()).add(what)
+        return found
+
+
+def _spoken(name: ir.TypeName) -> tuple[str, str]:
+    """Return the interface's class, and the part of it that a section is."""
+    base, _, part = name.name.rpartition("_")
+    if name.kind != "msg" and base:
+        return pynames.class_(name._replace(name=base)), f".{part}"
+    return pynames.class_(name), ""
+
+
+class Line(NamedTuple):
+    """A line of source: how deep, and its text."""
+
+    depth: int
+    text: str
+
+    def __str__(self) -> str:
+        return INDENT * self.depth + self.text
+
+
+def constructed(
+    message: ir.Message,
+    page: Page,
+    *,
+    head: str,
+    depth: int,
+    given: Mapping[str, str] | None = None,
+) -> str:
+    """Return the lines that make a message, behind `head`, at a depth of indentation.
+
+    `given` holds the values of fields that come from elsewhere.
+    """
+    lines = list(_construct(message, page, head, depth, "", given or {}))
+    return "\n".join(map(str, lines)).lstrip()
+
+
+def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list[str]:
+    """Return the lines that give each field of a variable a value, with its documentation."""
+    found: list[str] = []
+    for field in message.fields:
+        head = f"{variable}.{pynames.field(field.name)} = "
+        nested = _nested(field, page)
+        if nested:
+            lines = [*map(str, _construct(nested, page, head, 0, "", {}))]
+        else:
+            lines = [head + sample(message, field, page)]
+        if all(len(line) + depth * len(INDENT) <= WIDTH for line in lines):
+            found += [*documented(field, depth), *lines]
+    return found
+
+
+def _construct(
+    message: ir.Message, page: Page, head: str, depth: int, tail: str, given: Mapping[str, str]
+) -> Iterator[Line]:
+    name = page.use(message.name)
+    inner = [
+        line for field in message.fields for line in _field(message, field, page, depth + 1, given)
+    ]
+    if not inner:
+        yield Line(depth, f"{head}{name}(){tail}")
+        return
+    yield Line(depth, f"{head}{name}(")
+    yield from inner
+    yield Line(depth, f"){tail}")
+
+
+def _field(
+    message: ir.Message, field: ir.Field, page: Page, depth: int, given: Mapping[str, str]
+) -> Iterator[Line]:
+    name = pynames.field(field.name)
+    nested = _nested(field, page)
+    if field.name in given:
+        value = [Line(depth, f"{name}={given[field.name]},")]
+    elif nested:
+        value = list(_construct(nested, page, f"{name}=", depth, ",", {}))
+    else:
+        value = [Line(depth, f"{name}={sample(message, field, page)},")]
+    if any(len(str(line)) > WIDTH for line in value):
+        return
+    if field.name not in given:
+        yield from (Line(depth, text) for text in documented(field, depth))
+    yield from value
+
+
+def documented(field: ir.Field, depth: int) -> list[str]:
+    """Return what the interface says about a field, as comments that fit."""
+    text = " ".join(filter(None, (clean(line) for line in field.comment)))
+    unit = f"[{clean(field.unit)}]" if field.unit else ""
+    words = " ".join(filter(None, (text, unit)))
+    width = WIDTH - len(INDENT) * depth
+    return textwrap.wrap(words, width, initial_indent="# ", subsequent_indent="# ")
+
+
+def clean(text: str) -> str:
+    """Return one line of text without anything that does not print."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _nested(field: ir.Field, page: Page) -> ir.Message | None:
+    """Return the message that a field is, if it is to be spelled out."""
+    if not isinstance(field.type, ir.Ref) or (field.type.target == _TIME and page.clock):
+        return None
+    message = page.messages[field.type.target]
+    return message if message.fields and _leaves(message, page.messages) <= LEAVES else None
+
+
+def _leaves(message: ir.Message, messages: Messages) -> int:
+    return sum(
+        _leaves(messages[field.type.target], messages) if isinstance(field.type, ir.Ref) else 1
+        for field in message.fields
+    )
+
+
+def sample(message: ir.Message, field: ir.Field, page: Page) -> str:
+    """Return the source of a sensible value for a field."""
+    if field.default is not None:
+        return literal(field.type, field.default.value)
+    constant = _choice(message, field)
+    if constant is not None:
+        return f"{page.use(message.name)}.{constant}"
+    if message.name == _QUATERNION and field.name == "w":
+        return "1.0"
+    match field.type:
+        case ir.Sequence():
+            return "[]"
+        case ir.Array(element, size):
+            return _array(element, size, page)
+        case ir.Ref(target) if target == _TIME and page.clock:
+            return page.clock
+    return _element(ir.element_of(field.type), page, field.name)
+
+
+def _choice(message: ir.Message, field: ir.Field) -> str | None:
+    """Return the first of the constants that a field is to hold one of."""
+    fitting = [constant.name for constant in message.constants if constant.type == field.type]
+    prefixed = [name for name in fitting if name.startswith(field.name.upper() + "_")]
+    if prefixed:
+        return prefixed[0]
+    chosen = fitting and field.name.rpartition("_")[2] in _CHOICES
+    return fitting[0] if chosen else None
+
+
+def _element(element: ir.Element, page: Page, name: str) -> str:
+    match element:
+        case ir.Ref(target):
+            return f"{page.use(target)}()"
+        case ir.String(bound=bound):
+            text = _STRINGS.get(name, "")
+            return repr(text if bound is None or len(text) <= bound else "")
+        case ir.Primitive(kind):
+            return literal(element, False if kind == "bool" else 0)
+    return "None"
+
+
+def _array(element: ir.Element, size: int, page: Page) -> str:
+    one = _element(element, page, "")
+    return f"[{one} for _ in range({size})]" if isinstance(element, ir.Ref) else f"[{one}] * {size}"
+
+
+def literal(type_: ir.FieldType, value: ir.Value) -> str:
+    """Return a value as Python source."""
+    element = ir.element_of(type_)
+    if isinstance(value, tuple):
+        return "[" + ", ".join(literal(element, one) for one in value) + "]"
+    if isinstance(element, ir.Primitive):
+        if element.name == "byte":
+            return repr(bytes([int(value)]))
+        if element.name.startswith("float"):
+            number = float(value)
+            return repr(number) if number - number == 0 else f"float('{number}')"
+    return repr(value)

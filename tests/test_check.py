@@ -1,0 +1,439 @@
+"""`idlc check`: what is shown, in which format, and what is mended."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Literal
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+
+from idlc.checks.lint import RULES as LINT_RULES
+from idlc.checks.package import RULES as PACKAGE_RULES
+from idlc.cli.main import main
+from idlc.text.codes import CODES
+
+#: Ten mistakes of ten kinds in five files.
+MISTAKES = {
+    "package.xml": '<package format="3">\n  <name>demo</name>\n</package>\n',
+    "msg/One.msg": "flot64 a\nint8 b 300\n  int8 c\n",
+    "msg/Two.msg": "wstring name\nfloat64 angle  # [deg]\n",
+    "msg/ThreeStamped.msg": "geometry_msgs/Pose pose\n",
+    "srv/Four.srv": "int32 a\nint32 a\n",
+    "action/Five.action": "bool lambda\n---\n---\n",
+}
+EXPECTED = [
+    ("action/Five.action", 1, "IDL220"),
+    ("msg/One.msg", 1, "IDL201"),
+    ("msg/One.msg", 2, "IDL305"),
+    ("msg/One.msg", 3, "IDL102"),
+    ("msg/ThreeStamped.msg", 1, "IDL401"),
+    ("msg/ThreeStamped.msg", 1, "IDL451"),
+    ("msg/Two.msg", 1, "IDL421"),
+    ("msg/Two.msg", 2, "IDL405"),
+    ("srv/Four.srv", 2, "IDL208"),
+    ("srv/Four.srv", 2, "IDL104"),
+]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    return tmp_path
+
+
+def write(files):
+    for path, text in files.items():
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        Path(path).write_text(text, encoding="utf-8")
+
+
+def check(capsys, *words):
+    status = main(["check", *words])
+    return status, capsys.readouterr().out
+
+
+def codes(capsys, *words):
+    _, out = check(capsys, *words, "--format", "json")
+    return [line["code"] for line in map(json.loads, out.splitlines()) if "code" in line]
+
+
+def from_text(out):
+    found = re.findall(r"\[(IDL\d+)\].*\n +--> ([^:\n]+):(\d+)", out)
+    return [(path, int(line), code) for code, path, line in found]
+
+
+def from_json(out):
+    found = [line for line in map(json.loads, out.splitlines()) if line["type"] == "diagnostic"]
+    return [(one["path"], one["line"], one["code"]) for one in found]
+
+
+def from_github(out):
+    pattern = r"::(?:error|warning) file=([^,]+),line=(\d+),.*title=(IDL\d+) [^:]*::.+"
+    found = [re.fullmatch(pattern, line) for line in out.splitlines()]
+    return [(one[1], int(one[2]), one[3]) for one in found]
+
+
+def from_gitlab(out):
+    found = msgspec.json.decode(out, type=list[GitlabIssue])
+    assert len({one.fingerprint for one in found}) == len(found)
+    return [(one.location.path, one.location.lines.begin, one.check_name) for one in found]
+
+
+def from_junit(out):
+    suite = ElementTree.fromstring(out)  # noqa: S314 - our own
+    failed = [case for case in suite if case.find("failure") is not None]
+    assert suite.tag == "testsuite"
+    assert int(suite.get("tests")) == len(suite)
+    assert int(suite.get("failures")) == len(failed)
+    found = [re.fullmatch(r"(IDL\d+) \S+:(\d+):\d+", case.get("name")) for case in failed]
+    return [
+        (case.get("classname"), int(one[2]), one[1])
+        for case, one in zip(failed, found, strict=True)
+    ]
+
+
+def from_sarif(out):
+    log = msgspec.json.decode(out, type=SarifLog)
+    (run,) = log.runs
+    ids = [rule.id for rule in run.tool.driver.rules]
+    assert len(set(ids)) == len(ids)
+    found = []
+    for result in run.results:
+        assert ids[result.ruleIndex] == result.ruleId
+        (location,) = result.locations
+        region = location.physicalLocation.region
+        assert (region.endLine, region.endColumn) >= (region.startLine, region.startColumn)
+        assert region.startLine >= 1
+        assert region.startColumn >= 1
+        uri = location.physicalLocation.artifactLocation.uri
+        found.append((uri, region.startLine, result.ruleId))
+    return found
+
+
+READERS = {
+    "text": from_text,
+    "json": from_json,
+    "github": from_github,
+    "gitlab": from_gitlab,
+    "junit": from_junit,
+    "sarif": from_sarif,
+}
+
+
+@pytest.mark.parametrize("style", READERS)
+def test_ten_mistakes_are_ten_findings_in_each_format(style, capsys):
+    write(MISTAKES)
+    status, out = check(capsys, "--format", style)
+    assert status == 1
+    assert READERS[style](out) == EXPECTED
+
+
+@pytest.mark.parametrize("style", READERS)
+def test_text_of_unknown_origin_does_no_harm_in_any_format(style, capsys):
+    write({"demo/msg/A.msg": "int8 a%0A::error::x <&>\"'\x1b[31m \u202e\nint8 \x01]]>\n"})
+    status, out = check(capsys, "demo", "--format", style)
+    assert status == 1
+    assert READERS[style](out)
+    assert "\x1b" not in out
+    assert "\x01" not in out
+
+
+@pytest.mark.parametrize("style", ["github", "gitlab", "junit", "sarif"])
+def test_a_problem_without_a_place_has_one_in_each_format(style, capsys):
+    write({"demo/msg/DriveMsg.msg": "int8 a\n"})
+    status, out = check(capsys, "demo", "--format", style)
+    assert status == 0
+    assert "IDL407" in out
+    assert "demo/msg/DriveMsg.msg" in out
+
+
+def test_nothing_found_is_a_whole_document_too(capsys):
+    write({"demo/msg/Drive.msg": "int8 a\n"})
+    assert json.loads(check(capsys, "demo", "--format", "gitlab")[1]) == []
+    assert json.loads(check(capsys, "demo", "--format", "sarif")[1])["runs"][0]["results"] == []
+    suite = ElementTree.fromstring(check(capsys, "demo", "--format", "junit")[1])  # noqa: S314
+    assert (suite.get("tests"), suite.get("failures")) == ("1", "0")
+    assert check(capsys, "demo", "--format", "github")[1] == ""
+
+
+def test_colcon_reads_the_junit_file(capsys):
+    write(MISTAKES)
+    _, out = check(capsys, "--format", "junit")
+    write({"build/demo/idlc.xunit.xml": out})
+    code = "import sys; from colcon_core.command import main; sys.exit(main(argv=sys.argv[1:]))"
+    words = ["--log-base", "/dev/null", "test-result", "--test-result-base", "build", "--verbose"]
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
+    )
+    assert "10 tests, 0 errors, 10 failures, 0 skipped" in done.stdout, done.stderr
+    assert "unknown type `flot64`" in done.stdout
+    assert done.returncode == 1
+
+
+# What of SARIF 2.1.0 applies to what idlc writes; anything else is refused.
+
+
+class Strict(msgspec.Struct, forbid_unknown_fields=True):
+    pass
+
+
+class SarifText(Strict):
+    text: str
+    markdown: str = "-"
+
+
+class SarifRegion(Strict):
+    startLine: int  # noqa: N815 - SARIF's names
+    startColumn: int  # noqa: N815
+    endLine: int  # noqa: N815
+    endColumn: int  # noqa: N815
+
+
+class SarifArtifact(Strict):
+    uri: str
+
+
+class SarifPhysical(Strict):
+    artifactLocation: SarifArtifact  # noqa: N815
+    region: SarifRegion | None = None
+
+
+class SarifLocation(Strict):
+    physicalLocation: SarifPhysical  # noqa: N815
+    message: SarifText | None = None
+
+
+class SarifReplacement(Strict):
+    deletedRegion: SarifRegion  # noqa: N815
+    insertedContent: SarifText  # noqa: N815
+
+
+class SarifChange(Strict):
+    artifactLocation: SarifArtifact  # noqa: N815
+    replacements: list[SarifReplacement]
+
+
+class SarifFix(Strict):
+    artifactChanges: list[SarifChange]  # noqa: N815
+
+
+class SarifResult(Strict):
+    ruleId: str  # noqa: N815
+    ruleIndex: int  # noqa: N815
+    level: Literal["none", "note", "warning", "error"]
+    message: SarifText
+    partialFingerprints: dict[str, str]  # noqa: N815
+    locations: list[SarifLocation] = []
+    relatedLocations: list[SarifLocation] = []  # noqa: N815
+    fixes: list[SarifFix] = []
+
+
+class SarifLevel(Strict):
+    level: Literal["none", "note", "warning", "error"]
+
+
+class SarifRule(Strict):
+    id: str
+    name: str
+    shortDescription: SarifText  # noqa: N815
+    help: SarifText
+    defaultConfiguration: SarifLevel  # noqa: N815
+
+
+class SarifDriver(Strict):
+    name: str
+    version: str
+    rules: list[SarifRule]
+
+
+class SarifTool(Strict):
+    driver: SarifDriver
+
+
+class SarifRun(Strict):
+    tool: SarifTool
+    columnKind: Literal["utf16CodeUnits", "unicodeCodePoints"]  # noqa: N815
+    results: list[SarifResult]
+
+
+class SarifLog(Strict):
+    schema: str = msgspec.field(name="$schema")
+    version: Literal["2.1.0"]
+    runs: list[SarifRun]
+
+
+class GitlabLines(Strict):
+    begin: int
+
+
+class GitlabLocation(Strict):
+    path: str
+    lines: GitlabLines
+
+
+class GitlabIssue(Strict):
+    type: Literal["issue"]
+    check_name: str
+    description: str
+    severity: Literal["info", "minor", "major", "critical", "blocker"]
+    fingerprint: str
+    location: GitlabLocation
+
+
+PACKAGE_XML = """<?xml version="1.0"?>
+<package format="3">
+  <name>demo</name>  <!-- ours -->
+  <depend>std_msgs</depend>
+
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+
+
+def test_what_can_be_mended_is_mended_once_and_nothing_else_changes(capsys):
+    write(
+        {
+            "package.xml": PACKAGE_XML,
+            "CMakeLists.txt": "rosidl_generate_interfaces(demo msg/A.msg)\n",
+            "msg/A.msg": "# char is a word\nchar[3]   a\nchar  B=5  # a char\n"
+            "std_msgs/Header h\ngeometry_msgs/Pose p # idlc: ignore[IDL401] no longer true\n",
+        }
+    )
+    status, out = check(capsys, "--fix")
+    assert status == 0
+    assert out == "7 problems mended, no problems in 1 file\n"
+    assert Path("msg/A.msg").read_text() == (
+        "# char is a word\nuint8[3]   a\nuint8  B=5  # a char\n"
+        "std_msgs/Header h\ngeometry_msgs/Pose p\n"
+    )
+    assert Path("package.xml").read_text() == PACKAGE_XML.replace(
+        "  <depend>std_msgs</depend>\n",
+        "  <depend>std_msgs</depend>\n"
+        "  <depend>geometry_msgs</depend>\n"
+        "  <member_of_group>rosidl_interface_packages</member_of_group>\n"
+        "  <buildtool_depend>rosidl_default_generators</buildtool_depend>\n"
+        "  <exec_depend>rosidl_default_runtime</exec_depend>\n",
+    )
+    assert check(capsys, "--fix")[1] == "no problems in 1 file\n"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words", "expected"),
+    [
+        ("", [], ["IDL421"]),
+        ("", ["--select", "all"], ["IDL402", "IDL403", "IDL404", "IDL421", "IDL403"]),
+        ("", ["--select", "style"], ["IDL402", "IDL403", "IDL404", "IDL403"]),
+        ("", ["--select", "IDL404,portability"], ["IDL404", "IDL421"]),
+        ("", ["--select", "IDL40", "--ignore", "IDL403"], ["IDL402", "IDL404"]),
+        ("", ["--ignore", "wide-string"], []),
+        ('select = ["missing-unit"]', [], ["IDL404"]),
+        ('select = ["missing-unit"]', ["--select", "IDL402"], ["IDL402"]),
+        ('ignore = ["portability"]', [], []),
+        ('[tool.idlc.check.per-path]\n"msg/A*.msg" = ["IDL421"]', [], []),
+        ('[tool.idlc.check.per-path]\n"other/*" = ["IDL421"]', [], ["IDL421"]),
+    ],
+)
+def test_what_is_selected(settings, words, expected, capsys):
+    write(
+        {
+            "pyproject.toml": f"[tool.idlc.check]\n{settings}\n",
+            "demo/msg/A.msg": "float64 speed\nwstring name\n",
+        }
+    )
+    assert codes(capsys, "demo", *words) == expected
+
+
+@pytest.mark.parametrize(
+    "settings",
+    ['selct = ["all"]', 'select = "all"', 'select = ["IDL9999"]', "per-path = 3", "ignore = [1]"],
+)
+def test_mistakes_in_the_selection(settings, capsys):
+    write({"pyproject.toml": f"[tool.idlc.check]\n{settings}\n", "demo/msg/A.msg": "int8 a\n"})
+    assert main(["check", "demo"]) == 2
+    assert "[IDL611]" in capsys.readouterr().out
+    assert main(["check", "demo", "--select", "nothing"]) == 2
+
+
+def test_errors_cannot_be_switched_off(capsys):
+    write({"demo/msg/A.msg": "int7 a  # idlc: ignore[IDL201] really\n"})
+    assert codes(capsys, "demo", "--ignore", "IDL201,IDL490") == ["IDL201"]
+    assert codes(capsys, "demo") == ["IDL201", "IDL490"]
+
+
+def test_warnings_fail_only_when_asked(capsys):
+    write({"demo/msg/A.msg": "wstring a\n"})
+    assert check(capsys, "demo")[0] == 0
+    assert check(capsys, "demo", "--strict")[0] == 1
+
+
+def test_one_file_is_not_blamed_for_what_the_others_need(capsys):
+    write(
+        {
+            "package.xml": '<package format="3">\n  <name>demo</name>\n'
+            "  <depend>geometry_msgs</depend>\n</package>\n",
+            "msg/A.msg": "int8 a\n",
+            "msg/B.msg": "geometry_msgs/Pose p\n",
+        }
+    )
+    assert main(["gen", ".", "-o", "demo"]) == 0
+    capsys.readouterr()
+    assert codes(capsys, "msg/A.msg") == []
+    assert codes(capsys) == []
+    write({"msg/B.msg": "int8 b\n"})
+    assert codes(capsys) == ["IDL460", "IDL452"]
+    assert codes(capsys, "msg/A.msg") == []
+
+
+def test_entry_points(capsys):
+    setup = "from setuptools import setup\nname = 'demo'\nsetup(name=name, entry_points={})\n"
+    scripts = [
+        "good = demo.node:main",
+        "method = demo.node:Node.run",
+        "imported = demo:start",
+        "nowhere",
+        "other = nodes.node:main",
+        "missing = demo.noode:main",
+        "absent = demo.node:run",
+    ]
+    write(
+        {
+            "package.xml": "<package>\n  <name>demo</name>\n</package>\n",
+            "setup.py": setup.replace("{}", f"{{'console_scripts': {scripts!r}}}"),
+            "demo/__init__.py": "from demo.node import main as start\n",
+            "demo/node.py": "class Node:\n    pass\n\n\ndef main():\n    pass\n",
+            "msg/A.msg": "int8 a\n",
+        }
+    )
+    _, out = check(capsys)
+    assert re.findall(r"IDL457\]: (.*)", out) == [
+        "`nowhere` is no entry point",
+        "there is no Python package `nodes` here",
+        "there is no module `demo.noode`",
+        "`demo/node.py` has no `run`",
+    ]
+
+
+def test_files_that_are_not_python_or_xml_are_not_judged(capsys):
+    write(
+        {
+            "package.xml": "<package>\n  <name>demo</name>\n</package>\n",
+            "setup.py": "setup(\n",
+            "demo/node.py": "def (:\n",
+            "demo/other.py": "x = '\udcff'\n".encode("utf-8", "replace").decode(),
+            "msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys) == []
+
+
+def test_every_lint_rule_is_asked():
+    rules = {*LINT_RULES, *PACKAGE_RULES}
+    advice = {code for code in CODES if "IDL400" < code < "IDL490"}
+    assert len(rules) == len(advice) == 21

@@ -1,0 +1,236 @@
+"""`idlc scaffold`: what it writes, that it writes it once, and that it never writes a half.
+
+`IDLC_REFRESH='scaffold/*' pytest tests/test_scaffold.py` rewrites the trees in golden/scaffold that
+match, and fails, so that the changes are looked at.
+"""
+
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+from catkin_pkg.package import parse_package
+
+from idlc.cli.main import main
+
+ROOT = Path(__file__).parents[1]
+GOLDEN = ROOT / "golden" / "scaffold"
+CASES = sorted(path.parent for path in GOLDEN.glob("*/commands"))
+REFRESH = os.environ.get("IDLC_REFRESH", "")
+
+
+def tree(folder: Path) -> dict[str, str]:
+    return {
+        path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8")
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not {"__pycache__", ".mypy_cache", ".ruff_cache"} & set(path.parts)
+    }
+
+
+def carry_out(commands: str, monkeypatch) -> None:
+    for line in commands.splitlines():
+        program, *words = shlex.split(line)
+        if program == "cd":
+            monkeypatch.chdir(words[0])
+        else:
+            assert main(words) == 0, line
+
+
+@pytest.fixture(autouse=True)
+def nothing_installed(monkeypatch):
+    """Types come from the catalogue, so that every machine writes the same."""
+    monkeypatch.setattr("idlc.disk.surroundings.ament_prefixes", lambda: ())
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_golden_tree(case, tmp_path, monkeypatch):
+    commands = (case / "commands").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    carry_out(commands, monkeypatch)
+    found = tree(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    carry_out(commands, monkeypatch)
+    assert tree(tmp_path) == found, "the second time changed something"
+    if REFRESH and fnmatch(f"scaffold/{case.name}", REFRESH):
+        shutil.rmtree(case / "out", ignore_errors=True)
+        shutil.copytree(tmp_path, case / "out")
+        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+    expected = tree(case / "out")
+    assert sorted(found) == sorted(expected)
+    for path, text in expected.items():
+        assert found[path] == text, path
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_golden_packages_are_valid(case):
+    for manifest in (case / "out").glob("*/package.xml"):
+        package = parse_package(manifest)
+        package.validate()
+        assert package.get_build_type() in ("ament_python", "ament_cmake")
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_golden_packages_pass_the_checks_of_style(case, tmp_path):
+    shutil.copytree(case / "out", tmp_path / "out")
+    for package in sorted((tmp_path / "out").glob("*")):
+        for words in (["ruff", "check", "."], ["ruff", "format", "--check", "."]):
+            done = subprocess.run(
+                [sys.executable, "-m", *words, "--no-cache"],
+                cwd=package,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch) -> Path:
+    """Return a new package, in which the test works."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    monkeypatch.chdir("demo")
+    return tmp_path / "demo"
+
+
+NODE = ["scaffold", "node", "talker", "--publisher", "std_msgs/String:chatter"]
+
+
+def test_a_dry_run_shows_what_patch_would_need(package, capsys):
+    before = tree(package)
+    capsys.readouterr()
+    assert main([*NODE, "--dry-run"]) == 0
+    diff = capsys.readouterr().out
+    assert tree(package) == before
+    git = shutil.which("git")
+    assert git
+    subprocess.run([git, "apply", "-"], input=diff, text=True, check=True, cwd=package)
+    patched = tree(package)
+    assert patched != before
+    assert main(NODE) == 0
+    assert tree(package) == patched
+
+
+def test_an_edited_node_is_refused_and_forced_with_a_copy(package, capsys):
+    assert main(NODE) == 0
+    module = package / "demo" / "talker.py"
+    mine = module.read_text().replace("'hello'", "'goodbye'")
+    module.write_text(mine)
+    before = tree(package)
+    assert main([*NODE, "--timer", "1"]) == 1
+    assert "IDL620" in capsys.readouterr().err
+    assert tree(package) == before
+    assert main([*NODE, "--timer", "1", "--force"]) == 0
+    assert (package / "demo" / "talker.py.bak").read_text() == mine
+    assert "def tick" in module.read_text()
+
+
+def test_nothing_is_written_when_one_file_cannot_be_edited(package, capsys):
+    setup = package / "setup.py"
+    setup.write_text(setup.read_text().replace("'console_scripts': [", "'console_scripts': list(["))
+    setup.write_text(setup.read_text().replace("],\n    },", "]),\n    },"))
+    before = tree(package)
+    assert main(NODE) == 1
+    assert "'talker = demo.talker:main'," in capsys.readouterr().err
+    assert tree(package) == before
+
+
+def test_files_keep_their_mode(package):
+    (package / "setup.py").chmod(0o755)
+    assert main(NODE) == 0
+    assert (package / "setup.py").stat().st_mode & 0o777 == 0o755
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["node", "Talker"], "cannot be a node"),
+        (["node", "class"], "cannot be a node"),
+        (["node", "msg"], "taken"),
+        (["node", "a", "--publisher", "String"], "TYPE:TOPIC"),
+        (["node", "a", "--publisher", "std_msgs/String:a@0"], "above 0"),
+        (["node", "a", "--publisher", "std_msgs/String:1a"], "cannot be the name"),
+        (["node", "a", "--publisher", "std_msgs/Strin:a"], "did you mean `std_msgs/msg/String`"),
+        (["node", "a", "--service", "Nothing:a"], "idlc scaffold interface srv Nothing"),
+        (["node", "a", "--qos", "latched"], "comes after the endpoint"),
+        (["node", "a", "--publisher", "std_msgs/String:a", "--qos", "best"], "--qos is one of"),
+        (["node", "a", "--service", "std_srvs/Empty:a", "--qos", "latched"], "--qos is for"),
+        (["node", "a", "--param", "x"], "NAME:TYPE=DEFAULT"),
+        (["node", "a", "--param", "x:int=1.5"], "is no int"),
+        (["node", "a", "--timer", "soon"], "number of seconds"),
+        (["interface", "msg", "my_message", "int8 a"], "cannot be an interface"),
+        (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),
+        (["interface", "msg", "Message", "int8 a\nint8 b"], "a field is one line"),
+        (["interface", "msg", "Message", "flot32 a"], "IDL201"),
+        (["package", "Demo"], "IDL607"),
+        (["package", "demo2", "--interfaces-only"], "--build-type ament_cmake"),
+    ],
+)
+def test_wrong_words_are_explained_and_change_nothing(package, capsys, words, said):
+    before = tree(package)
+    status = main(["scaffold", *words])
+    output = capsys.readouterr()
+    assert status in (1, 2)
+    assert said in output.err
+    assert "Traceback" not in output.err
+    assert tree(package) == before
+
+
+def test_outside_of_a_package(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".git").mkdir()
+    assert main(NODE) == 2
+    assert "idlc scaffold package NAME" in capsys.readouterr().err
+
+
+def test_killed_at_any_moment_every_file_is_old_or_new(package):
+    """The moments are spread over the run; the package is put back after each."""
+    spare = package.parent / "spare"
+    shutil.copytree(package, spare)
+    old = tree(package)
+    command = [sys.executable, "-m", "idlc", *NODE]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "AMENT_PREFIX_PATH": ""}
+    started = time.monotonic()
+    subprocess.run(command, env=environment, check=True, capture_output=True)
+    length = time.monotonic() - started
+    new = tree(package)
+    for part in range(12):
+        shutil.rmtree(package)
+        shutil.copytree(spare, package)
+        process = subprocess.Popen(
+            command,
+            env=environment,
+            cwd=package,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        time.sleep(length * (0.6 + 0.4 * part / 11))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        for path, text in tree(package).items():
+            if not path.startswith(".idlc-stage-"):
+                assert text in (old.get(path), new.get(path)), path
+
+
+def test_the_wizard_asks_for_the_same(package, monkeypatch):
+    from click.testing import CliRunner
+
+    from idlc.cli.scaffold_node import command
+
+    answers = ["publish", "std_msgs/Strin", "bad topic", "publish", "std_msgs/String", "chatter"]
+    answers += ["2", "latched", "timer", "0.5", "parameter", "speed:int=3", "done", "n"]
+    monkeypatch.setattr("idlc.cli.scaffold_node.interactive", lambda: True)
+    answers[3:3] = ["1", "default"]
+    result = CliRunner().invoke(command, ["asker"], input="\n".join(answers) + "\n")
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.output
+    asked = (package / "demo" / "asker.py").read_text()
+    words = ["--publisher", "std_msgs/String:chatter@2", "--qos", "latched", "--timer", "0.5"]
+    assert main(["scaffold", "node", "typer", *words, "--param", "speed:int=3"]) == 0
+    typed = (package / "demo" / "typer.py").read_text()
+    assert asked.replace("asker", "typer").replace("Asker", "Typer") == typed
