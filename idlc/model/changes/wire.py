@@ -157,10 +157,13 @@ class _Follower:
     def _array(self, old: ir.Array, new: ir.Array, start: int) -> set[_Place]:
         runs = self._elements(old.element, new.element)
         places = {_Place(start)}
-        for _ in range(new.size):
-            before, places = places, self.follow(runs, places, at_end=False)
-            if places == before:
-                break
+        passed: list[set[_Place]] = []
+        while len(passed) < new.size:
+            if places in passed:  # positions count modulo 8, so they come round soon
+                first = passed.index(places)
+                return passed[first + (new.size - first) % (len(passed) - first)]
+            passed.append(places)
+            places = self.follow(runs, places, at_end=False)
         return places
 
 
