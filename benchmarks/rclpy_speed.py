@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from array import array
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -128,27 +129,32 @@ def message_rows(node, rounds):
         yield name, list(zip(*medians, strict=True))
 
 
-def service_row(node, rounds):
-    from rclpy.executors import SingleThreadedExecutor
+def round_trip(client, service, kind, request):
+    """Call a service without executor: send, take, answer, take."""
+    client.handle.send_request(request)
+    header = None
+    while header is None:
+        _, header = service.handle.service_take_request(kind.Request)
+    service.send_response(kind.Response(success=True), header)
+    header = None
+    while header is None:
+        header, _ = client.handle.take_response(kind.Response)
 
-    clients = []
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
+
+def service_row(node, rounds):
+    calls = []
     for place in ("std_srvs", "std_srvs" + SUFFIX):
         kind = import_module(f"{place}.srv").SetBool
-        node.create_service(kind, place, lambda _, response: response)
+        service = node.create_service(kind, place, print)
         client = node.create_client(kind, place)
         client.wait_for_service()
-        clients.append((client, kind.Request(data=True)))
-
-    def call(client, request):
-        executor.spin_until_future_complete(client.call_async(request))
-
+        calls.append(partial(round_trip, client, service, kind, kind.Request(data=True)))
     results = ([], [])
     for _ in range(rounds):
-        for (client, request), result in zip(clients, results, strict=True):
-            result.append(p50(lambda c=client, r=request: call(c, r), 100))
-    return "SetBool call, p50", [tuple(map(statistics.median, results))]
+        for call, result in zip(calls, results, strict=True):
+            result.append((cpu(call, 1000), p50(call, 1000)))
+    medians = [map(statistics.median, zip(*result, strict=True)) for result in results]
+    return "SetBool call", list(zip(*medians, strict=True))
 
 
 def show(name, pairs):
@@ -174,6 +180,7 @@ def main(rounds):
         print(f"{'':17} " + " | ".join(f"{column:21}" for column in COLUMNS))
         for row in message_rows(node, rounds):
             show(*row)
+        print(f"\n{'':17} call and answer       | the same, p50")
         show(*service_row(node, rounds))
         node.destroy_node()
         rclpy.shutdown()

@@ -189,6 +189,9 @@ _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
 _capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
+if sys.maxsize < 1 << 62:
+    raise ImportError("idlc's type support needs a 64-bit Python")
+
 #: All memory of the process, by address, as bytes and as words: `MEMORY[start:stop]`,
 #: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C.
 MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")

@@ -170,8 +170,10 @@ def _deserializer(name: str, cls: Any) -> int:
         try:
             here = cdr >> 3
             view = everything[words[here + position] - _HEADER : words[here + end]]
-            large = bulk and len(view) > _SMALL
-            data: Any = view if large else view.tobytes()
+            if bulk and len(view) > _SMALL:
+                memory.message = decode_any(view)
+                return True
+            data = view.tobytes()
             if data[1] == native and not data[0]:
                 try:
                     memory.message = decode(data)

@@ -92,8 +92,8 @@ def test_a_flood_of_interrupts_is_survived_and_seen(start):
         process.send_signal(signal.SIGINT)
         time.sleep(0.003)
     out, complaints = finish(process)
-    # of Python code, rclpy's own included, there may be some
-    assert "ctypes" not in complaints
+    # Python 3.10 also looks for signals where a handler of exceptions begins
+    assert sys.version_info < (3, 11) or "ctypes" not in complaints
     seen, received, *_ = out.split()
     assert int(seen) > 100
     assert int(received) > 100
