@@ -72,7 +72,7 @@ def test_help_imports_nothing_heavy(command):
 def test_a_run_with_nothing_to_do_imports_no_compiler():
     make("pkg/msg/A.msg")
     words = ["gen", "pkg", "-o", "out/demo"]
-    assert {"lark", "jinja2"} <= imported(words)
+    assert "jinja2" in imported(words)
     assert not {"lark", "jinja2", "numpy", "rich"} & imported(words)
 
 

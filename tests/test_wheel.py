@@ -107,6 +107,10 @@ class Environment:
         out = self.folder / "out"
         run(self.bin / "idlc", "gen", interfaces, "-o", out / "my_robot_controller", cwd=interfaces)
         run(self.bin / "python", "-c", IMPORT_THE_RESULT, cwd=out)
+        odd = self.folder / "odd" / "Odd.msg"  # which only lark can read
+        odd.parent.mkdir()
+        odd.write_text("string GREETING=gr\u00fc\u00df dich\n", encoding="utf-8")
+        run(self.bin / "idlc", "check", odd, cwd=odd.parent)
 
 
 def only(folder: Path, pattern: str) -> Path:

@@ -49,7 +49,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 )
 @options.package
 @options.include
-@options.style
+@options.report_style
 def command(
     paths: tuple[str, ...],
     against: str | None,
@@ -65,7 +65,7 @@ def command(
     """
     import datetime
 
-    from idlc.cli import terminal
+    from idlc.cli import reports, terminal
     from idlc.disk import config, tables
     from idlc.driver.breaking import BreakingOptions, breaking
     from idlc.text.diagnostics import Report
@@ -89,12 +89,16 @@ def command(
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
         verdict = breaking(wanted, report)
-    terminal.show(report, style, sys.stdout)
     if style == "json":
+        terminal.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
         terminal.fact(sys.stdout, "summary", **terminal.counts(report), **facts)
-    elif verdict:
-        sys.stdout.write(f"{_summary(verdict)}\n")
+    elif style == "text":
+        terminal.show(report, style, sys.stdout)
+        if verdict:
+            sys.stdout.write(f"{_summary(verdict)}\n")
+    else:
+        reports.write(report, style, (), 0, sys.stdout)
     return terminal.status(report)
 
 

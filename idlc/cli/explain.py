@@ -16,9 +16,17 @@ Example:
 
 
 @click.command("explain", epilog=EPILOG)
-@click.argument("code", metavar="CODE")
-def command(code: str) -> int:
+@click.argument("code", metavar="[CODE]", required=False)
+@click.option("--all", "everything", is_flag=True, help="Every code, as one Markdown document.")
+def command(code: str | None, everything: bool) -> int:
     """Explain a code: what it means, why, an example that triggers it and one that is right."""
+    if everything:
+        from idlc.text.rulebook import document
+
+        sys.stdout.write(document())
+        return 0
+    if code is None:
+        raise click.UsageError("give a CODE such as IDL201, or --all")
     from idlc.cli import terminal
     from idlc.text.codes import CODES
     from idlc.text.pages import close_code, page

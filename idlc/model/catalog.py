@@ -18,9 +18,10 @@ from idlc.text.source import Source
 
 @lru_cache(maxsize=1)
 def _entries() -> dict[str, list[dict[str, list[list[Any]]]]]:
-    from importlib.resources import files
+    from pkgutil import get_data
 
-    data = files("idlc.model").joinpath("catalog.json").read_bytes()
+    data = get_data("idlc.model", "catalog.json")
+    assert data is not None, "the package is not whole"
     return msgspec.json.decode(data, type=dict[str, list[dict[str, list[list[Any]]]]])
 
 

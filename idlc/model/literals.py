@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
 from idlc.syntax.escapes import EscapeError, read_back, through_idl
-from idlc.syntax.parse import terminal
+from idlc.syntax.grammar import terminal
 from idlc.text import codes
 
 FLOAT32_MAX = 3.402823466e38

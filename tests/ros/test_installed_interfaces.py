@@ -5,6 +5,7 @@ from pathlib import Path
 
 from test_format import assert_only_the_layout_changes
 
+from idlc.cli.main import main
 from idlc.model import ir
 from idlc.syntax.format import format_file
 from idlc.syntax.parse import parse
@@ -29,3 +30,9 @@ def test_fmt_leaves_nine_lines_in_ten_alone():
         changed += sum(a != b for a, b in zip(before, after, strict=True))
     assert total > 1000, "no interface files: are the ROS 2 wheels installed?"
     assert changed < total / 10
+
+
+def test_check_finds_advice_but_no_errors(capsys):
+    for words in ([], ["--select", "all"]):
+        assert main(["check", str(SHARE), *words]) == 0
+        assert "error[" not in capsys.readouterr().out

@@ -1,0 +1,188 @@
+"""What CI systems run: hooks, the action's script, the snippets, the pytest plugin."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+LOOSE = "float64   speed# [m/s]\n"
+TIDY = "float64 speed  # [m/s]\n"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A repository with one package, and an `idlc` and a `python` on PATH that are these."""
+    monkeypatch.chdir(tmp_path)
+    commands = tmp_path / ".bin"
+    commands.mkdir()
+    for name, words in (("idlc", f'"{sys.executable}" -m idlc'), ("python", f'"{sys.executable}"')):
+        (commands / name).write_text(f'#!/bin/sh\nexec {words} "$@"\n')
+        (commands / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{commands}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    for name in [name for name in os.environ if name.startswith(("GITHUB_", "IDLC_", "GIT_"))]:
+        monkeypatch.delenv(name)
+    write("demo/msg/Drive.msg", TIDY)
+    return tmp_path
+
+
+def write(path, text):
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    Path(path).write_text(text, encoding="utf-8")
+
+
+def run(*words, **environment):
+    return subprocess.run(
+        list(words),
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+def git(*words):
+    who = ["-c", "user.name=me", "-c", "user.email=me@example.org"]
+    return subprocess.run(["git", *who, *words], check=True, capture_output=True, text=True).stdout  # noqa: S607
+
+
+def hooks():
+    text = (ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8")
+    for block in text.split("- id: ")[1:]:
+        yield block.split("\n")[0], dict(re.findall(r"(?m)^  (\w+): (.*)$", block))
+
+
+@pytest.mark.parametrize(
+    ("hook", "text", "status"),
+    [
+        ("idlc-check", TIDY, 0),
+        ("idlc-check", "flot64 speed\n", 1),
+        ("idlc-fmt", TIDY, 0),
+        ("idlc-fmt", LOOSE, 0),
+        ("idlc-gen-check", TIDY, 0),
+        ("idlc-gen-check", "float64 other\n", 1),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_each_hook_runs_on_the_files_that_changed(hook, text, status):
+    write("pyproject.toml", '[tool.idlc]\npaths = ["demo"]\nout = "out/demo"\n')
+    assert run("idlc", "gen").returncode == 0
+    write("demo/msg/Drive.msg", text)
+    settings = dict(hooks())[hook]
+    assert settings["language"] == "python"
+    files = ["demo/msg/Drive.msg"]
+    assert all(re.search(settings["files"], file) for file in files)
+    if settings.get("pass_filenames") == "false":
+        files = []
+    done = run(*shlex.split(settings["entry"]), *files)
+    assert done.returncode == status, done.stdout + done.stderr
+    if hook == "idlc-fmt":
+        # pre-commit fails a hook that changed files
+        assert Path("demo/msg/Drive.msg").read_text() == TIDY
+
+
+@pytest.fixture
+def pull_request(here):
+    """The event of a pull request, and the file that says so."""
+    git("init", "-q", "-b", "main")
+    write(".gitignore", ".bin\n")
+    git("add", ".")
+    git("commit", "-q", "-m", "base")
+    base = git("rev-parse", "HEAD").strip()
+    event = {"pull_request": {"title": "$(touch hacked)", "base": {"sha": base}}}
+    (here / "event.json").write_text(json.dumps(event))
+    return {
+        "GITHUB_EVENT_PATH": str(here / "event.json"),
+        "GITHUB_OUTPUT": str(here / "output"),
+        "GITHUB_ACTION_PATH": str(ROOT),
+    }
+
+
+def act(environment, **inputs):
+    """Run the action's script as action.yml does, with its defaults."""
+    text = (ROOT / "action.yml").read_text(encoding="utf-8")
+    defaults = dict(
+        re.findall(r"(?m)^  (\w+):\n    description: .*\n    default: \"?(.*?)\"?$", text)
+    )
+    passed = re.findall(r"(IDLC_\w+): \$\{\{ inputs\.(\w+) \}\}", text)
+    assert len(passed) == 5
+    values = {**defaults, **inputs}
+    given = {variable: values[name] for variable, name in passed}
+    return run("sh", str(ROOT / ".ci/action"), **environment, **given)
+
+
+def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
+    done = act(pull_request, paths="demo")
+    assert (done.returncode, done.stderr) == (0, "1 file in order\n")
+    assert done.stdout == ""
+    assert json.loads((here / "idlc.sarif").read_text())["runs"][0]["results"] == []
+    assert (here / "output").read_text() == "sarif=idlc.sarif\n"
+
+
+def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
+    write("demo/msg/Drive.msg", "float32   speed  # [m/s]\n")
+    write("demo/msg/Wide.msg", "wstring text\n")
+    done = act(pull_request, paths="demo")
+    assert done.returncode == 1
+    assert "::warning file=demo/msg/Wide.msg,line=1" in done.stdout
+    assert "+float32 speed" in done.stdout
+    assert "::error file=demo/msg/Drive.msg,line=1,endLine=1,col=1" in done.stdout
+    assert "title=IDL507 field-type-changed" in done.stdout
+    sarif = json.loads((here / "idlc.sarif").read_text())
+    assert [one["ruleId"] for one in sarif["runs"][0]["results"]] == ["IDL421"]
+
+
+def test_the_actions_inputs(pull_request):
+    write("demo/msg/Drive.msg", "float32   speed  # [m/s]\n")
+    off = {"format": "false", "breaking": "false"}
+    assert act(pull_request, paths="demo", **off).returncode == 0
+    write("demo/msg/Wide.msg", "wstring text\n")
+    assert act(pull_request, paths="demo", **off).returncode == 0
+    assert act(pull_request, paths="demo", strict="true", **off).returncode == 1
+
+
+def test_no_text_of_a_pull_request_becomes_a_command(pull_request, here):
+    for paths in ("$(touch hacked)", "; touch hacked", "--help", "* `touch hacked`"):
+        act(pull_request, paths=paths)
+    assert not (here / "hacked").exists()
+    action = (ROOT / "action.yml").read_text(encoding="utf-8")
+    scripts = re.findall(r"(?m)^ +run: (.*)$", action)
+    assert len(scripts) == 2
+    assert not any("${{" in script for script in scripts)
+
+
+@pytest.mark.parametrize(("text", "status"), [(TIDY, 0), ("flot64 a\n", 1)])
+def test_the_gitlab_snippet(here, text, status):
+    write("demo/msg/Drive.msg", text)
+    document = (ROOT / "docs/ci.md").read_text(encoding="utf-8")
+    script = document.partition("  script:\n")[2].partition("  artifacts:")[0]
+    lines = [line.removeprefix("    - ") for line in script.splitlines()]
+    assert lines.pop(0) == "pip install idlc"
+    assert run("sh", "-c", "set -e\n" + "\n".join(lines)).returncode == status
+    assert len(json.loads((here / "gl-code-quality-report.json").read_text())) == status
+    assert f'failures="{status}"' in (here / "idlc.xunit.xml").read_text()
+
+
+def run_pytest(*words):
+    plugin = ["-p", "idlc.cli.pytest_plugin", "-p", "no:cacheprovider"]
+    return run(sys.executable, "-m", "pytest", *plugin, "-q", "-c", "/dev/null", *words)
+
+
+@pytest.mark.usefixtures("here")
+def test_the_pytest_plugin():
+    write("demo/msg/Wrong.msg", "flot64 a\n")
+    write("demo/srv/Wide.srv", "wstring a\n---\n")
+    assert run_pytest("demo").returncode == 5, "collected without being asked"
+    done = run_pytest("--idlc", "demo")
+    assert done.returncode == 1
+    assert "1 failed, 2 passed, 1 warning" in done.stdout
+    assert "error[IDL201]: unknown type `flot64`" in done.stdout
+    assert "IDL421: middlewares" in done.stdout
+    assert "Traceback" not in done.stdout
+    assert "2 failed, 1 passed" in run_pytest("--idlc-strict", "demo").stdout
