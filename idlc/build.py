@@ -11,11 +11,8 @@ from idlc.disk.inputs import one_package
 from idlc.disk.project import Project
 from idlc.driver.gen import GenOptions, gen
 from idlc.driver.query import describe
+from idlc.scaffold import interface
 from idlc.text.diagnostics import Report
-
-#: Where the files are that ROS 2's tools look up when the package is installed.
-RESOURCE = "resource"
-INDEX = "rosidl_interfaces"
 
 
 def compile_interfaces(package: str) -> None:
@@ -30,11 +27,11 @@ def compile_interfaces(package: str) -> None:
         return
     gen(GenOptions(paths=(".",), out=package, package=package), report)
     project = Project(".", report)
-    files = {f"{RESOURCE}/{INDEX}/{package}": "".join(f"{key}\n" for key in sorted(given.digests))}
+    files = dict([interface.index(package, given.digests)])
     for one in given.files:
         if not report.had_errors:
             content = json.dumps(describe(one.file.shown, package, (), report), indent=2)
-            files[f"{RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
+            files[f"{interface.RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
     planned = None if report.had_errors else project.plan({}, files)
     if planned is not None:
         project.apply(planned[0])

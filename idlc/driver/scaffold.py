@@ -97,6 +97,9 @@ def interface(
     edited = _accepted(project, edits, report)
     if edited is None:
         return None
+    if lists is None:
+        there = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
+        edited |= dict([interface_text.index(own, there | {path})])
     return _write(project, {path: text}, edited, settings, report)
 
 

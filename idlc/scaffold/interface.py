@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from idlc.model import names
 
 SEPARATOR = "---"
+#: The folder of what is installed for ROS 2's tools only.
+RESOURCE = "resource"
 
 
 def check_name(name: str) -> str:
@@ -33,6 +35,14 @@ def text(kind: str, fields: Sequence[str], comment: str = "") -> str:
     gap = "\n" if head and parts[0] else ""
     body = f"{SEPARATOR}\n".join("".join(f"{line}\n" for line in part) for part in parts)
     return head + gap + body
+
+
+def index(package: str, keys: Iterable[str]) -> tuple[str, str]:
+    """Return path and text of the file by which ROS 2's tools know a package's interfaces.
+
+    `keys` are the interface files, such as `msg/Drive.msg`. Source: spec section 9.
+    """
+    return f"{RESOURCE}/rosidl_interfaces/{package}", "".join(f"{key}\n" for key in sorted(keys))
 
 
 def check_fields(fields: Sequence[str]) -> None:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import libcst as cst
 
 from idlc.scaffold.edit import Edited, Outcome, Refused
-from idlc.scaffold.python_text import appended, constants, parsed, quoted, string
+from idlc.scaffold.layout import WIDTH
+from idlc.scaffold.python_text import (
+    appended,
+    constants,
+    inner_indent,
+    parsed,
+    quoted,
+    string,
+)
 
 WHERE = "to the list that `LaunchDescription` gets"
 MODULE = "launch_ros.actions"
@@ -36,7 +44,7 @@ def add_node(text: str, package: str, executable: str) -> Outcome:
         if isinstance(element.value, cst.Call)
         for arg in element.value.args
     ]
-    new = _node_call(imported or "Node", package, executable, literals)
+    new = _node_call(imported or "Node", package, executable, literals, inner_indent(listed))
     changed = module.deep_replace(listed, appended(listed, cst.Element(new)))
     assert isinstance(changed, cst.Module)
     result = changed.code if imported else _with_import(changed)
@@ -44,12 +52,16 @@ def add_node(text: str, package: str, executable: str) -> Outcome:
 
 
 def _node_call(
-    function: str, package: str, executable: str, like: list[cst.BaseExpression]
+    function: str, package: str, executable: str, like: list[cst.BaseExpression], margin: str
 ) -> cst.BaseExpression:
-    """Return the call of Node, with the quotes that other nodes have."""
+    """Return the call of Node, in the quotes of the others, within a function: indented once."""
     words = {"package": package, "executable": executable, "output": "screen"}
-    given = ", ".join(f"{name}={quoted(word, like).value}" for name, word in words.items())
-    return cst.parse_expression(f"{function}({given})")
+    given = [f"{name}={quoted(word, like).value}" for name, word in words.items()]
+    line = f"{function}({', '.join(given)})"
+    if len(f"    {margin}{line},") > WIDTH:
+        lines = "".join(f"{margin}    {one},\n" for one in given)
+        line = f"{function}(\n{lines}{margin})"
+    return cst.parse_expression(line)
 
 
 def _calls(module: cst.Module) -> dict[str, list[cst.Call]]:

@@ -272,14 +272,15 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
         add("rclpy.utilities", "remove_ros_args")
     add("rclpy.utilities", "try_shutdown")
     add("rclpy.executors", "ExternalShutdownException", "SingleThreadedExecutor")
-    if planned.once:
-        add("rclpy.signals", "SignalHandlerOptions")
+    add("rclpy.signals", "SignalHandlerOptions")
+    if not planned.once:
+        add("rclpy.signals", "install_signal_handlers")
     if node.lifecycle:
         add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
     else:
         add("rclpy.node", "Node")
     standard = {module: found for module, found in names.items() if module in _STANDARD}
     others = {module: found for module, found in names.items() if module not in _STANDARD}
-    plain = ("argparse", "sys", "time") if planned.clients else ()
+    plain = ("signal", *(("argparse", "sys", "time") if planned.clients else ()))
     groups = (imports(standard, plain), imports(others, ("rclpy",)))
     return tuple(tuple(group) for group in groups if group)

@@ -129,6 +129,14 @@ def appended(
     )
 
 
+def inner_indent(sequence: cst.List) -> str:
+    """Return the indentation of elements with a line of their own, that of blocks left out."""
+    opening, closing = _brackets(sequence)
+    if isinstance(opening, cst.ParenthesizedWhitespace):
+        return opening.last_line.value if sequence.elements else opening.last_line.value + " " * 4
+    return closing.last_line.value if isinstance(closing, cst.ParenthesizedWhitespace) else ""
+
+
 _Space = cst.BaseParenthesizableWhitespace
 
 

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import signal
 import sys
 import time
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args, try_shutdown
 from std_msgs.msg import Empty
@@ -146,11 +148,13 @@ def switch_request(given: argparse.Namespace) -> SetBool.Request:
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
     given = parse_arguments(args)
-    rclpy.init(args=args)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = Keeper(given)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

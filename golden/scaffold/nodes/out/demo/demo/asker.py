@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import signal
 import sys
 import time
 
@@ -97,8 +98,9 @@ def ask_request(given: argparse.Namespace) -> Ask.Request:
 def main(args: list[str] | None = None) -> int:
     """Do what the command line asks for; return 0 if all went well."""
     given = parse_arguments(args)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.SIGTERM)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = Asker(given.server_timeout)
         executor = SingleThreadedExecutor()
         executor.add_node(node)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import signal
 import sys
 import time
 from typing import Any
@@ -149,8 +150,9 @@ def dock_request(given: argparse.Namespace) -> Dock.Goal:
 def main(args: list[str] | None = None) -> int:
     """Do what the command line asks for; return 0 if all went well."""
     given = parse_arguments(args)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.SIGTERM)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = Both(given.server_timeout)
         executor = SingleThreadedExecutor()
         executor.add_node(node)

@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+import signal
+
 from demo.action import Dock
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import try_shutdown
 
@@ -84,11 +87,13 @@ class Station(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
-    rclpy.init(args=args)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = Station()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

@@ -5,12 +5,15 @@
 
 from __future__ import annotations
 
+import signal
+
 from demo.msg import Command
 from geometry_msgs.msg import Twist, Vector3
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 
@@ -79,11 +82,13 @@ class Talker(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
-    rclpy.init(args=args)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         node = Talker()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass

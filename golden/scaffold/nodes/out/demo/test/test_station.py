@@ -26,7 +26,8 @@ def test_it_reaches_dock(start: Start, observer: Node, until: Until) -> None:
     client = ActionClient(observer, Dock, 'dock')
     start(MODULE)
     assert until(client.server_is_ready)
-    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    goal = Dock.Goal()
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     assert until(sent.done)
     assert sent.result().accepted
     ending = sent.result().get_result_async()
@@ -36,13 +37,14 @@ def test_it_reaches_dock(start: Start, observer: Node, until: Until) -> None:
     client.destroy()
 
 
-def test_it_reaches_dock_cancelled(start: Start, observer: Node, until: Until) -> None:
+def test_it_cancels_dock(start: Start, observer: Node, until: Until) -> None:
     """A goal for dock can be cancelled while the node works on it."""
     feedback: list[object] = []
     client = ActionClient(observer, Dock, 'dock')
     start(MODULE)
     assert until(client.server_is_ready)
-    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    goal = Dock.Goal()
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     assert until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()

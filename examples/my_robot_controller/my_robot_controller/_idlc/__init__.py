@@ -1,0 +1,111 @@
+"""Support for generated messages: what their modules share. Copied into each package.
+
+It imports the standard library only; `arrays` imports numpy, `typesupport` looks for rclpy.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterable
+from typing import Any, TypeAlias
+
+from .cdr import (
+    HEADERS,
+    NATIVE,
+    PAD2,
+    PAD4,
+    PAD8,
+    Texts,
+    flags,
+    flags_writer,
+    layout,
+    octets,
+    octets_writer,
+    phases,
+    read_flags,
+    read_octets,
+    read_wide_text,
+    text_block,
+    text_phases,
+    wide_block,
+    wide_text,
+)
+from .codec import Codec, Text, codec_for, maker
+from .errors import DecodeError, ValidationError, importing
+from .interfaces import Action, Imported, Service, make, several
+from .loading import lazily
+from .message import Fresh, FreshList, Message, dataclass
+from .sequences import (
+    Float32Sequence,
+    Float64Sequence,
+    Int8Sequence,
+    Int16Sequence,
+    Int32Sequence,
+    Int64Sequence,
+    UInt8Sequence,
+    UInt16Sequence,
+    UInt32Sequence,
+    UInt64Sequence,
+    sequence_writer,
+    to_array,
+)
+
+#: What numeric sequences take.
+Integers: TypeAlias = Iterable[int]
+Floats: TypeAlias = Iterable[float]
+
+__all__ = [
+    "HEADERS",
+    "NATIVE",
+    "PAD2",
+    "PAD4",
+    "PAD8",
+    "Action",
+    "Any",
+    "Codec",
+    "DecodeError",
+    "Float32Sequence",
+    "Float64Sequence",
+    "Floats",
+    "Fresh",
+    "FreshList",
+    "Imported",
+    "Int8Sequence",
+    "Int16Sequence",
+    "Int32Sequence",
+    "Int64Sequence",
+    "Integers",
+    "Message",
+    "Service",
+    "Text",
+    "Texts",
+    "TypeAlias",
+    "UInt8Sequence",
+    "UInt16Sequence",
+    "UInt32Sequence",
+    "UInt64Sequence",
+    "ValidationError",
+    "array",
+    "codec_for",
+    "dataclass",
+    "flags",
+    "flags_writer",
+    "importing",
+    "layout",
+    "lazily",
+    "make",
+    "maker",
+    "octets",
+    "octets_writer",
+    "phases",
+    "read_flags",
+    "read_octets",
+    "read_wide_text",
+    "sequence_writer",
+    "several",
+    "text_block",
+    "text_phases",
+    "to_array",
+    "wide_block",
+    "wide_text",
+]

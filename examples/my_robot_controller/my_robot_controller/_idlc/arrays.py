@@ -1,0 +1,197 @@
+"""Fixed-size numeric arrays: fields that hold a `numpy.ndarray`. Only who has one imports this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+
+from .cdr import NATIVE
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Values: TypeAlias = ArrayLike
+
+Element = TypeVar("Element", bound="np.generic")
+
+
+def to_ndarray(dtype: Any, size: int, values: Any) -> Any:
+    """Return `values` as an array of `size` elements: themselves if they are one, else a copy.
+
+    Raises ValueError for another size, TypeError or OverflowError for what does not fit.
+    """
+    if type(values) is np.ndarray and values.dtype is dtype and values.shape == (size,):
+        return values
+    result = np.array(values, dtype)
+    if result.shape != (size,):
+        raise ValueError(
+            f"needs an array of {size} elements, not of shape {result.shape}"
+        )
+    return result
+
+
+INT8 = np.dtype("int8")
+UINT8 = np.dtype("uint8")
+INT16 = np.dtype("int16")
+UINT16 = np.dtype("uint16")
+INT32 = np.dtype("int32")
+UINT32 = np.dtype("uint32")
+INT64 = np.dtype("int64")
+UINT64 = np.dtype("uint64")
+FLOAT32 = np.dtype("float32")
+FLOAT64 = np.dtype("float64")
+
+zeros = np.zeros
+array = np.array
+
+
+class NumberArray(Generic[Element]):
+    """A field that reads as a `numpy.ndarray` and takes any sequence of `size` numbers.
+
+    In the class body it stands for the field; the metaclass puts a property in its place.
+    """
+
+    dtype: Any
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+
+    def property_of(self, slot: Any) -> property:
+        """Return the property over the slot member `slot`."""
+        dtype, size = self.dtype, self.size
+        store = slot.__set__
+
+        def setter(message: object, values: Any) -> None:
+            store(message, to_ndarray(dtype, size, values))
+
+        return property(slot.__get__, setter)
+
+    if TYPE_CHECKING:
+
+        def __get__(
+            self, message: object, owner: type | None = None
+        ) -> NDArray[Element]: ...
+        def __set__(self, message: object, values: ArrayLike) -> None: ...
+
+
+class Int8Array(NumberArray["np.int8"]):
+    """An array of int8."""
+
+    dtype = INT8
+
+
+class UInt8Array(NumberArray["np.uint8"]):
+    """An array of uint8, or of char."""
+
+    dtype = UINT8
+
+
+class Int16Array(NumberArray["np.int16"]):
+    """An array of int16."""
+
+    dtype = INT16
+
+
+class UInt16Array(NumberArray["np.uint16"]):
+    """An array of uint16."""
+
+    dtype = UINT16
+
+
+class Int32Array(NumberArray["np.int32"]):
+    """An array of int32."""
+
+    dtype = INT32
+
+
+class UInt32Array(NumberArray["np.uint32"]):
+    """An array of uint32."""
+
+    dtype = UINT32
+
+
+class Int64Array(NumberArray["np.int64"]):
+    """An array of int64."""
+
+    dtype = INT64
+
+
+class UInt64Array(NumberArray["np.uint64"]):
+    """An array of uint64."""
+
+    dtype = UINT64
+
+
+class Float32Array(NumberArray["np.float32"]):
+    """An array of float32."""
+
+    dtype = FLOAT32
+
+
+class Float64Array(NumberArray["np.float64"]):
+    """An array of float64."""
+
+    dtype = FLOAT64
+
+
+def array_writer(order: str, name: str, size: int) -> Callable[[Any], bytes]:
+    """Return a function that turns a field's value into bytes of byte order `order`."""
+    dtype = np.dtype(name)
+    ndarray = np.ndarray
+
+    def native(values: Any) -> bytes:
+        if type(values) is ndarray and values.dtype is dtype and len(values) == size:
+            return values.tobytes()
+        return to_ndarray(dtype, size, values).tobytes()  # type: ignore[no-any-return]
+
+    def swapped(values: Any) -> bytes:
+        return to_ndarray(dtype, size, values).byteswap().tobytes()  # type: ignore[no-any-return]
+
+    return native if order == NATIVE or dtype.itemsize == 1 else swapped
+
+
+def array_reader(order: str, name: str, size: int) -> Callable[[bytes], Any]:
+    """Return a function that turns bytes of byte order `order` into a field's value."""
+    dtype = np.dtype(name)
+    ndarray = np.ndarray
+
+    def native(raw: bytes) -> Any:
+        return ndarray(size, dtype, bytearray(raw))
+
+    def swapped(raw: bytes) -> Any:
+        return ndarray(size, dtype, bytearray(raw)).byteswap()
+
+    return native if order == NATIVE or dtype.itemsize == 1 else swapped
+
+
+__all__ = [
+    "FLOAT32",
+    "FLOAT64",
+    "INT8",
+    "INT16",
+    "INT32",
+    "INT64",
+    "UINT8",
+    "UINT16",
+    "UINT32",
+    "UINT64",
+    "Float32Array",
+    "Float64Array",
+    "Int8Array",
+    "Int16Array",
+    "Int32Array",
+    "Int64Array",
+    "UInt8Array",
+    "UInt16Array",
+    "UInt32Array",
+    "UInt64Array",
+    "array",
+    "array_reader",
+    "array_writer",
+    "to_ndarray",
+    "zeros",
+]

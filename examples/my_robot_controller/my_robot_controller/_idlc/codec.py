@@ -1,0 +1,173 @@
+"""How a class gets its codec: made for one byte order, on first use."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from .cdr import HEADERS, NATIVE
+from .errors import DecodeError, ValidationError
+
+if TYPE_CHECKING:
+    from .message import Message
+
+ORDERS = {"little": "<", "big": ">"}
+
+#: What turns bytes into a str.
+Text = Callable[[Any], str]
+
+#: Takes a memoryview, too. Slower than `bytes.decode`.
+text_of_view: Text = partial(str, encoding="utf-8")
+
+#: What decoding raises when a buffer is not a message.
+FAILURES = (struct.error, ValueError, IndexError, OverflowError)
+
+
+class Codec(NamedTuple):
+    """The two functions of one class and byte order.
+
+    `encode(message)` returns the parts of the message in order: buffers, of which the first
+    begins with the encapsulation header. Numeric sequences are parts of their own, not copied.
+    `decode(data)` returns a message from `bytes` that begin with the encapsulation header.
+    `bulk` says that there are numeric sequences, so that a memoryview saves a copy.
+    """
+
+    encode: Callable[[Any], list[Any]]
+    decode: Callable[[Any], Any]
+    bulk: bool = False
+
+
+class Codecs(Protocol):
+    """Gives the codec of a byte order, making it on first use."""
+
+    def __call__(self, order: str, text: Text = bytes.decode) -> Codec:
+        """Return the codec whose `decode` makes strings by `text`."""
+        ...
+
+
+Make = Callable[[str, Text], Codec]
+
+
+def codec_for(kind: Any) -> Callable[[Make], Make]:
+    """Return a decorator that gives a message class the function that makes its codecs."""
+
+    def give(make: Make) -> Make:
+        made: dict[tuple[str, Text], Codec] = {}
+
+        def codecs(order: str, text: Text = bytes.decode) -> Codec:
+            found = made.get((order, text))
+            if found is None:
+                found = made[order, text] = make(order, text)
+            return found
+
+        kind._codec_ = staticmethod(codecs)
+        return make
+
+    return give
+
+
+def maker(kind: type) -> Callable[[], Any]:
+    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
+    if "_check_fields" not in getattr(kind, "__slots__", ()) or hasattr(
+        kind, "_codec_"
+    ):
+        return partial(object.__new__, kind)
+
+    def make() -> Any:
+        made: Any = object.__new__(kind)
+        made._check_fields = False
+        return made
+
+    return make
+
+
+def install(kind: type[Message]) -> None:
+    """Replace `serialize` and `deserialize` of the class that owns the codec by direct ones."""
+    owner: Any = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    codecs = owner._codec_
+    encode, decode, _ = codecs("<")
+    join = b"".join
+
+    def serialize(self: Any, *, byteorder: str = "little") -> bytes:
+        try:
+            if byteorder == "little":
+                return join(encode(self))
+            return join(codecs(ORDERS[byteorder]).encode(self))
+        except Exception as error:
+            raise encode_error(self, byteorder, error) from error
+
+    def deserialize(buffer: Any) -> Any:
+        try:
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                return decode(buffer)
+            return read(codecs, buffer)
+        except FAILURES as error:
+            failure = error
+        return recover(owner, buffer, failure)
+
+    serialize.__doc__ = owner.serialize.__doc__
+    deserialize.__doc__ = owner.deserialize.__doc__
+    owner.serialize = serialize
+    owner.deserialize = staticmethod(deserialize)
+
+
+def read(codecs: Codecs, buffer: Any) -> Any:
+    """Return a message from any buffer, in either byte order."""
+    if type(buffer) is not bytes:
+        buffer = memoryview(buffer).cast("B")
+        if codecs(NATIVE).bulk:
+            return codecs(order_of(buffer), text_of_view).decode(buffer)
+        buffer = bytes(buffer)
+    return codecs(order_of(buffer)).decode(buffer)
+
+
+def read_as_subclass(kind: Any, buffer: Any) -> Any:
+    """Return a message of a user's subclass."""
+    owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    message = owner.deserialize(buffer)
+    result = kind.__new__(kind)
+    for slot in owner.__slots__:
+        setattr(result, slot, getattr(message, slot))
+    return result
+
+
+def order_of(data: Any) -> str:
+    """Return the byte order that an encapsulation header names; raise DecodeError otherwise."""
+    if len(data) < 4:
+        raise DecodeError(
+            f"the encapsulation header needs 4 bytes, there are {len(data)}"
+        )
+    for order, header in HEADERS.items():
+        if bytes(data[:2]) == header[:2]:
+            return order
+    raise DecodeError(
+        f"unknown encapsulation {bytes(data[:2]).hex()}, only plain CDR is read"
+    )
+
+
+def recover(kind: type, buffer: Any, failure: Exception) -> Any:
+    """Return the message after all, if a middleware would; raise DecodeError otherwise."""
+    if isinstance(failure, DecodeError):
+        raise failure
+    from .careful import read_carefully
+
+    data = bytes(buffer)
+    return read_carefully(kind, data, order_of(data))
+
+
+def encode_error(message: Message, byteorder: str, error: Exception) -> Exception:
+    """Return the exception that says which field was wrong."""
+    if byteorder not in ORDERS:
+        return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
+    from .validation import validate
+
+    try:
+        validate(message, wire_only=True)
+    except ValidationError as found:
+        return found
+    return error
+
+
+__all__ = ["Codec", "Text", "codec_for", "encode_error", "install", "maker"]

@@ -1,0 +1,72 @@
+"""What can go wrong with a message, as exceptions."""
+
+from __future__ import annotations
+
+
+class DecodeError(ValueError):
+    """Bytes that are not a message of the expected type.
+
+    `path` names the field that could not be read, `offset` the byte at which it should begin,
+    counted from the start of the buffer.
+    """
+
+    def __init__(self, problem: str, path: str = "", offset: int = 0) -> None:
+        super().__init__(problem, path, offset)
+        self.problem = problem
+        self.path = path
+        self.offset = offset
+
+    def __str__(self) -> str:
+        where = f"{self.path}: " if self.path else ""
+        return f"{where}{self.problem} at byte {self.offset}"
+
+
+class ValidationError(ValueError):
+    """A value that its field cannot hold.
+
+    `path` names the field, `allowed` says what it can hold, `value` is what it holds.
+    """
+
+    def __init__(self, path: str, allowed: str, value: object) -> None:
+        super().__init__(path, allowed, value)
+        self.path = path
+        self.allowed = allowed
+        self.value = value
+
+    def __str__(self) -> str:
+        text = repr(self.value)
+        if len(text) > 80:
+            text = text[:77] + "..."
+        return f"{self.path}: must be {self.allowed}, not {text}"
+
+
+class importing:
+    """A context that says, when an import in it fails, how to get the package."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(
+        self, _kind: object, error: BaseException | None, _trace: object
+    ) -> None:
+        if isinstance(error, ImportError) and not isinstance(
+            error, MissingPackageError
+        ):
+            raise missing_package(error) from error
+
+
+class MissingPackageError(ImportError):
+    """Another package's messages cannot be imported."""
+
+
+def missing_package(error: ImportError) -> MissingPackageError:
+    """Return an ImportError that says how to get the package that `error` missed."""
+    package = (error.name or "").partition(".")[0] or "another package"
+    return MissingPackageError(
+        f"this message needs {package}, which cannot be imported ({error}). "
+        f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
+        f"{package.replace('_', '-')}), or generate it beside this package: "
+        f"run `idlc gen` with --vendor-deps.",
+        name=error.name,
+        path=error.path,
+    )

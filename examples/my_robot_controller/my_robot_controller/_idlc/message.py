@@ -1,0 +1,219 @@
+"""The base of generated messages: what rosidl's classes offer, and dataclasses besides.
+
+A message class declares `_fields_and_field_types`. Its metaclass makes a slot of each field,
+named as rosidl names it (`_stamp`), and gives it its public name (`stamp`): the same slot, or a
+property that converts for numeric arrays. Nothing else is computed until it is asked for.
+"""
+
+from __future__ import annotations
+
+from array import array
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
+
+from . import codec
+from .names import public_name, slot_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from dataclasses import Field, dataclass
+
+    import typing_extensions
+else:
+
+    def dataclass(**_options):
+        """Leave the class as it is: the generated class already is what a dataclass has."""
+        return lambda cls: cls
+
+
+Value = TypeVar("Value")
+
+
+class Fresh(Generic[Value]):
+    """A class attribute whose value is made anew at each access, for mutable defaults."""
+
+    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
+        self._make = make
+        self._arguments = arguments
+
+    def __get__(self, instance: object, owner: type | None = None) -> Value:
+        """Return a new value."""
+        return self._make(*self._arguments)
+
+
+class FreshList(Fresh[list[Value]]):
+    """A class attribute whose value is a new list of the same values at each access."""
+
+    def __init__(self, *values: Value) -> None:
+        super().__init__(list, values)
+
+
+class _SlotTypes:
+    """The field types as rosidl_parser.definition objects, made on first access."""
+
+    def __get__(self, instance: object, owner: type) -> tuple[Any, ...]:
+        from .typeinfo import slot_types
+
+        return slot_types(owner)
+
+
+class _DataclassFields:
+    """The `__dataclass_fields__` of a class, made on first access."""
+
+    def __get__(self, instance: object, owner: type[Message]) -> dict[str, Field[Any]]:
+        from .fields import dataclass_fields
+
+        return dataclass_fields(owner)
+
+
+class InterfaceMeta(type):
+    """What rclpy looks for on the class of a class; one subclass for each interface."""
+
+    _TYPE_SUPPORT: ClassVar[Any] = None
+
+    def __setattr__(cls, name: str, value: object) -> None:
+        if name.isupper() and name[0] != "_" and hasattr(cls, name):
+            raise AttributeError(f"{cls.__name__}.{name} is a constant")
+        super().__setattr__(name, value)
+
+
+class MessageMeta(InterfaceMeta):
+    """Makes a message class from `_fields_and_field_types`."""
+
+    _CREATE_ROS_MESSAGE: ClassVar[Any] = None
+    _CONVERT_FROM_PY: ClassVar[Any] = None
+    _CONVERT_TO_PY: ClassVar[Any] = None
+    _DESTROY_ROS_MESSAGE: ClassVar[Any] = None
+
+    #: The message class that a metaclass was made for.
+    _message: ClassVar[Any] = None
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
+    ) -> MessageMeta:
+        """Return a message class, or a user's subclass of one."""
+        fields = namespace.get("_fields_and_field_types")
+        if fields is None:
+            if bases:
+                read = classmethod(codec.read_as_subclass)
+                namespace.setdefault("deserialize", read)
+            return super().__new__(cls, name, bases, namespace)
+        metaclass: Any = type(
+            f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
+        )
+        converted = {
+            public: namespace.pop(public, None) for public in map(public_name, fields)
+        }
+        namespace["__slots__"] = [slot_name(field) for field in fields]
+        made: Any = type.__new__(metaclass, name, bases, namespace)
+        for slot, (public, conversion) in zip(
+            made.__slots__, converted.items(), strict=True
+        ):
+            member = made.__dict__[slot]
+            attribute = member if conversion is None else conversion.property_of(member)
+            type.__setattr__(made, public, attribute)
+        metaclass._message = made
+        return made  # type: ignore[no-any-return]
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the five capsules that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        typesupport.import_message(cls._message)
+
+
+def _equal(mine: object, other: object) -> bool:
+    """Return whether two field values are equal, numpy arrays as a whole."""
+    if type(mine).__module__ == "numpy" or type(other).__module__ == "numpy":
+        import numpy as np
+
+        return np.array_equal(mine, other)  # type: ignore[arg-type]
+    return bool(mine == other)
+
+
+class Message(metaclass=MessageMeta):
+    """The base of all generated messages.
+
+    `_codec_` makes the functions that read and write one byte order.
+    """
+
+    __slots__ = ()
+    __hash__ = None  # type: ignore[assignment]
+
+    _fields_and_field_types: ClassVar[dict[str, str]]
+    _codec_: ClassVar[codec.Codecs]
+    SLOT_TYPES: ClassVar[tuple[Any, ...]] = _SlotTypes()  # type: ignore[assignment]
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]] = _DataclassFields()  # type: ignore[assignment]
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        """Return the IDL type of each field, by its name on the wire."""
+        return dict(cls._fields_and_field_types)
+
+    def serialize(self, *, byteorder: Literal["little", "big"] = "little") -> bytes:
+        """Return the message as CDR with its four-byte encapsulation header.
+
+        Raises ValidationError for a value that its field cannot hold. The bound of a string is
+        not a matter of the wire format and only checked by `validate`.
+        """
+        codec.install(type(self))
+        return self.serialize(byteorder=byteorder)
+
+    @classmethod
+    def deserialize(
+        cls, buffer: bytes | bytearray | memoryview
+    ) -> typing_extensions.Self:
+        """Return the message that `buffer` begins with, in the byte order that its header names.
+
+        Raises DecodeError. Bytes after the message are ignored; invalid UTF-8 becomes U+FFFD.
+        """
+        codec.install(cls)
+        return cls.deserialize(buffer)
+
+    def validate(self) -> None:
+        """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
+        from .validation import validate
+
+        validate(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the fields by their names on the wire, in types that JSON knows.
+
+        Nested messages become dictionaries, arrays lists, and bytes integers.
+        """
+        from .dictionaries import to_dict
+
+        return to_dict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> typing_extensions.Self:
+        """Return the message that `to_dict` would turn into `values`; absent fields have defaults.
+
+        Raises ValidationError for an unknown name or a value that its field cannot hold.
+        """
+        from .dictionaries import from_dict
+
+        message: typing_extensions.Self = from_dict(cls, values)
+        return message
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return NotImplemented
+        slots = type(self)._fields_and_field_types
+        return all(
+            _equal(getattr(self, slot), getattr(other, slot))
+            for slot in map(slot_name, slots)
+        )
+
+    def __repr__(self) -> str:
+        kind = type(self)
+        parts = []
+        for field in kind._fields_and_field_types:
+            value = getattr(self, slot_name(field))
+            shown = value.tolist() if type(value) is array else value
+            parts.append(f"{field}={shown!r}")
+        package = kind.__module__.rpartition(".")[0]
+        return f"{package}.{kind.__name__}({', '.join(parts)})"
+
+
+__all__ = ["Fresh", "FreshList", "InterfaceMeta", "Message", "MessageMeta", "dataclass"]

@@ -1,0 +1,38 @@
+"""How the names of an interface appear in Python.
+
+Wire names stay as they are in files, dictionaries and type descriptions. In Python a name that
+is a keyword, or that a message class needs for itself, gets a trailing underscore; no field
+name can end in one, so two names never meet.
+"""
+
+from __future__ import annotations
+
+from keyword import iskeyword
+
+#: What a message class offers itself, and what it must not lose to a field.
+RESERVED = frozenset(
+    {
+        "deserialize",
+        "from_dict",
+        "get_fields_and_field_types",
+        "mro",
+        "self",
+        "serialize",
+        "to_dict",
+        "validate",
+    }
+)
+
+#: Class attributes that look like the slot of a field.
+RESERVED_SLOTS = frozenset({"_fields_and_field_types"})
+
+
+def public_name(field: str) -> str:
+    """Return the attribute, and the keyword argument, that a field has in Python."""
+    return field + "_" if iskeyword(field) or field in RESERVED else field
+
+
+def slot_name(field: str) -> str:
+    """Return the slot that holds a field's value, named as rosidl names it."""
+    slot = "_" + field
+    return slot + "_" if slot in RESERVED_SLOTS else slot

@@ -1,0 +1,150 @@
+"""Numeric sequences: fields that hold an `array.array` and take anything sequence-like."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from .cdr import NATIVE
+
+Number = TypeVar("Number", int, float)
+
+#: The array type code of each IDL type, as rosidl chooses it.
+TYPE_CODES = {
+    "float": "f",
+    "double": "d",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+}
+
+#: How other buffers spell the same numbers, where C has two names for them.
+SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
+
+
+def to_array(code: str, values: Any) -> Any:
+    """Return `values` as an array of type `code`: themselves if they are one, else a copy.
+
+    Buffers of the same type (of numpy, memoryview, bytes for uint8) are copied whole.
+    Raises TypeError or OverflowError for what does not fit, as `array.array` does.
+    """
+    if type(values) is array and values.typecode == code:
+        return values
+    result = array(code)
+    try:
+        view = memoryview(values)
+    except TypeError:
+        result.extend(values)
+        return result
+    if view.ndim == 1 and SAME_NUMBER.get(view.format, view.format) == code:
+        if view.nbytes:
+            result.frombytes(view.cast("B") if view.c_contiguous else view.tobytes())
+    else:
+        result.extend(values.tolist() if hasattr(values, "tolist") else values)
+    return result
+
+
+class NumberSequence(Generic[Number]):
+    """A field that reads as an `array.array` and takes any sequence of numbers.
+
+    In the class body it stands for the field; the metaclass puts a property in its place.
+    """
+
+    code: str
+
+    def property_of(self, slot: Any) -> property:
+        """Return the property over the slot member `slot`."""
+        code = self.code
+        store = slot.__set__
+
+        def setter(message: object, values: Any) -> None:
+            store(message, to_array(code, values))
+
+        return property(slot.__get__, setter)
+
+    if TYPE_CHECKING:
+
+        def __get__(
+            self, message: object, owner: type | None = None
+        ) -> array[Number]: ...
+        def __set__(self, message: object, values: Iterable[Number]) -> None: ...
+
+
+class Int8Sequence(NumberSequence[int]):
+    """A sequence of int8."""
+
+    code = "b"
+
+
+class UInt8Sequence(NumberSequence[int]):
+    """A sequence of uint8, or of char."""
+
+    code = "B"
+
+
+class Int16Sequence(NumberSequence[int]):
+    """A sequence of int16."""
+
+    code = "h"
+
+
+class UInt16Sequence(NumberSequence[int]):
+    """A sequence of uint16."""
+
+    code = "H"
+
+
+class Int32Sequence(NumberSequence[int]):
+    """A sequence of int32."""
+
+    code = "i"
+
+
+class UInt32Sequence(NumberSequence[int]):
+    """A sequence of uint32."""
+
+    code = "I"
+
+
+class Int64Sequence(NumberSequence[int]):
+    """A sequence of int64."""
+
+    code = "q"
+
+
+class UInt64Sequence(NumberSequence[int]):
+    """A sequence of uint64."""
+
+    code = "Q"
+
+
+class Float32Sequence(NumberSequence[float]):
+    """A sequence of float32."""
+
+    code = "f"
+
+
+class Float64Sequence(NumberSequence[float]):
+    """A sequence of float64."""
+
+    code = "d"
+
+
+def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:
+    """Return a function that turns a field's value into a buffer in the wire's byte order."""
+
+    def native(values: Any) -> Any:
+        return values if type(values) is array else to_array(code, values)
+
+    def swapped(values: Any) -> Any:
+        result = array(code, to_array(code, values))
+        result.byteswap()
+        return result
+
+    return native if order == NATIVE else swapped

@@ -1,0 +1,134 @@
+"""Type support for rclpy, made from Python: what rclpy finds on a class's metaclass.
+
+rclpy reads capsules from `type(cls)` and, if they are missing, calls the metaclass's
+`__import_type_support__`, which comes here. Nothing else imports these modules.
+"""
+
+from __future__ import annotations
+
+from ctypes import PYFUNCTYPE, py_object
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+from . import typesupport_c as c
+from . import typesupport_services as services
+from .typesupport_descriptions import load
+from .typesupport_extension import extension
+
+#: Middlewares that take encoded messages through Fast DDS's type support.
+_OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
+#: Middlewares that have a type support of their own, generated in C++.
+_UNSUPPORTED = ("rmw_connextdds", "rmw_connextddsmicro")
+
+#: What rclpy reads from the metaclass; the type support comes last, because its presence
+#: says that all is there.
+_SUPPORT = "_TYPE_SUPPORT"
+_CREATE = "_CREATE_ROS_MESSAGE"
+_SHARED = {
+    "_DESTROY_ROS_MESSAGE": "Py_DecRef",
+    "_CONVERT_FROM_PY": "PyNumber_MatrixMultiply",
+    "_CONVERT_TO_PY": "PyNumber_Positive",
+}
+
+
+@cache
+def _road() -> ModuleType:
+    """Return the module that fits the middleware of this process."""
+    try:
+        utilities = import_module("rclpy.utilities")
+    except ImportError as error:
+        raise ImportError(
+            "type support needs rclpy: install it (for example `pip install "
+            "ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), or source your ROS 2 "
+            "installation first"
+        ) from error
+    middleware = utilities.get_rmw_implementation_identifier()
+    if middleware in _UNSUPPORTED:
+        raise ImportError(
+            f"idlc's type support does not know {middleware}: set RMW_IMPLEMENTATION to "
+            "rmw_fastrtps_cpp or rmw_cyclonedds_cpp, or build the interface package "
+            "with colcon"
+        )
+    if middleware in _OPAQUE:
+        from . import typesupport_fastrtps as road
+    else:
+        from . import typesupport_structs as road  # type: ignore[no-redef]
+    return road
+
+
+def _name(cls: Any) -> str:
+    """Return the full name of a class as ROS 2 writes it."""
+    kind = cls.__module__.split(".")[-2]
+    return f"{load().package}/{kind}/{cls.__name__}"
+
+
+def _handle(cls: Any) -> int:
+    """Return the address of any class's type support, whoever made the class."""
+    meta = type(cls)
+    if getattr(meta, _SUPPORT) is None:
+        meta.__import_type_support__()
+    return c.capsule_pointer(getattr(meta, _SUPPORT))
+
+
+def _give(cls: Any, capsules: dict[str, object]) -> None:
+    for attribute, capsule in capsules.items():
+        setattr(type(cls), attribute, capsule)
+
+
+@cache
+def _message(cls: Any) -> c.MessageSupport:
+    return _road().message(cls, _name(cls))  # type: ignore[no-any-return]
+
+
+@cache
+def _shared() -> dict[str, object]:
+    """Return the capsules that are the same for all messages."""
+    return {
+        name: c.capsule(c.c_function(function)) for name, function in _SHARED.items()
+    }
+
+
+def import_message(cls: Any) -> None:
+    """Give `type(cls)` the capsules that rclpy reads from a message class."""
+    built = extension(cls, _name(cls))
+    if built:
+        _give(cls, built.message())
+        return
+    support = _message(cls)
+    create = c.address(PYFUNCTYPE(py_object)(support.memory))
+    _give(cls, {_CREATE: c.capsule(create), **_shared()})
+    _give(cls, {_SUPPORT: c.capsule(support.handle)})
+
+
+def import_service(cls: Any) -> None:
+    """Give `type(cls)` the capsule that rclpy reads from a service class."""
+    built = extension(cls, _name(cls))
+    if built:
+        _give(cls, {_SUPPORT: built.service()})
+        return
+    event = services.event(cls.Event, _handle(cls.Event), _message(cls.Event).memory)
+    support = services.service(
+        _name(cls), _handle(cls.Request), _handle(cls.Response), event, _road()
+    )
+    _give(cls, {_SUPPORT: c.capsule(support)})
+
+
+def import_action(cls: Any) -> None:
+    """Give `type(cls)` the capsule that rclpy reads from an action class."""
+    built = extension(cls, _name(cls))
+    if built:
+        _give(cls, {_SUPPORT: built.action()})
+        return
+    parts = cls.Impl
+    support = services.action(
+        _name(cls),
+        (
+            _handle(parts.SendGoalService),
+            _handle(parts.GetResultService),
+            _handle(parts.CancelGoalService),
+        ),
+        (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage)),
+    )
+    _give(cls, {_SUPPORT: c.capsule(support)})

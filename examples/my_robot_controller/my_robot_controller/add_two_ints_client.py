@@ -1,0 +1,115 @@
+"""The node add_two_ints_client calls add_two_ints."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import signal
+import sys
+import time
+
+from my_robot_controller.srv import AddTwoInts
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args, try_shutdown
+
+
+class AddTwoIntsClient(Node):
+    """The node add_two_ints_client calls add_two_ints."""
+
+    def __init__(self, timeout: float) -> None:
+        """Create what the node consists of."""
+        super().__init__('add_two_ints_client')
+        self.timeout = timeout
+        self.add_two_ints_client = self.create_client(AddTwoInts, 'add_two_ints')
+
+    async def call_add_two_ints(self, request: AddTwoInts.Request) -> bool:
+        """Call add_two_ints once; return whether it answered in time."""
+        if not await self.until(self.add_two_ints_client.service_is_ready):
+            self.get_logger().error('add_two_ints: there is no server')
+            return False
+        answer = self.add_two_ints_client.call_async(request)
+        if not await self.until(answer.done):
+            self.get_logger().error('add_two_ints: no answer in time')
+            return False
+        response: AddTwoInts.Response | None = answer.result()
+        if response is None:
+            return False
+        self.get_logger().info(f'Result: {response.sum} = {request.a} + {request.b}')
+        return True
+
+    async def until(self, condition: Callable[[], bool]) -> bool:
+        """Wait until a condition holds; return whether it did so in time."""
+        deadline = time.monotonic() + self.timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            await self.pause(0.05)
+        return True
+
+    async def pause(self, seconds: float) -> None:
+        """Wait without blocking: other callbacks run in the meantime."""
+        over: Future = Future()
+        timer = self.create_timer(seconds, lambda: over.set_result(None))
+        await over
+        self.destroy_timer(timer)
+
+
+def parse_arguments(args: list[str] | None) -> argparse.Namespace:
+    """Return what the command line says, ROS 2's own arguments left out."""
+    parser = argparse.ArgumentParser(
+        description='The node add_two_ints_client calls add_two_ints.',
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        '--server-timeout',
+        type=float,
+        default=5.0,
+        metavar='SECONDS',
+        help='How long to wait for a server and for its answer.',
+    )
+    parser.add_argument('a', type=int, nargs='?', default=2, help='a')
+    parser.add_argument('b', type=int, nargs='?', default=3, help='b')
+    words = remove_ros_args(sys.argv if args is None else args)
+    return parser.parse_args(words[1:])
+
+
+def add_two_ints_request(given: argparse.Namespace) -> AddTwoInts.Request:
+    """Return the request that the command line asks for."""
+    return AddTwoInts.Request(
+        a=given.a,
+        b=given.b,
+    )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Do what the command line asks for; return 0 if all went well."""
+    given = parse_arguments(args)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = AddTwoIntsClient(given.server_timeout)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        try:
+            well = True
+            task = executor.create_task(node.call_add_two_ints, add_two_ints_request(given))
+            executor.spin_until_future_complete(task)
+            well = bool(task.result()) and well
+            return 0 if well else 1
+        except KeyboardInterrupt:
+            return 130
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 130
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,57 @@
+"""The node add_two_ints_server serves add_two_ints."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import signal
+
+from my_robot_controller.srv import AddTwoInts
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+
+class AddTwoIntsServer(Node):
+    """The node add_two_ints_server serves add_two_ints."""
+
+    def __init__(self) -> None:
+        """Create what the node consists of."""
+        super().__init__('add_two_ints_server')
+        self.add_two_ints_service = self.create_service(
+            AddTwoInts,
+            'add_two_ints',
+            self.handle_add_two_ints,
+        )
+
+    def handle_add_two_ints(
+        self, request: AddTwoInts.Request, response: AddTwoInts.Response
+    ) -> AddTwoInts.Response:
+        """Answer a request to add_two_ints."""
+        self.get_logger().info(f'add_two_ints: a={request.a!r} b={request.b!r}')
+        # a + b
+        response.sum = request.a + request.b
+        return response
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node until it is asked to end."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = AddTwoIntsServer()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        install_signal_handlers()  # not before: they would shut down what is being created
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

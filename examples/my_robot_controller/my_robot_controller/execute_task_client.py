@@ -1,0 +1,151 @@
+"""The node execute_task_client sends goals to execute_task."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+import signal
+import sys
+import time
+from typing import Any
+
+from action_msgs.msg import GoalStatus
+from my_robot_controller.action import ExecuteTask
+import rclpy
+from rclpy.action.client import ActionClient, ClientGoalHandle
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args, try_shutdown
+
+
+class ExecuteTaskClient(Node):
+    """The node execute_task_client sends goals to execute_task."""
+
+    def __init__(self, timeout: float) -> None:
+        """Create what the node consists of."""
+        super().__init__('execute_task_client')
+        self.timeout = timeout
+        self.execute_task_goal: ClientGoalHandle | None = None
+        self.execute_task_client = ActionClient(self, ExecuteTask, 'execute_task')
+
+    async def send_execute_task(self, goal: ExecuteTask.Goal) -> bool:
+        """Send a goal to execute_task and see it through; return whether it was reached."""
+        if not await self.until(self.execute_task_client.server_is_ready):
+            self.get_logger().error('execute_task: there is no server')
+            return False
+        answer = self.execute_task_client.send_goal_async(
+            goal,
+            feedback_callback=self.follow_execute_task,
+        )
+        if not await self.until(answer.done):
+            self.get_logger().error('execute_task: no answer in time')
+            return False
+        goal_handle: ClientGoalHandle = answer.result()
+        if not goal_handle.accepted:
+            self.get_logger().error('execute_task: the goal was rejected')
+            return False
+        self.execute_task_goal = goal_handle
+        ending = goal_handle.get_result_async()
+        while not ending.done():
+            if not self.execute_task_client.server_is_ready():
+                self.get_logger().error('execute_task: the server has gone')
+                return False
+            await self.pause(0.05)
+        self.execute_task_goal = None
+        result: ExecuteTask.Result = ending.result().result
+        self.get_logger().info(f'execute_task: success={result.success!r}')
+        return bool(ending.result().status == GoalStatus.STATUS_SUCCEEDED)
+
+    def follow_execute_task(self, message: Any) -> None:
+        """Act on what the server reports about the goal."""
+        feedback: ExecuteTask.Feedback = message.feedback
+        self.get_logger().info(f'execute_task: current_status={feedback.current_status!r}')
+
+    async def cancel_execute_task(self) -> None:
+        """Ask the server to cancel the goal that it works on."""
+        goal_handle = self.execute_task_goal
+        if goal_handle is not None:
+            answer = goal_handle.cancel_goal_async()
+            if await self.until(answer.done):
+                self.get_logger().info('execute_task: cancelled')
+
+    async def until(self, condition: Callable[[], bool]) -> bool:
+        """Wait until a condition holds; return whether it did so in time."""
+        deadline = time.monotonic() + self.timeout
+        while not condition():
+            if time.monotonic() > deadline:
+                return False
+            await self.pause(0.05)
+        return True
+
+    async def pause(self, seconds: float) -> None:
+        """Wait without blocking: other callbacks run in the meantime."""
+        over: Future = Future()
+        timer = self.create_timer(seconds, lambda: over.set_result(None))
+        await over
+        self.destroy_timer(timer)
+
+
+def parse_arguments(args: list[str] | None) -> argparse.Namespace:
+    """Return what the command line says, ROS 2's own arguments left out."""
+    parser = argparse.ArgumentParser(
+        description='The node execute_task_client sends goals to execute_task.',
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    parser.add_argument(
+        '--server-timeout',
+        type=float,
+        default=5.0,
+        metavar='SECONDS',
+        help='How long to wait for a server and for its answer.',
+    )
+    parser.add_argument(
+        'task_name',
+        type=str,
+        nargs='?',
+        default='dock',
+        help='The task to execute, e.g. "dock"',
+    )
+    words = remove_ros_args(sys.argv if args is None else args)
+    return parser.parse_args(words[1:])
+
+
+def execute_task_request(given: argparse.Namespace) -> ExecuteTask.Goal:
+    """Return the goal that the command line asks for."""
+    return ExecuteTask.Goal(
+        task_name=given.task_name,
+    )
+
+
+def main(args: list[str] | None = None) -> int:
+    """Do what the command line asks for; return 0 if all went well."""
+    given = parse_arguments(args)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = ExecuteTaskClient(given.server_timeout)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        try:
+            well = True
+            task = executor.create_task(node.send_execute_task, execute_task_request(given))
+            executor.spin_until_future_complete(task)
+            well = bool(task.result()) and well
+            return 0 if well else 1
+        except KeyboardInterrupt:
+            ending = executor.create_task(node.cancel_execute_task)
+            executor.spin_until_future_complete(ending)
+            return 130
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 130
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

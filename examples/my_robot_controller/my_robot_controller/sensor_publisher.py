@@ -1,0 +1,52 @@
+"""The node sensor_publisher publishes sensor_data."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import signal
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import install_signal_handlers, SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from std_msgs.msg import String
+
+
+class SensorPublisher(Node):
+    """The node sensor_publisher publishes sensor_data."""
+
+    def __init__(self) -> None:
+        """Create what the node consists of."""
+        super().__init__('sensor_publisher')
+        self.sensor_data_publisher = self.create_publisher(String, 'sensor_data', 10)
+        self.sensor_data_timer = self.create_timer(0.5, self.publish_sensor_data)
+
+    def publish_sensor_data(self) -> None:
+        """Publish a message on sensor_data."""
+        message = String(
+            data='Temperature: 25.5C',
+        )
+        self.sensor_data_publisher.publish(message)
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node until it is asked to end."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        node = SensorPublisher()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        install_signal_handlers()  # not before: they would shut down what is being created
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

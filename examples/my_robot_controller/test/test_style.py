@@ -1,0 +1,29 @@
+"""The package keeps the style of ROS 2's own packages, where its checkers are installed."""
+
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1]
+FILES = [
+    str(path)
+    for folder in ('my_robot_controller', 'launch', 'test')
+    for path in sorted((PACKAGE / folder).glob('*.py'))
+]
+
+
+@pytest.mark.flake8
+@pytest.mark.linter
+def test_flake8() -> None:
+    """No line is one that ament_flake8 objects to."""
+    flake8 = pytest.importorskip('ament_flake8.main')
+    code, errors = flake8.main_with_errors(argv=FILES)
+    assert code == 0, '\n'.join(errors)
+
+
+@pytest.mark.linter
+@pytest.mark.pep257
+def test_pep257() -> None:
+    """No docstring is one that ament_pep257 objects to."""
+    pep257 = pytest.importorskip('ament_pep257.main')
+    assert pep257.main(argv=FILES) == 0

@@ -1,0 +1,71 @@
+"""Nodes in processes of their own, and what they print."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+PATIENCE = 40.0
+
+
+class Running:
+    """A node that runs; its output goes into a file."""
+
+    def __init__(self, log: Path, words: list[str], folder: Path, environment: dict[str, str]):
+        self.log = log
+        with log.open("w") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-u", "-m", *words],
+                cwd=folder,
+                env=environment,
+                stdout=output,
+                stderr=output,
+            )
+
+    @property
+    def output(self) -> str:
+        return self.log.read_text()
+
+    def said(self) -> list[str]:
+        """Return what the node logged, without times and names."""
+        return [line.partition("]: ")[2] for line in self.output.splitlines() if "]: " in line]
+
+    def until(self, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, f"in vain; it said:\n{self.output}"
+            time.sleep(0.05)
+
+    def says(self, text: str) -> None:
+        self.until(lambda: text in self.output)
+
+    def ends(self) -> int:
+        self.until(lambda: self.process.poll() is not None)
+        return self.process.returncode
+
+    def end(self, how: signal.Signals = signal.SIGINT) -> int:
+        self.process.send_signal(how)
+        return self.process.wait(PATIENCE)
+
+
+@contextmanager
+def nodes(
+    folder: Path, logs: Path, environment: dict[str, str]
+) -> Iterator[Callable[..., Running]]:
+    """Yield a function that starts a module of a package; all are ended at the end."""
+    started: list[Running] = []
+
+    def start(*words: str) -> Running:
+        log = logs / f"{len(started)}.log"
+        started.append(Running(log, list(words), folder, environment))
+        return started[-1]
+
+    try:
+        yield start
+    finally:
+        for node in started:
+            node.process.kill()
+            node.process.wait()

@@ -1,0 +1,145 @@
+"""Every node of the example, each in a process of its own, does what the tutorial says."""
+
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+from nodes import nodes
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "my_robot_controller"
+
+
+@pytest.fixture
+def start(tmp_path, ros_environment):
+    with nodes(EXAMPLE, tmp_path, ros_environment) as start:
+        yield lambda name, *words: start(f"my_robot_controller.{name}", *words)
+
+
+@pytest.fixture(autouse=True)
+def no_tracebacks(tmp_path):
+    yield
+    for log in tmp_path.glob("*.log"):
+        assert "Traceback" not in log.read_text()
+
+
+def test_the_command_publisher_toggles(start):
+    node = start("command_publisher")
+    node.until(lambda: len(node.said()) >= 4)
+    lines = [f"Publishing: linear_velocity_x={speed}" for speed in (0.0, 0.5, 0.0, 0.5)]
+    assert node.said()[:4] == lines
+    assert node.end() == 0
+
+
+def test_the_subscriber_hears_the_temperature(start):
+    subscriber = start("sensor_subscriber")
+    publisher = start("sensor_publisher")
+    subscriber.until(lambda: subscriber.output.count("Temperature: 25.5C") >= 2)
+    assert publisher.end(signal.SIGTERM) == 0
+    assert subscriber.end() == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [([], "Result: 5 = 2 + 3"), (["40", "2"], "Result: 42 = 40 + 2")]
+)
+def test_two_numbers_are_added(start, words, said):
+    server = start("add_two_ints_server")
+    client = start("add_two_ints_client", "--server-timeout", "30", *words)
+    assert client.ends() == 0
+    assert client.said() == [said]
+    assert server.end() == 0
+
+
+def test_the_countdown_counts_down(start):
+    server = start("countdown_action_server")
+    client = start("countdown_action_client", "--server-timeout", "30")
+    assert client.ends() == 0
+    counts = [f"countdown: current_count={count}" for count in (5, 4, 3, 2, 1)]
+    assert client.said() == [*counts, "countdown: final_count=0 success=True"]
+    assert server.end() == 0
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_client_that_is_ended_cancels_its_goal(start, how):
+    server = start("countdown_action_server")
+    client = start("countdown_action_client", "--server-timeout", "30", "50")
+    client.says("current_count=49")
+    assert client.end(how) == 130
+    server.says("countdown: cancelled")
+    assert server.end() == 0
+
+
+def test_a_newer_goal_takes_over(start):
+    server = start("countdown_action_server")
+    first = start("countdown_action_client", "--server-timeout", "30", "50")
+    first.says("current_count=49")
+    second = start("countdown_action_client", "--server-timeout", "30", "1")
+    assert first.ends() == 1
+    assert second.ends() == 0
+    assert "a newer goal takes over" in server.output
+
+
+def test_a_goal_that_cannot_be_counted_is_rejected(start):
+    start("countdown_action_server")
+    client = start("countdown_action_client", "--server-timeout", "30", "0")
+    assert client.ends() == 1
+    assert "the goal was rejected" in client.output
+
+
+def test_a_task_is_executed(start):
+    server = start("execute_task_server")
+    client = start("execute_task_client", "--server-timeout", "30", "paint")
+    assert client.ends() == 0
+    steps = [f"current_status='{step}: paint'" for step in ("starting", "working", "finishing")]
+    assert client.said() == [*(f"execute_task: {s}" for s in steps), "execute_task: success=True"]
+    assert server.end() == 0
+
+
+def test_a_goal_whose_server_dies_is_given_up(start):
+    server = start("execute_task_server")
+    client = start("execute_task_client", "--server-timeout", "30")
+    client.says("working")
+    server.end()
+    assert client.ends() == 1
+    assert "the server has gone" in client.output
+
+
+@pytest.mark.parametrize(
+    "name", ["add_two_ints_client", "countdown_action_client", "execute_task_client"]
+)
+def test_a_client_without_a_server_says_so(start, name):
+    client = start(name, "--server-timeout", "0.5")
+    assert client.ends() == 1
+    assert "there is no server" in client.output
+
+
+@pytest.mark.parametrize(
+    "name", ["add_two_ints_client", "countdown_action_client", "execute_task_client"]
+)
+def test_a_waiting_client_ends_quietly(start, name):
+    client = start(name, "--server-timeout", "1000")
+    client.until(partial(_waits, client))
+    assert client.end() == 130
+
+
+def _waits(client) -> bool:
+    """Whether the process has opened its sockets, which rclpy does as its last preparation."""
+    descriptors = Path(f"/proc/{client.process.pid}/fd")
+    try:
+        return sum("socket" in str(one.readlink()) for one in descriptors.iterdir()) >= 4
+    except OSError:
+        return False
+
+
+def test_the_example_passes_its_own_tests(ros_environment):
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"],
+        cwd=EXAMPLE,
+        env=ros_environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
