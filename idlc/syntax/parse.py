@@ -15,6 +15,9 @@ from idlc.text.source import Source
 #: The characters that end a line, as `str.splitlines` has it (spec 1.1).
 LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
 
+#: Longer lines are parsed again rather than remembered.
+SHARED_LENGTH = 1000
+
 
 def _piece(token: Token) -> tree.Piece:
     return tree.Piece(str(token), _start(token))
@@ -103,9 +106,13 @@ def parse(source: Source) -> tree.File:
     )
 
 
-@lru_cache(maxsize=4096)
 def parse_definition(text: str) -> tree.Body:
     """Return what the code of one line is; `text` is a `Line.definition` and not empty."""
+    return _parsed(text) if len(text) < SHARED_LENGTH else _parsed.__wrapped__(text)
+
+
+@lru_cache(maxsize=4096)
+def _parsed(text: str) -> tree.Body:
     if text[0].isspace():
         return _broken_indent(text)
     try:
