@@ -38,6 +38,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
     from idlc.driver.fmt import fmt
     from idlc.text.diagnostics import Report
     from idlc.text.present import counted
+    from idlc.text.visible import one_line
 
     report = Report()
     settings = config.load(report)
@@ -49,7 +50,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
             if file.changed and diff:
                 sys.stdout.writelines(_diff(file, sys.stdout))
             elif file.changed:
-                sys.stdout.write(f"{'would change' if dry else 'changed'} {file.path}\n")
+                sys.stdout.write(f"{'would change' if dry else 'changed'} {one_line(file.path)}\n")
     terminal.show(report, "text", sys.stderr)
     changed = sum(file.changed for file in files)
     broken = sum(file.old is None for file in files)
@@ -67,12 +68,13 @@ def _diff(file: Formatted, stream: TextIO) -> Iterator[str]:
     from difflib import unified_diff
 
     from idlc.cli import terminal
-    from idlc.text.visible import visible
+    from idlc.text.visible import one_line, visible
 
     old = (file.old or "").splitlines(keepends=True)
     new = (file.new or "").splitlines(keepends=True)
+    path = one_line(file.path)
     codes = {"+": "32", "-": "31", "@": "36"} if terminal.colours(stream) else {}
-    for line in unified_diff(old, new, f"a/{file.path}", f"b/{file.path}"):
+    for line in unified_diff(old, new, f"a/{path}", f"b/{path}"):
         text = line.rstrip("\r\n")
         shown = visible(text) if stream.isatty() else text
         code = codes.get(line[:1])

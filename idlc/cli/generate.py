@@ -9,6 +9,7 @@ from idlc.disk.config import Config
 from idlc.driver.gen import Generated, GenOptions, gen
 from idlc.text.diagnostics import Report
 from idlc.text.present import counted, summary
+from idlc.text.visible import one_line
 
 
 def completed(wanted: GenOptions, settings: Config) -> GenOptions:
@@ -55,5 +56,5 @@ def _line(package: Generated, check: bool) -> str:
     note = f" ({', '.join(done)})" if done else ""
     return (
         f"{package.package}: {counted(package.interfaces, 'interface')} → "
-        f"{counted(package.files, 'file')} in {package.out}{note}\n"
+        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}\n"
     )

@@ -8,6 +8,7 @@ import time
 from idlc.cli.generate import once
 from idlc.disk.watch import snapshot
 from idlc.driver.gen import GenOptions
+from idlc.text.visible import one_line
 
 INTERVAL = 0.25
 
@@ -17,7 +18,7 @@ def run_again(wanted: GenOptions, style: str) -> int:
     try:
         seen = snapshot(wanted.paths, wanted.include)
         once(wanted, style)
-        sys.stderr.write(f"watching {', '.join(wanted.paths)}; Ctrl-C ends\n")
+        sys.stderr.write(f"watching {one_line(', '.join(wanted.paths))}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()

@@ -106,6 +106,8 @@ class Library:
         self._own = own or {}
         self._report = report
         self._known: dict[str, list[Path]] = {}
+        self._packages: list[str] | None = None
+        self._listed: dict[str, list[tuple[ir.Kind, str]]] = {}
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""
@@ -148,6 +150,12 @@ class Library:
         """Return kind and name of each file of a package, in the first place that has any."""
         if not _NAME.fullmatch(package):
             return []
+        known = self._listed.get(package)
+        if known is None:
+            known = self._listed[package] = self._list(package)
+        return known
+
+    def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
         for root in self._roots(package):
             found = [
                 (KINDS[path.suffix], path.stem)
@@ -161,8 +169,10 @@ class Library:
 
     def packages(self) -> Iterable[str]:
         """Return the names of all packages, for suggestions."""
-        found = set(catalog.packages()) | set(self._own)
-        return sorted(found.union(*(place.packages() for place in self._places)))
+        if self._packages is None:
+            found = set(catalog.packages()) | set(self._own)
+            self._packages = sorted(found.union(*(place.packages() for place in self._places)))
+        return self._packages
 
 
 def _files(folder: Path) -> list[Path]:

@@ -20,12 +20,13 @@ MANIFEST = "package.xml"
 @lru_cache(maxsize=1024)
 def manifest(folder: Path) -> Path | None:
     """Return the nearest package.xml at or above an absolute folder, within its repository."""
-    path = folder / MANIFEST
-    if is_file(path):
-        return path
-    if folder.parent == folder or _is_repository(folder):
-        return None
-    return manifest(folder.parent)
+    for here in (folder, *folder.parents):
+        path = here / MANIFEST
+        if is_file(path):
+            return path
+        if _is_repository(here):
+            break
+    return None
 
 
 def _is_repository(folder: Path) -> bool:

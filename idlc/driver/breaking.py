@@ -12,6 +12,7 @@ from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out
 from idlc.disk.statements import statements
 from idlc.driver.stages import models_of, stage
+from idlc.emit.limits import oversized
 from idlc.model.changes.allow import Allowance, without_allowed
 from idlc.model.changes.change import LEVELS
 from idlc.model.changes.packages import (
@@ -132,6 +133,9 @@ def _models(
     """Return the packages' models; only errors are reported, warnings are `check`'s."""
     found = Report()
     models = {model.package: model for model, _ in models_of(given, include, found)}
+    if not found.had_errors:
+        for model in models.values():
+            found.extend(oversized(model))
     report.extend(one for one in found if one.severity is codes.ERROR)
     return models
 

@@ -77,8 +77,8 @@ def models_of(
 ) -> Iterator[tuple[Model, list[str]]]:
     """Yield each package's model and the names of what its files define, derived ones included."""
     own = {given.package: given.folders for given in packages}
+    library = Library(include, report, own=own)
     for given in packages:
-        library = Library(include, report, own=own)
         sources = list(sources_of(given, report))
         model = compile_package(given.package, sources, library, report)
         names = {name for name, _ in sources}

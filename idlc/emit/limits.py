@@ -16,6 +16,8 @@ from idlc.text.diagnostics import Diagnostic
 
 MAX_FIELDS = 20_000
 MAX_DEPTH = 100
+#: Of all structures of a package together.
+MAX_PACKAGE_FIELDS = 2_000_000
 
 
 class _Extent(NamedTuple):
@@ -26,21 +28,29 @@ class _Extent(NamedTuple):
 
 
 def oversized(model: Model) -> Iterator[Diagnostic]:
-    """Yield a problem for each of the model's own interfaces that is over a limit."""
+    """Yield a problem for each of the model's own interfaces that is over a limit, or for all."""
     extents = _extents(model)
+    total, refused = 0, False
     for interface in model.own:
         worst = [extents[message.name] for message in derive.messages(interface)]
         fields, depth = max(e.fields for e in worst), max(e.depth for e in worst)
         path = interface.source.path if interface.source else str(interface.name)
+        total += sum(extent.fields for extent in worst)
         if fields > MAX_FIELDS:
-            message = f"`{interface.name}` has {fields:,} fields, nested ones included"
+            number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
+            message = f"`{interface.name}` has {number} fields, nested ones included"
             hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
         elif depth > MAX_DEPTH:
             message = f"`{interface.name}` nests messages {depth} deep"
             hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
         else:
             continue
+        refused = True
         yield codes.STRUCTURE_TOO_LARGE.of(path, message, hint=hint)
+    if total > MAX_PACKAGE_FIELDS and not refused:
+        message = f"`{model.package}` has {total:,} fields, nested ones included"
+        hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
+        yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
 
 
 def _extents(model: Model) -> dict[ir.TypeName, _Extent]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import NamedTuple
 
 from idlc.syntax.escapes import EscapeError, through_idl
 from idlc.text import codes
 
 # a comma makes it a range, not a unit
-_UNIT = re.compile(r"(\s*\[([^,\]]+)\])")
+_UNIT_END = re.compile(r"[,\]]")
 
 
 class Comment(NamedTuple):
@@ -27,16 +28,26 @@ def condense(lines: Sequence[str]) -> Comment:
         return Comment()
     unit: str | None = None
     kept = list(lines)
-    found = _UNIT.findall("\n".join(lines)) if any("[" in line for line in lines) else []
+    found = list(islice(_units("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
     if len(found) == 1:
         whole, unit = found[0]
         kept = [line.replace(whole, "") for line in kept]
-    while kept and not kept[0]:
-        del kept[0]
-    while kept and not kept[-1]:
-        del kept[-1]
+    filled = [at for at, line in enumerate(kept) if line]
+    kept = kept[filled[0] : filled[-1] + 1] if filled else []
     kept = [line for at, line in enumerate(kept) if line or kept[at - 1]]
     return Comment(tuple(textwrap.dedent("\n".join(kept)).split("\n")) if kept else (), unit)
+
+
+def _units(text: str) -> Iterator[tuple[str, str]]:
+    r"""Yield what `(\s*\[([^,\]]+)\])` finds in `text`, looking at each character once."""
+    behind = 0
+    at = text.find("[")
+    while at >= 0 and (end := _UNIT_END.search(text, at)):
+        if end[0] == "]" and end.start() > at + 1:
+            head = text[behind:at]
+            yield text[behind + len(head.rstrip()) : end.end()], text[at + 1 : end.start()]
+            behind = end.end()
+        at = text.find("[", end.end())
 
 
 class Problem(NamedTuple):

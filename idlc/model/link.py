@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from functools import cached_property
 from typing import Protocol
 
@@ -16,6 +16,10 @@ from idlc.text.diagnostics import Diagnostic, Report, Severity
 from idlc.text.source import Source, Span
 from idlc.text.suggest import did_you_mean
 
+#: Problems after which nearest names are no longer looked for; people see fewer than these.
+SUGGESTIONS = 200
+#: Messages of a circle that are named.
+NAMED = 10
 _PRIMITIVES = (*ir.PRIMITIVES, *STRINGS)
 
 
@@ -91,6 +95,7 @@ def _load_references(
     interfaces: MutableMapping[ir.TypeName, ir.Interface], library: Library, report: Report
 ) -> None:
     """Add every interface that is reached and not there yet; report those that do not exist."""
+    unknown = _Unknown(interfaces, library)
     queue = list(interfaces.values())
     while queue:
         for field, target in _references(queue.pop()):
@@ -99,7 +104,7 @@ def _load_references(
             source = library.source(target)
             if source is None:
                 if field.type_span is not None:
-                    report.add(_unknown(target, field.type_span, interfaces, library))
+                    report.add(unknown.problem(target, field.type_span))
                 continue
             found = Report()
             interface = lower(parse(source), target, found)
@@ -108,40 +113,63 @@ def _load_references(
             queue.append(interface)
 
 
-def _unknown(
-    target: ir.TypeName,
-    span: Span,
-    interfaces: Mapping[ir.TypeName, ir.Interface],
-    library: Library,
-) -> Diagnostic:
-    mine = {name for name in interfaces if name.package == target.package}
-    known = {name.name for name in mine if name.kind == "msg"} | set(library.names(target.package))
-    written = span.text
-    if "/" in written and not known and not mine:
-        hint = did_you_mean(target.package, library.packages())
-        return codes.UNKNOWN_PACKAGE.at(
-            span.at(0, len(target.package)),
-            f"unknown package `{target.package}`",
-            hint=hint or f"add `-I DIR` for the folder that holds `{target.package}`",
-        )
-    kinds = {name.kind for name in mine if name.name == target.name}
-    if kinds:
-        what = "a service" if "srv" in kinds else "an action"
-        hint = f"`{target.name}` is {what}; only messages can be the type of a field"
-    else:
-        hint = _elsewhere(target.name, library) if "/" not in written else None
-        hint = hint or did_you_mean(target.name, (*known, *_PRIMITIVES))
-        hint = hint or f"there is no `{target.name}.msg` in package `{target.package}`"
-    at = span.at(written.rfind("/") + 1, len(written))
-    return codes.UNKNOWN_TYPE.at(at, f"unknown type `{written}`", hint=hint)
+class _Unknown:
+    """Says what is wrong with references to what does not exist.
 
+    The nearest name is looked for among all that there are, so only for the first problems.
+    """
 
-def _elsewhere(name: str, library: Library) -> str | None:
-    """Return a hint at another package that has a message of exactly this name."""
-    for package in sorted(library.packages(), key=lambda package: (package != "std_msgs", package)):
-        if name in library.names(package):
-            return f"did you mean `{package}/{name}`?"
-    return None
+    def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface], library: Library) -> None:
+        self._interfaces = interfaces
+        self._library = library
+        self._hints = SUGGESTIONS
+        self._messages: dict[str, set[str]] = {}
+        for name in interfaces:
+            mine = self._messages.setdefault(name.package, set())
+            mine |= {name.name} if name.kind == "msg" else set()
+
+    def problem(self, target: ir.TypeName, span: Span) -> Diagnostic:
+        """Return the problem with a reference to `target`."""
+        self._hints -= 1
+        written = span.text
+        known = self._messages.get(target.package)
+        if known is None and "/" in written and not self._library.names(target.package):
+            hint = self._near(target.package, self._library.packages)
+            return codes.UNKNOWN_PACKAGE.at(
+                span.at(0, len(target.package)),
+                f"unknown package `{target.package}`",
+                hint=hint or f"add `-I DIR` for the folder that holds `{target.package}`",
+            )
+        others: dict[ir.Kind, str] = {"srv": "a service", "action": "an action"}
+        what = next((others[kind] for kind in others if self._is(target, kind)), None)
+        if what:
+            hint = f"`{target.name}` is {what}; only messages can be the type of a field"
+        else:
+            hint = None if "/" in written else self._elsewhere(target.name)
+            hint = hint or self._near(target.name, lambda: self._known(target.package))
+            hint = hint or f"there is no `{target.name}.msg` in package `{target.package}`"
+        at = span.at(written.rfind("/") + 1, len(written))
+        return codes.UNKNOWN_TYPE.at(at, f"unknown type `{written}`", hint=hint)
+
+    def _is(self, target: ir.TypeName, kind: ir.Kind) -> bool:
+        return target._replace(kind=kind) in self._interfaces
+
+    def _known(self, package: str) -> Iterable[str]:
+        names = self._library.names(package)
+        return {*self._messages.get(package, ()), *names, *_PRIMITIVES}
+
+    def _near(self, name: str, known: Callable[[], Iterable[str]]) -> str | None:
+        return did_you_mean(name, known()) if self._hints >= 0 else None
+
+    def _elsewhere(self, name: str) -> str | None:
+        """Return a hint at another package that has a message of exactly this name."""
+        if self._hints < 0:
+            return None
+        library = self._library
+        for package in sorted(library.packages(), key=lambda one: (one != "std_msgs", one)):
+            if name in library.names(package):
+                return f"did you mean `{package}/{name}`?"
+        return None
 
 
 def _check_recursion(interfaces: Mapping[ir.TypeName, ir.Interface], report: Report) -> None:
@@ -149,28 +177,36 @@ def _check_recursion(interfaces: Mapping[ir.TypeName, ir.Interface], report: Rep
     edges = {name: tuple(_references(interface)) for name, interface in interfaces.items()}
     done: set[ir.TypeName] = set()
     for root in interfaces:
-        path: dict[ir.TypeName, Iterator[tuple[ir.Field, ir.TypeName]]] = {}
-        if root not in done:
-            path[root] = iter(edges[root])
-        while path:
-            name, rest = next(reversed(path.items()))
-            step = next(rest, None)
+        path: list[ir.TypeName] = []
+        rest: list[Iterator[tuple[ir.Field, ir.TypeName]]] = []
+        places: dict[ir.TypeName, int] = {}
+        enter: ir.TypeName | None = None if root in done else root
+        while enter or path:
+            if enter:
+                places[enter] = len(path)
+                path.append(enter)
+                rest.append(iter(edges[enter]))
+            step = next(rest[-1], None)
+            enter = None
             if step is None:
-                done.add(name)
-                del path[name]
-            elif step[1] in path:
-                _report_circle(list(path), *step, report)
+                done.add(path[-1])
+                del rest[-1], places[path.pop()]
+            elif step[1] in places:
+                _report_circle(path, places[step[1]], *step, report)
             elif step[1] in edges and step[1] not in done:
-                path[step[1]] = iter(edges[step[1]])
+                enter = step[1]
 
 
 def _report_circle(
-    path: list[ir.TypeName], field: ir.Field, target: ir.TypeName, report: Report
+    path: list[ir.TypeName], start: int, field: ir.Field, target: ir.TypeName, report: Report
 ) -> None:
+    """Report a circle of the messages on `path` from `start` on, and `target` again."""
     if field.type_span is None:
         return
-    circle = [*path[path.index(target) :], target]
-    names = " → ".join(name.name for name in circle)
+    left_out = len(path) - start - NAMED
+    shown = [name.name for name in path[start : start + NAMED]]
+    shown += [f"{left_out} more"] if left_out > 0 else []
+    names = " → ".join((*shown, target.name))
     report.add(
         codes.RECURSIVE_TYPE.at(
             field.type_span,

@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import math
 import re
+import warnings
 from functools import cache
 from typing import NamedTuple, TypeAlias
 
@@ -43,6 +44,7 @@ class Text(NamedTuple):
 Number: TypeAlias = bool | int | float
 BACKSLASH_HINT = "write `\\\\\\\\` for each backslash that should stay"
 _QUOTES = ('"', "'")
+_NO_BLANK = re.compile("[^ ]")
 
 
 def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | Text | Fault:
@@ -195,7 +197,9 @@ def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fa
     literal = repr(values).replace("\\", "\\\\").replace('"', '\\"')
     try:
         annotation = read_back(literal, text)
-        value = ast.literal_eval(annotation)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # unknown escapes, which the text is full of
+            value = ast.literal_eval(annotation)
     except EscapeError as error:
         hint = "write the character as an escape such as `\\u20ac`"
         message = f"ROS 2's tools fail on {error}"
@@ -234,45 +238,70 @@ def _elements(inside: str) -> list[tuple[str, int]] | Fault:
 def _string_elements(inside: str) -> list[tuple[str, int]] | Fault:
     """Split as rosidl's scanner does, wrong turns included (spec section 4)."""
     found: list[tuple[str, int]] = []
-    rest = inside
-    while rest:
-        rest = rest.lstrip(" ")
-        at = len(inside) - len(rest)
-        if not rest or rest[0] == ",":
+    ends = {quote: _Ends(inside, quote) for quote in _QUOTES}
+    at = 0
+    while at < len(inside):
+        at = _behind_blanks(inside, at)
+        if at == len(inside) or inside[at] == ",":
             return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")
         quoted = False
         for quote in _QUOTES:
-            if rest.startswith(quote):
+            if inside.startswith(quote, at):
                 quoted = True
-                end = _end_quote(rest, quote)
+                end = ends[quote].behind(at)
                 if end == -1:
-                    at = len(inside) - len(rest)
                     message = f"no {quote} that ends this element"
                     hint = (
                         "an element cannot end with an escaped quote; use the other kind of quote"
                     )
                     return Fault(codes.BAD_VALUE, message, at, len(inside), hint)
-                element = rest[1 : end + 1].replace(f"\\{quote}", quote)
+                element = inside[at + 1 : at + end + 1].replace(f"\\{quote}", quote)
                 # upstream strips every element, also what stood in quotes
-                found.append((element.strip(), len(inside) - len(rest)))
-                rest = rest[end + 2 :]
+                found.append((element.strip(), at))
+                at += end + 2
         if not quoted:
-            element, comma, behind = rest.partition(",")
-            found.append((element.strip(), at))
-            rest = comma + behind
-        rest = rest.lstrip(" ").removeprefix(",")
+            comma = inside.find(",", at)
+            end = len(inside) if comma < 0 else comma
+            found.append((inside[at:end].strip(), at))
+            at = end
+        at = _behind_blanks(inside, at)
+        at += inside.startswith(",", at)
     return found
 
 
-def _end_quote(text: str, quote: str) -> int:
-    """Return rosidl's idea of where the quoted text ends; -1 if nowhere. Quadratic upstream."""
-    base = 0
-    while text:
-        at = text.find(quote, 1) - 1
-        if at < 0:
-            return -1
-        if text[at : at + 2] != f"\\{quote}":
-            return base + at
-        text = text[at + 2 :]
-        base = at + 2
-    return -1
+def _behind_blanks(text: str, at: int) -> int:
+    """Return the first place from `at` on where no blank stands."""
+    found = _NO_BLANK.search(text, at)
+    return found.start() if found else len(text)
+
+
+class _Ends:
+    """rosidl's idea of where quoted texts end, without its quadratic search.
+
+    Upstream goes from one escaped quote to the next, and counts from the last of them instead of
+    from the start, so that what follows may be looked at again and again.
+    """
+
+    def __init__(self, text: str, quote: str) -> None:
+        self._text = text
+        self._quote = quote
+        #: place -> the closing quote, the place behind the last escaped one, the place before that
+        self._known: dict[int, tuple[int, int, int]] = {}
+
+    def behind(self, start: int) -> int:
+        """Return the length of the text quoted at `start`; -1 if nothing ends it."""
+        path = [start]
+        while path[-1] not in self._known:
+            here = path[-1]
+            at = self._text.find(self._quote, here + 1)
+            if at < 0 or self._text[at - 1] != "\\":
+                self._known[here] = (at, here, here)
+            else:
+                path.append(at + 1)
+        behind = path.pop()
+        for here in reversed(path):
+            end, last, before = self._known[behind]
+            self._known[here] = (end, last, here if last == behind else before)
+            behind = here
+        end, last, before = self._known[start]
+        return -1 if end < 0 else end - 1 - before

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import msgspec
 
 from idlc.model import ir
@@ -107,12 +109,12 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
     seen: set[tuple[object, ...]] = set()
     result: list[ir.Message] = []
     for part in parts:
-        names = [constant.name for constant in part.constants]
+        names = Counter(constant.name for constant in part.constants)
         keys = [_identity(constant) for constant in part.constants]
         kept: list[ir.Constant] = []
         for key, constant in zip(keys, part.constants, strict=True):
             # a name that occurs twice is an error, which a check will report
-            if key not in seen or names.count(constant.name) > 1:
+            if key not in seen or names[constant.name] > 1:
                 kept.append(constant)
             elif constant.name_span is not None:
                 report.add(_moved(constant, constant.name_span))

@@ -10,6 +10,9 @@ from idlc.syntax import quick, tree
 from idlc.syntax.grammar import LINE_ENDS
 from idlc.text.source import Source
 
+#: Longer lines are parsed again rather than remembered.
+SHARED_LENGTH = 1000
+
 
 def _lalr() -> ModuleType:
     from idlc.syntax import lalr
@@ -33,7 +36,13 @@ def parse(source: Source) -> tree.File:
     )
 
 
-@lru_cache(maxsize=4096)
 def parse_definition(text: str) -> tree.Body:
     """Return what the code of one line is; `text` is a `Line.definition` and not empty."""
+    return _shared(text) if len(text) < SHARED_LENGTH else _definition(text)
+
+
+def _definition(text: str) -> tree.Body:
     return quick.definition(text) or cast("tree.Body", _lalr().definition(text))
+
+
+_shared = lru_cache(maxsize=4096)(_definition)

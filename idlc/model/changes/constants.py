@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 
 from idlc.model import ir
 from idlc.model.changes.change import Change
@@ -15,7 +15,7 @@ from idlc.text.source import Span
 
 def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield what changed between the constants; their order says nothing."""
-    pairing = pair(sides.old.constants, sides.new.constants, _same_value)
+    pairing = pair(sides.old.constants, sides.new.constants, _content)
     for constant in pairing.removed:
         yield _gone(sides, constant)
     for old, new in pairing.renamed:
@@ -29,11 +29,11 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
 
 def added(sides: Sides) -> int:
     """Return how many constants the new version has that the old one had not."""
-    return len(pair(sides.old.constants, sides.new.constants, _same_value).added)
+    return len(pair(sides.old.constants, sides.new.constants, _content).added)
 
 
-def _same_value(one: ir.Constant, other: ir.Constant) -> bool:
-    return one.type == other.type and repr(one.value) == repr(other.value)
+def _content(constant: ir.Constant) -> Hashable:
+    return constant.type, repr(constant.value)
 
 
 def _native(constant: ir.Constant) -> object:

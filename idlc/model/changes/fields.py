@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from bisect import bisect_right
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from idlc.model import ir
@@ -53,13 +54,11 @@ def field_changes(sides: Sides) -> Iterator[Change]:
 
 
 def _changes(sides: Sides) -> Iterator[Change]:
-    pairing = pair(sides.old.fields, sides.new.fields, lambda one, other: one.type == other.type)
-    for field in pairing.removed:
-        yield _removed(sides, pairing, field)
+    pairing = pair(sides.old.fields, sides.new.fields, lambda field: field.type)
+    yield from _all_removed(sides, pairing)
     for old, new in pairing.renamed:
         yield _renamed(sides, old, new)
-    for field in pairing.added:
-        yield _added(sides, pairing, field)
+    yield from _all_added(sides, pairing)
     for old, new in pairing.kept:
         if new.name in pairing.moved:
             yield _moved(sides, old, new)
@@ -78,16 +77,25 @@ def _element_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Cha
         yield _unit(sides, old, new)
 
 
-def _removed(sides: Sides, pairing: Pairing[ir.Field], field: ir.Field) -> Change:
-    stayed = {id(old) for old, _ in (*pairing.kept, *pairing.renamed)}
-    old_fields = sides.old.fields
-    behind = old_fields[next(at for at, one in enumerate(old_fields) if one is field) + 1 :]
-    levels: set[Level] = {"hash", "source"}
-    if any(id(one) in stayed for one in behind):
-        levels.add("wire")
-    followed = next((new for old, new in pairing.kept if any(old is one for one in behind)), None)
-    before = sides.new.fields[-1] if sides.new.fields else None
-    beside = followed or before
+def _places(fields: Iterable[ir.Field]) -> dict[str, int]:
+    return {field.name: place for place, field in enumerate(fields)}
+
+
+def _all_removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
+    places = _places(sides.old.fields)
+    last = max((places[old.name] for old, _ in (*pairing.kept, *pairing.renamed)), default=-1)
+    kept = [places[old.name] for old, _ in pairing.kept]
+    end = sides.new.fields[-1] if sides.new.fields else None
+    for field in pairing.removed:
+        place = places[field.name]
+        followed = bisect_right(kept, place)
+        beside = pairing.kept[followed][1] if followed < len(kept) else end
+        yield _removed(sides, field, beside, is_behind=last < place)
+
+
+def _removed(sides: Sides, field: ir.Field, beside: ir.Field | None, *, is_behind: bool) -> Change:
+    """Return the change; `is_behind` is whether no field stands behind it that stayed."""
+    levels: set[Level] = {"hash", "source"} if is_behind else {"hash", "source", "wire"}
     return Change(
         codes.FIELD_REMOVED,
         sides.subject(field.name),
@@ -119,12 +127,17 @@ def _renamed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     )
 
 
-def _added(sides: Sides, pairing: Pairing[ir.Field], field: ir.Field) -> Change:
-    stayed = {id(new) for _, new in (*pairing.kept, *pairing.renamed)}
-    fields = sides.new.fields
-    behind = fields[next(at for at, one in enumerate(fields) if one is field) + 1 :]
+def _all_added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
+    places = _places(sides.new.fields)
+    last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
+    for field in pairing.added:
+        yield _added(sides, field, is_behind=last < places[field.name])
+
+
+def _added(sides: Sides, field: ir.Field, *, is_behind: bool) -> Change:
+    """Return the change; `is_behind` is whether no field stands behind it that stayed."""
     levels: set[Level] = {"wire", "hash"}
-    if any(id(one) in stayed for one in behind):
+    if not is_behind:
         levels.add("source")  # positional arguments and patterns mean other fields now
     return Change(
         codes.FIELD_ADDED,

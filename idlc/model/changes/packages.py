@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from idlc.model import derive, ir
@@ -13,6 +13,9 @@ from idlc.model.link import Model
 from idlc.model.meaning import meaning
 from idlc.text import codes
 from idlc.text.suggest import edit_distance
+
+#: Interfaces of equal content among which a renamed one is looked for.
+CANDIDATES = 50
 
 
 class Comparison(NamedTuple):
@@ -71,7 +74,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
     sources = {str(own.name): own.source for own in after.own}
     for name in sorted(recorded):
         kind = name.split("/")[1]
-        if kind != "msg" and any(name.startswith(f"{own}_") for own in recorded):
+        if kind != "msg" and any(own in recorded for own in _shorter(name)):
             continue  # follows from the interface that it is derived from
         if name not in sources:
             levels = frozenset(LEVELS[:3])
@@ -91,6 +94,11 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
             )
     come = sum(name not in recorded for name in sources)
     return Comparison(tuple(changes), come, bool(changes or come))
+
+
+def _shorter(name: str) -> Iterator[str]:
+    """Yield what stands before each underscore of a name."""
+    return (name[:at] for at, character in enumerate(name) if character == "_")
 
 
 def _what(kind: str) -> str:
@@ -125,12 +133,16 @@ def _renamed(
     gone: list[ir.Interface], come: list[ir.Interface]
 ) -> Iterator[tuple[ir.TypeName, ir.Interface]]:
     """Yield each interface that disappeared with the one of the same content that appeared."""
-    left = list(come)
+    left: dict[Hashable, list[ir.Interface]] = {}
+    for new in come:
+        left.setdefault(_shape(new), []).append(new)
     for old in gone:
-        alike = [new for new in left if _shape(new) == _shape(old) and _shape(old)[1]]
+        shape = _shape(old)
+        # of very many, the first ones are as good as any
+        alike = left.get(shape, [])[:CANDIDATES] if shape[1] else []
         if alike:
             best = min(alike, key=lambda new: edit_distance(old.name.name, new.name.name))
-            left.remove(best)
+            left[shape].remove(best)
             yield old.name, best
 
 

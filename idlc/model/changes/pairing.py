@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 
@@ -28,10 +29,11 @@ class Pairing(NamedTuple, Generic[T]):
     added: list[T]
 
 
-def pair(old: Sequence[T], new: Sequence[T], alike: Callable[[T, T], bool]) -> Pairing[T]:
+def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -> Pairing[T]:
     """Return what became of the elements of `old`, whose names must differ, in those of `new`.
 
-    An element that disappeared counts as renamed if one that is `alike` appeared in its place.
+    An element that disappeared counts as renamed if one of the same content appeared in its
+    place.
     """
     places = {element.name: place for place, element in enumerate(new)}
     common = [element for element in old if element.name in places]
@@ -39,7 +41,7 @@ def pair(old: Sequence[T], new: Sequence[T], alike: Callable[[T, T], bool]) -> P
     steady = {order[at] for at in _longest_increasing(order)}
     kept = [(element, new[places[element.name]]) for element in common]
     moved = frozenset(element.name for element in common if places[element.name] not in steady)
-    renamed = list(_renamed(old, new, moved, alike))
+    renamed = list(_renamed(old, new, moved, content))
     gone = {id(one) for one, _ in renamed}
     come = {id(one) for _, one in renamed}
     names = {element.name for element in common}
@@ -71,19 +73,21 @@ def _longest_increasing(numbers: Sequence[int]) -> list[int]:
 
 
 def _renamed(
-    old: Sequence[T], new: Sequence[T], moved: frozenset[str], alike: Callable[[T, T], bool]
+    old: Sequence[T], new: Sequence[T], moved: frozenset[str], content: Callable[[T], Hashable]
 ) -> Iterator[tuple[T, T]]:
     """Yield the pairs of like elements in each gap between those that kept name and order."""
     for gone, come in _gaps(old, new, moved):
-        rest = iter(come)
+        candidates: dict[Hashable, deque[int]] = {}
+        for at, other in enumerate(come):
+            candidates.setdefault(content(other), deque()).append(at)
+        first = 0
         for one in gone:
-            candidates = list(rest)
-            match = next((at for at, other in enumerate(candidates) if alike(one, other)), None)
-            if match is None:
-                rest = iter(candidates)
-            else:
-                yield one, candidates[match]
-                rest = iter(candidates[match + 1 :])
+            like = candidates.get(content(one), deque())
+            while like and like[0] < first:
+                like.popleft()
+            if like:
+                first = like[0] + 1
+                yield one, come[like[0]]
 
 
 def _gaps(

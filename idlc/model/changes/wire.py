@@ -10,7 +10,7 @@ and texts and sequences make distances variable, so every position modulo eight 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from typing import NamedTuple
 
 from idlc.model import ir
@@ -79,6 +79,7 @@ class _Follower:
     def __init__(self, before: Messages, after: Messages) -> None:
         self._before = before
         self._after = after
+        self._known: dict[Hashable, set[_Place]] = {}
 
     def follow(self, runs: _Runs, starts: Iterable[_Place], *, at_end: bool) -> set[_Place]:
         """Return the places behind two runs; raise _MisreadError if a value is not what it was.
@@ -126,11 +127,18 @@ class _Follower:
             case ir.String(), ir.String() if old.type.wide == new.type.wide:
                 return {_Place(at) for at in ((0, 4) if old.type.wide else range(8))}
             case ir.Sequence(), ir.Sequence() if _fits(old.type.bound, new.type.bound):
-                return self._sequence(old.type, new.type, (start + 4) % 8, at_end=at_end)
+                key: Hashable = (old.type, new.type, start % 8, at_end)
+                if key not in self._known:
+                    ends = self._sequence(old.type, new.type, (start + 4) % 8, at_end=at_end)
+                    self._known[key] = ends
+                return self._known[key]
             case ir.Array(), ir.Array() if old.type.size == new.type.size or (
                 at_end and new.type.size < old.type.size
             ):
-                return self._array(old.type, new.type, start % 8)
+                key = (old.type, new.type, start % 8)
+                if key not in self._known:
+                    self._known[key] = self._array(old.type, new.type, start % 8)
+                return self._known[key]
         raise _MisreadError
 
     def _elements(self, old: ir.Element, new: ir.Element) -> _Runs:
@@ -156,15 +164,14 @@ class _Follower:
 
     def _array(self, old: ir.Array, new: ir.Array, start: int) -> set[_Place]:
         runs = self._elements(old.element, new.element)
-        places = {_Place(start)}
-        passed: list[set[_Place]] = []
-        while len(passed) < new.size:
-            if places in passed:  # positions count modulo 8, so they come round soon
-                first = passed.index(places)
-                return passed[first + (new.size - first) % (len(passed) - first)]
-            passed.append(places)
-            places = self.follow(runs, places, at_end=False)
-        return places
+        seen = [frozenset((_Place(start),))]
+        while len(seen) <= new.size:
+            places = frozenset(self.follow(runs, seen[-1], at_end=False))
+            if places in seen:  # from here on they repeat
+                first = seen.index(places)
+                return set(seen[first + (new.size - first) % (len(seen) - first)])
+            seen.append(places)
+        return set(seen[new.size])
 
 
 def _behind(rest: Iterable[Leaf], place: _Place, *, at_end: bool) -> _Place:
