@@ -13,25 +13,13 @@ from functools import cache
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
+from idlc.model.elements import QUOTES, elements, string_elements
+from idlc.model.fault import Fault
 from idlc.syntax.escapes import EscapeError, read_back, through_idl
 from idlc.syntax.grammar import terminal
 from idlc.text import codes
 
 FLOAT32_MAX = 3.402823466e38
-
-
-class Fault(NamedTuple):
-    """What is wrong with a value; `start` and `end` count from the beginning of its text."""
-
-    code: codes.Code
-    message: str
-    start: int
-    end: int
-    hint: str | None = None
-
-    def moved(self, offset: int) -> Fault:
-        """Return the same fault in a longer text that has `offset` characters before."""
-        return self._replace(start=self.start + offset, end=self.end + offset)
 
 
 class Text(NamedTuple):
@@ -43,8 +31,6 @@ class Text(NamedTuple):
 
 Number: TypeAlias = bool | int | float
 BACKSLASH_HINT = "write `\\\\\\\\` for each backslash that should stay"
-_QUOTES = ('"', "'")
-_NO_BLANK = re.compile("[^ ]")
 
 
 def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | Text | Fault:
@@ -144,7 +130,7 @@ def _text(type_: ir.String, text: str) -> Text | Fault:
 def _unquote(type_: ir.String, text: str) -> str | Fault:
     """Return a string value as rosidl's adapter takes it: without its quotes, escapes untouched."""
     raw = text
-    for quote in _QUOTES:
+    for quote in QUOTES:
         if text.startswith(quote) and text.endswith(quote):
             raw = text[1:-1]
             inner = re.search(rf"(?<!\\){quote}", raw)
@@ -167,7 +153,7 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
         hint = "write `[1, 2, 3]`"
         return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
     inside = text[1:-1]
-    split = _string_elements if isinstance(type_.element, ir.String) else _elements
+    split = string_elements if isinstance(type_.element, ir.String) else elements
     pieces = split(inside)
     if isinstance(pieces, Fault):
         return pieces.moved(1)
@@ -219,89 +205,3 @@ def _wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault
         return None
     hint = f"give {expected} elements"
     return _fault(codes.ARRAY_LENGTH, text, f"{count} elements instead of {expected}", hint)
-
-
-def _elements(inside: str) -> list[tuple[str, int]] | Fault:
-    """Split at commas; each element with its offset."""
-    found: list[tuple[str, int]] = []
-    at = 0
-    for part in inside.split(",") if inside else []:
-        stripped = part.strip()
-        found.append((stripped, at + len(part) - len(part.lstrip())))
-        if not stripped:
-            end = at + max(len(part), 1)
-            return Fault(codes.ARRAY_VALUE, "an element is missing", at, end, "remove the comma")
-        at += len(part) + 1
-    return found
-
-
-def _string_elements(inside: str) -> list[tuple[str, int]] | Fault:
-    """Split as rosidl's scanner does, wrong turns included (spec section 4)."""
-    found: list[tuple[str, int]] = []
-    ends = {quote: _Ends(inside, quote) for quote in _QUOTES}
-    at = 0
-    while at < len(inside):
-        at = _behind_blanks(inside, at)
-        if at == len(inside) or inside[at] == ",":
-            return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")
-        quoted = False
-        for quote in _QUOTES:
-            if inside.startswith(quote, at):
-                quoted = True
-                end = ends[quote].behind(at)
-                if end == -1:
-                    message = f"no {quote} that ends this element"
-                    hint = (
-                        "an element cannot end with an escaped quote; use the other kind of quote"
-                    )
-                    return Fault(codes.BAD_VALUE, message, at, len(inside), hint)
-                element = inside[at + 1 : at + end + 1].replace(f"\\{quote}", quote)
-                # upstream strips every element, also what stood in quotes
-                found.append((element.strip(), at))
-                at += end + 2
-        if not quoted:
-            comma = inside.find(",", at)
-            end = len(inside) if comma < 0 else comma
-            found.append((inside[at:end].strip(), at))
-            at = end
-        at = _behind_blanks(inside, at)
-        at += inside.startswith(",", at)
-    return found
-
-
-def _behind_blanks(text: str, at: int) -> int:
-    """Return the first place from `at` on where no blank stands."""
-    found = _NO_BLANK.search(text, at)
-    return found.start() if found else len(text)
-
-
-class _Ends:
-    """rosidl's idea of where quoted texts end, without its quadratic search.
-
-    Upstream goes from one escaped quote to the next, and counts from the last of them instead of
-    from the start, so that what follows may be looked at again and again.
-    """
-
-    def __init__(self, text: str, quote: str) -> None:
-        self._text = text
-        self._quote = quote
-        #: place -> the closing quote, the place behind the last escaped one, the place before that
-        self._known: dict[int, tuple[int, int, int]] = {}
-
-    def behind(self, start: int) -> int:
-        """Return the length of the text quoted at `start`; -1 if nothing ends it."""
-        path = [start]
-        while path[-1] not in self._known:
-            here = path[-1]
-            at = self._text.find(self._quote, here + 1)
-            if at < 0 or self._text[at - 1] != "\\":
-                self._known[here] = (at, here, here)
-            else:
-                path.append(at + 1)
-        behind = path.pop()
-        for here in reversed(path):
-            end, last, before = self._known[behind]
-            self._known[here] = (end, last, here if last == behind else before)
-            behind = here
-        end, last, before = self._known[start]
-        return -1 if end < 0 else end - 1 - before

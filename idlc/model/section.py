@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 from idlc.model import ir, names
 from idlc.model.comments import Comment, condense, problem
-from idlc.model.literals import Fault, Text, default, scalar
+from idlc.model.fault import Fault
+from idlc.model.literals import Text, default, scalar
 from idlc.model.types import STRINGS, as_parsed, lower_type
 from idlc.syntax import tree
 from idlc.syntax.parse import parse_definition

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from idlc.model import ir, names
-from idlc.model.literals import Fault
+from idlc.model.fault import Fault
 from idlc.syntax import tree
 from idlc.text import codes
 from idlc.text.suggest import did_you_mean

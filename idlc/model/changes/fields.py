@@ -9,8 +9,8 @@ from typing import NamedTuple
 from idlc.model import ir
 from idlc.model.changes.change import Change, Level
 from idlc.model.changes.pairing import Pairing, pair
+from idlc.model.changes.types import container, described, native, tighter, without_bounds
 from idlc.model.changes.wire import reads_alike, type_reads_alike
-from idlc.model.describe import individual
 from idlc.model.link import Model
 from idlc.model.spelling import spell, spell_value
 from idlc.text import codes
@@ -174,14 +174,14 @@ def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     before, after = sides.before.messages, sides.after.messages
     if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
         levels.add("wire")
-    if _described(old) != _described(new):
+    if described(old) != described(new):
         levels.add("hash")
-    only_bounds = _without_bounds(old.type) == _without_bounds(new.type)
-    if not only_bounds or _container(old.type) != _container(new.type):
+    only_bounds = without_bounds(old.type) == without_bounds(new.type)
+    if not only_bounds or container(old.type) != container(new.type):
         levels.add("source")
-    if _tighter(old.type, new.type):
+    if tighter(old.type, new.type):
         levels.add("behaviour")
-    if _native(old.type) == _native(new.type):
+    if native(old.type) == native(new.type):
         levels -= {"source"}
     return Change(
         codes.FIELD_BOUND if only_bounds else codes.FIELD_TYPE,
@@ -193,55 +193,6 @@ def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
         old=old.type_span,
         path=sides.path,
     )
-
-
-def _described(field: ir.Field) -> object:
-    """Return what the type hash sees of a field's type."""
-    message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
-    return individual(message)["fields"][0]["type"]
-
-
-def _without_bounds(type_: ir.FieldType) -> ir.FieldType:
-    match type_:
-        case ir.String():
-            return ir.String(type_.wide)
-        case ir.Sequence():
-            return ir.Sequence(_element_without_bounds(type_.element))
-        case ir.Array():
-            return ir.Array(_element_without_bounds(type_.element), 1)
-        case _:
-            return type_
-
-
-def _element_without_bounds(element: ir.Element) -> ir.Element:
-    return ir.String(element.wide) if isinstance(element, ir.String) else element
-
-
-def _container(type_: ir.FieldType) -> tuple[str, int | None]:
-    """Return what C++ has a type of its own for: sizes and bounds of arrays, not of strings."""
-    match type_:
-        case ir.Sequence():
-            return "sequence", type_.bound
-        case ir.Array():
-            return "array", type_.size
-        case _:
-            return "", None
-
-
-def _native(type_: ir.FieldType) -> object:
-    """Return a value that is equal for types that are one type in C++ and in Python."""
-    element = ir.element_of(type_)
-    if element == ir.Primitive("char"):
-        element = ir.Primitive("uint8")
-    return _container(type_), _element_without_bounds(element)
-
-
-def _tighter(old: ir.FieldType, new: ir.FieldType) -> bool:
-    """Tell whether text that was allowed is too long now."""
-    before, after = ir.element_of(old), ir.element_of(new)
-    if not isinstance(before, ir.String) or not isinstance(after, ir.String):
-        return False
-    return after.bound is not None and (before.bound is None or after.bound < before.bound)
 
 
 def _used_type(sides: Sides, old: ir.Field, new: ir.Field, target: str) -> Iterator[Change]:
