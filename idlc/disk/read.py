@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 #: Bytes; the largest interface file that is read. Real ones stay below 64 KiB.
 MAX_SIZE = 16 << 20
+#: Lines of one file; each costs memory, however short it is.
+MAX_LINES = 500_000
+_LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
 
 _SPECIAL = {
     stat.S_IFIFO: "a named pipe",
@@ -100,12 +103,17 @@ def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:
 
 
 def decode(data: bytes, name: str, report: Report) -> Source | None:
-    """Return bytes as source text, unchanged; report IDL603 where they are not UTF-8."""
+    """Return bytes as source text, unchanged; report IDL603 where they are not UTF-8, IDL604."""
     try:
-        return Source(name, data.decode("utf-8"))
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         report.add(_not_text(data, name, error.start))
         return None
+    if sum(map(text.count, _LINE_ENDS)) <= MAX_LINES:
+        return Source(name, text)
+    message = f"`{name}` has more than {MAX_LINES:,} lines, which no interface file has"
+    report.add(codes.TOO_LARGE.of(name, message, hint="split it up"))
+    return None
 
 
 def _not_text(data: bytes, name: str, offset: int) -> Diagnostic:

@@ -8,6 +8,8 @@ from idlc.model.fault import Fault
 from idlc.text import codes
 
 QUOTES = ('"', "'")
+#: Elements that a default may have; each takes about a kilobyte on its way.
+MAX_ELEMENTS = 200_000
 _NO_BLANK = re.compile("[^ ]")
 
 
@@ -30,7 +32,7 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
     found: list[tuple[str, int]] = []
     ends = {quote: _Ends(inside, quote) for quote in QUOTES}
     at = 0
-    while at < len(inside):
+    while at < len(inside) and len(found) <= MAX_ELEMENTS:
         at = _behind_blanks(inside, at)
         if at == len(inside) or inside[at] == ",":
             return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")

@@ -13,13 +13,15 @@ from functools import cache
 from typing import NamedTuple, TypeAlias
 
 from idlc.model import ir
-from idlc.model.elements import QUOTES, elements, string_elements
+from idlc.model.elements import MAX_ELEMENTS, QUOTES, elements, string_elements
 from idlc.model.fault import Fault
 from idlc.syntax.escapes import EscapeError, read_back, through_idl
 from idlc.syntax.grammar import terminal
 from idlc.text import codes
 
 FLOAT32_MAX = 3.402823466e38
+#: Characters from which on Python itself judges numbers: patterns take much memory for them.
+LONG = 1000
 
 
 class Text(NamedTuple):
@@ -81,15 +83,16 @@ def _bool(text: str) -> bool | Fault:
 
 
 def _float(type_: ir.Primitive, text: str) -> float | Fault:
-    if _shape("REAL").fullmatch(text):
-        return float(text)
+    value = _real(text) if len(text) > LONG or _shape("REAL").fullmatch(text) else None
+    if value is not None:
+        return value
     message = f"{_shown(text)} is not a number" if text else f"a {type_.name} value is missing"
     return _fault(codes.BAD_VALUE, text, message, "write a number such as `1`, `-0.5` or `1e-3`")
 
 
 def _integer(type_: ir.Primitive, text: str) -> int | Fault:
     info = type_.info
-    value = _int(text) if _shape("INTEGER").fullmatch(text) else None
+    value = _int(text) if len(text) > LONG or _shape("INTEGER").fullmatch(text) else None
     if value is None:
         message = (
             f"{_shown(text)} is not an integer" if text else f"a {type_.name} value is missing"
@@ -100,6 +103,13 @@ def _integer(type_: ir.Primitive, text: str) -> int | Fault:
         return value
     hint = f"{type_.name} holds {info.low} to {info.high}"
     return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} does not fit {type_.name}", hint)
+
+
+def _real(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def _int(text: str) -> int | None:
@@ -153,10 +163,14 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
         hint = "write `[1, 2, 3]`"
         return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
     inside = text[1:-1]
+    if not isinstance(type_.element, ir.String) and inside.count(",") >= MAX_ELEMENTS:
+        return _too_many(text)
     split = string_elements if isinstance(type_.element, ir.String) else elements
     pieces = split(inside)
     if isinstance(pieces, Fault):
         return pieces.moved(1)
+    if len(pieces) > MAX_ELEMENTS:
+        return _too_many(text)
     if (wrong := _wrong_length(type_, len(pieces), text)) is not None:
         return wrong
     assert isinstance(type_.element, (ir.Primitive, ir.String))
@@ -194,6 +208,11 @@ def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fa
         hint = "only finite numbers can be defaults of an array"
         return _fault(codes.BAD_VALUE, text, "ROS 2's tools cannot read this default", hint)
     return ir.Default(value, annotation)
+
+
+def _too_many(text: str) -> Fault:
+    message = f"more than {MAX_ELEMENTS:,} elements in a default"
+    return _fault(codes.TOO_LARGE, text, message, "set the value in code")
 
 
 def _wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:

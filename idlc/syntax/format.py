@@ -15,6 +15,8 @@ from idlc.syntax import tree
 from idlc.syntax.parse import parse_definition
 
 TAB_WIDTH = 8
+#: Definitions that are longer have their comments behind them, not in the block's column.
+WIDEST = 200
 #: Between a definition and its comment, where the comments of a block are not in one column yet.
 COMMENT_GAP = 2
 #: More blank lines than these in a row say nothing.
@@ -146,15 +148,18 @@ def _with_comments(old: Sequence[_Row], new: Sequence[_Row]) -> Iterator[_Row]:
     comment of its definition stays below it; any other keeps its place.
     """
     columns = {row.column for row in old if row.code and row.comment}
-    width = max((len(row.code) for row in new if row.code and row.comment), default=0)
+    lengths = [len(row.code) for row in new if row.code and row.comment]
+    width = max((length for length in lengths if length <= WIDEST), default=0)
     column = max(columns, default=0)
     if len(columns) > 1 or column <= width:
         column = width + COMMENT_GAP
     above: int | None = None
+    place = column
     for row in new:
         if row.code:
             above = row.column if row.comment else None
+            place = column if column > len(row.code) else len(row.code) + COMMENT_GAP
         if row.comment and (row.code or row.column == above):
-            yield row._replace(column=column)
+            yield row._replace(column=place)
         else:
             yield row

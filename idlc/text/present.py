@@ -18,6 +18,7 @@ from idlc.text.visible import display_width, one_line, visible
 
 LIMIT = 100
 LINE_WIDTH = 100
+TEXT_WIDTH = 1000
 BEFORE_CARET = 40
 
 _STYLES = {
@@ -68,7 +69,7 @@ def text(
 def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
     level = diagnostic.severity.name.lower()
     head = paint(level, f"{level}[{diagnostic.code}]")
-    yield f"{head}{paint('bold', ': ' + one_line(diagnostic.message))}"
+    yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
     marks = _marks(diagnostic)
     margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
     if diagnostic.span:
@@ -78,12 +79,19 @@ def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
     if diagnostic.detail:
         bar = f"{margin} {paint('frame', '|')}"
         yield bar
-        yield from (f"{bar} {visible(line)}".rstrip() for line in diagnostic.detail.split("\n"))
+        lines = map(_shortened, diagnostic.detail.split("\n"))
+        yield from (f"{bar} {visible(line)}".rstrip() for line in lines)
     if diagnostic.levels:
         sign = paint("frame", "=")
         yield f"{margin} {sign} {paint('hint', 'breaks')}: {', '.join(diagnostic.levels)}"
     if diagnostic.hint:
-        yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {one_line(diagnostic.hint)}"
+        hint = one_line(_shortened(diagnostic.hint))
+        yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {hint}"
+
+
+def _shortened(text: str) -> str:
+    """Return a text without its middle if it is so long that nobody could read it."""
+    return text if len(text) <= TEXT_WIDTH else f"{text[: TEXT_WIDTH - 200]} … {text[-100:]}"
 
 
 def _marks(diagnostic: Diagnostic) -> list[_Mark]:

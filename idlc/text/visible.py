@@ -27,6 +27,8 @@ def visible(text: str, column: int = 0) -> str:
 
 def one_line(text: str) -> str:
     """Return `text` made visible, line ends and tabs included."""
+    if text.isascii() and text.isprintable():
+        return text
     return "".join(_spelled(character) for character in text)
 
 
