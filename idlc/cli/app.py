@@ -15,6 +15,7 @@ COMMANDS = {
     "breaking": "Report what breaks against another version.",
     "fmt": "Lay interface files out.",
     "hash": "Print type hashes (RIHS01).",
+    "show": "Show an interface with the messages in it.",
     "describe": "Print a type description, as ROS 2 installs it.",
     "scaffold": "Write packages, interfaces and nodes.",
     "explain": "Explain a code such as IDL201.",
