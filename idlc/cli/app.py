@@ -15,6 +15,8 @@ COMMANDS = {
     "breaking": "Report what breaks against another version.",
     "fmt": "Lay interface files out.",
     "hash": "Print type hashes (RIHS01).",
+    "show": "Show an interface with the messages in it.",
+    "docs": "Write a site about interfaces.",
     "describe": "Print a type description, as ROS 2 installs it.",
     "scaffold": "Write packages, interfaces and nodes.",
     "explain": "Explain a code such as IDL201.",

@@ -23,7 +23,7 @@ def hashes(
 ) -> list[tuple[str, str]]:
     """Return type hash and full name of what paths and type names mean, derived types included."""
     found: list[tuple[str, str]] = []
-    for model, names in _wanted(wanted, package, include, report):
+    for model, names in wanted_models(wanted, package, include, report):
         with stage("describe", model.package):
             found += [(model.describer.hash(name), name) for name in names]
     return list(dict.fromkeys(found))
@@ -33,7 +33,7 @@ def describe(
     wanted: str, package: str | None, include: Sequence[str], report: Report
 ) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
-    found = list(_wanted((wanted,), package, include, report))
+    found = list(wanted_models((wanted,), package, include, report))
     if report.had_errors or not found:
         return None
     (model, names) = found[0]
@@ -47,7 +47,7 @@ def describe(
         return {**model.describer.installed(tops[0])}
 
 
-def _wanted(
+def wanted_models(
     wanted: Sequence[str], package: str | None, include: Sequence[str], report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
     """Yield, for paths and type names, sound models and the names in them that are meant."""

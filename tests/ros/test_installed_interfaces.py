@@ -3,12 +3,17 @@
 import sys
 from pathlib import Path
 
+from rosidl_parser.definition import Message
+from rosidl_parser.parser import parse_idl_string
 from test_format import assert_only_the_layout_changes
 
 from idlc.cli.main import main
 from idlc.model import ir
+from idlc.model.idl import idl
+from idlc.model.lower import lower
 from idlc.syntax.format import format_file
 from idlc.syntax.parse import parse
+from idlc.text.diagnostics import Report
 from idlc.text.source import Source
 
 SHARE = Path(sys.prefix) / "share"
@@ -36,3 +41,32 @@ def test_check_finds_advice_but_no_errors(capsys):
     for words in ([], ["--select", "all"]):
         assert main(["check", str(SHARE), *words]) == 0
         assert "error[" not in capsys.readouterr().out
+
+
+def test_the_idl_is_what_rosidl_made_of_the_same_file():
+    compared = 0
+    for path in FILES:
+        installed = path.with_suffix(".idl")
+        if installed.exists():
+            name = ir.TypeName(path.parts[-3], path.suffix[1:], path.stem)
+            text = idl(lower(parse(Source(str(path), read(path))), name, Report()))
+            assert structures(text) == structures(installed.read_text(encoding="utf-8")), path
+            compared += 1
+    assert compared > 100
+
+
+def structures(text):
+    """Names, types, annotations and constants, as rosidl's own parser reads them."""
+    content = parse_idl_string(text)
+    return [
+        (
+            message.structure.namespaced_type.name,
+            [(member.name, type(member.type).__name__) for member in message.structure.members],
+            [
+                [(one.name, str(one.value)) for one in member.annotations]
+                for member in message.structure.members
+            ],
+            [(constant.name, constant.value) for constant in message.constants],
+        )
+        for message in content.get_elements_of_type(Message)
+    ]

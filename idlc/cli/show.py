@@ -1,0 +1,47 @@
+"""`idlc show`."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from idlc.cli import options
+
+FORMATS = ("text", "json", "ros2idl", "jsonschema", "mcap")
+
+EPILOG = """\
+Example:
+
+\b
+  idlc show geometry_msgs/msg/PoseStamped
+"""
+
+
+@click.command("show", epilog=EPILOG)
+@click.argument("wanted", metavar="TYPE|PATH", type=click.Path())
+@click.option(
+    "--format",
+    "style",
+    type=click.Choice(FORMATS),
+    default="text",
+    show_default=True,
+    help="For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
+)
+@options.package
+@options.include
+def command(wanted: str, style: str, package: str | None, include: tuple[str, ...]) -> int:
+    """Show an interface with the messages in it and all comments."""
+    from idlc.cli import terminal
+    from idlc.driver.show import show
+    from idlc.text.diagnostics import Report
+    from idlc.text.visible import visible
+
+    report = Report()
+    texts = show(wanted, style, package, include, report)
+    text = "\n".join(texts)
+    if style == "text" and sys.stdout.isatty():
+        text = "\n".join(map(visible, text.split("\n")))
+    sys.stdout.write(text)
+    terminal.show(report, "text", sys.stderr)
+    return terminal.status(report)

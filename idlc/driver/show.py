@@ -1,0 +1,53 @@
+"""The pipeline of `idlc show`: find a type, compile it, say it in another way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from idlc.driver.query import wanted_models
+from idlc.driver.stages import stage
+from idlc.text import codes
+from idlc.text.diagnostics import Report
+
+if TYPE_CHECKING:
+    from idlc.model import ir
+    from idlc.model.link import Model
+
+
+def show(
+    wanted: str, style: str, package: str | None, include: Sequence[str], report: Report
+) -> list[str]:
+    """Return the interfaces that a type name or path means, each as text in a format."""
+    texts = []
+    for model, names in list(wanted_models((wanted,), package, include, report)):
+        for own in model.own:
+            if str(own.name) in names:
+                with stage("show", str(own.name)):
+                    texts.append(_text(own, model, style))
+    if not texts and not report.had_errors:
+        message = f"`{wanted}` is a part of a service or action; show the whole"
+        report.add(codes.NO_SUCH_TYPE.of(wanted, message))
+    return texts
+
+
+def _text(interface: ir.Interface, model: Model, style: str) -> str:
+    from idlc.model import idl, outline, schemas
+
+    match style:
+        case "json":
+            return json.dumps(schemas.facts(interface, model)) + "\n"
+        case "ros2idl":
+            return idl.idl(interface)
+        case "jsonschema":
+            return json.dumps(schemas.json_schema(interface, model), indent=2) + "\n"
+        case "mcap":
+            return schemas.mcap(interface, model)
+    return "".join(_lines(interface, model, outline.outline(interface, model)))
+
+
+def _lines(interface: ir.Interface, model: Model, outline: Iterator[str]) -> Iterator[str]:
+    """Yield an outline below the interface's name and hash."""
+    yield f"# {interface.name}\n# {model.describer.hash(str(interface.name))}\n\n"
+    yield from (f"{line}\n" for line in outline)

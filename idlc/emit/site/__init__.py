@@ -1,0 +1,1 @@
+"""Site: a package's interfaces as static HTML, without anything from elsewhere."""
