@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from symtable import symtable
 from typing import TYPE_CHECKING, NamedTuple
 
 from idlc import __version__
@@ -159,7 +160,8 @@ def _check_syntax(plan: Plan, target: Target) -> None:
     for change in plan.changes:
         if change.new and change.path.endswith(".py") and not change.path.startswith("_idlc/"):
             with stage("compile", f"{target.name}/{change.path}"):
-                compile(change.new, change.path, "exec", dont_inherit=True)
+                # parses, and resolves names, without the cost of making bytecode
+                symtable(change.new.decode("utf-8"), change.path, "exec")
 
 
 def _imports(model: Model) -> tuple[str, ...]:
