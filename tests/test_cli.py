@@ -314,7 +314,7 @@ def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch,
 
     def broken(model):
         return tuple(
-            type(file)(file.path, "def (:\n") if file.path == "msg/_a.py" else file
+            type(file)(file.path, "def (: \\\n") if file.path == "msg/_a.py" else file
             for file in real(model)
         )
 

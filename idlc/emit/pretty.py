@@ -28,7 +28,8 @@ class Group(msgspec.Struct, frozen=True):
 
     def flat(self) -> str:
         """Return the group on one line."""
-        inner = ", ".join(flat(item) for item in self.items)
+        # a list, and no call for a str: half of all rendering passes through here
+        inner = ", ".join([one if isinstance(one, str) else one.flat() for one in self.items])
         return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}{self.after}"
 
 
@@ -82,11 +83,14 @@ def assign(target: Node, value: Node, indent: int) -> list[str]:
         inner = ", ".join(flat(item) for item in target.items)
         inner += "," if len(target.items) == 1 else ""
         bare = f"({inner})" if len(target.items) == 1 else inner
-        if len(f"{margin}{bare} = {flat(value)}") <= WIDTH:
-            return [f"{margin}{bare} = {flat(value)}"]
-        return lines(target, indent, "", f" = {flat(value)}")
+        source = flat(value)
+        if len(margin) + len(bare) + 3 + len(source) <= WIDTH:
+            return [f"{margin}{bare} = {source}"]
+        return lines(target, indent, "", f" = {source}")
     one = f"{margin}{target} = {flat(value)}"
-    if len(one) <= WIDTH or not isinstance(value, str):
+    if len(one) <= WIDTH:
+        return [one]
+    if not isinstance(value, str):
         return lines(value, indent, f"{target} = ")
     if len(margin) + 4 + len(value) <= WIDTH:
         return [f"{margin}{target} = (", f"{margin}    {value}", f"{margin})"]

@@ -44,6 +44,7 @@ def _template(name: str) -> jinja2.Template:
     return environment().get_template(name)
 
 
+@cache
 def runtime_files() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
     return tuple(

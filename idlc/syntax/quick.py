@@ -47,7 +47,7 @@ def lines(text: str) -> tuple[object, ...] | None:
 
 def definition(text: str) -> tree.Body | None:
     """Return what `lalr.definition` returns, or `None` for code that is not an ordinary line."""
-    found = _definition().fullmatch(text) if text.isascii() and text.isprintable() else None
+    found = _definition().fullmatch(text) if text.isprintable() else None
     if found is None:
         return None
     type_ = tree.Type(
