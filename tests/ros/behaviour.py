@@ -224,12 +224,14 @@ def many_threads():
             publisher.publish(message)
 
     threads = [threading.Thread(target=publish, args=pair) for pair in publishers]
-    threads.append(threading.Thread(target=executor.spin, daemon=True))
+    threads.append(threading.Thread(target=executor.spin))
     for thread in threads:
         thread.start()
     eventually(lambda: all(len(numbers) == count for numbers in received.values()))
     assert all(sorted(numbers) == list(range(count)) for numbers in received.values())
     executor.shutdown()
+    for thread in threads:
+        thread.join()
 
 
 def ends_with_messages_pending():

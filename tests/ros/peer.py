@@ -26,7 +26,7 @@ from trees import Values, class_of
 
 COUNT = 4
 LATCHED = QoSProfile(depth=COUNT, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-EVENTS = QoSProfile(depth=100)
+EVENTS = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PATIENCE = 90.0
 RESULT_STATUS = {"succeeded": 4, "canceled": 5}
 
@@ -110,7 +110,7 @@ def compare_graph(peer, name):
 
 
 def serve(peer):
-    """Answer from another thread until the other side has ended."""
+    """Answer from another thread; return what ends it."""
     executor = MultiThreadedExecutor(4)
     executor.add_node(peer.node)
     for name in peer.names:
@@ -118,8 +118,15 @@ def serve(peer):
             serve_service(peer, name)
         else:
             serve_action(peer, name)
-    threading.Thread(target=executor.spin, daemon=True).start()
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
     peer.looked_at = len(peer.names)
+
+    def end():
+        executor.shutdown()
+        thread.join()
+
+    return end
 
 
 def serve_service(peer, name):
@@ -144,6 +151,10 @@ def serve_action(peer, name):
 
     def execute(handle, last):
         peer.compare(f"{name}_Goal", "goal", handle.request, next(goals))
+        # rclpy knows the client as soon as its services match; feedback may be sent too early
+        while not peer.node.count_subscribers(f"/{peer.me}/{name}/_action/feedback"):
+            time.sleep(0.01)
+        time.sleep(0.1)
         for tree in peer.trees(f"{name}_Feedback", peer.me):
             handle.publish_feedback(peer.build(f"{name}_Feedback", tree))
         if last:
@@ -202,8 +213,6 @@ def call_service(peer, name, finish):
     if not client.wait_for_service(PATIENCE):
         peer.complain(name, "no service")
         return
-    while peer.node.count_publishers(topic) < 2:
-        time.sleep(0.01)
     requests = peer.trees(f"{name}_Request", peer.me)
     responses = peer.trees(f"{name}_Response", peer.other)
     for request, response in zip(requests, responses, strict=True):
@@ -255,7 +264,9 @@ if __name__ == "__main__":
     step, *arguments = sys.argv[1:]
     rclpy.init()
     peer = Peer(*arguments)
-    {"messages": messages, "serve": serve, "call": call}[step](peer)
+    end = {"messages": messages, "serve": serve, "call": call}[step](peer)
     print("looked at", peer.looked_at, flush=True)
     sys.stdin.read()
+    if end:
+        end()
     rclpy.shutdown()
