@@ -11,6 +11,7 @@ ARGS ?=
 
 TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 TEST_ENV := .venv/test-$(TAG)$(if $(filter no,$(ROS)),-without-ros)
+KILTED_ENV := .venv/kilted-$(TAG)
 DEMO_ENV := .venv/demo-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
@@ -22,7 +23,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all lint bench clean
+.PHONY: help demo test test-kilted test-all lint bench clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -40,6 +41,9 @@ ifeq ($(ROS),no)
 endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
+test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
+	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py $(ARGS)
+
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/every_python.sh $(INTERPRETERS)
 
@@ -56,6 +60,7 @@ clean: ## remove environments and everything that was built
 	find . \( -name __pycache__ -o -name .ruff_cache \) -type d -prune -exec rm -rf {} +
 
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
+$(KILTED_ENV)/installed: EXTRA := test-kilted
 $(DEMO_ENV)/installed: EXTRA := ros
 
 # One pip call per environment: the resolver sees everything at once. An environment that is

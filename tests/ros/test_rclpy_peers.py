@@ -16,6 +16,7 @@ PACKAGES = (*STANDARD, "test_msgs")
 #: Packages without rosidl's classes: folder of interface files by name.
 OURS = {
     "every_kind": HERE / "every_kind",
+    "idlc_fixtures": HERE.parents[1] / "golden" / "rosidl" / "interfaces" / "idlc_fixtures",
     "my_robot_controller": HERE.parents[1] / "examples" / "my_robot_controller",
 }
 
