@@ -9,6 +9,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from idlc.disk.read import is_folder
+
 #: What this process has locked, so that it does not wait for itself.
 _held: set[Path] = set()
 
@@ -17,23 +19,25 @@ _held: set[Path] = set()
 def alone(folder: Path) -> Iterator[None]:
     """Wait until no other idlc writes to a folder, and let none begin meanwhile.
 
-    The lock is the operating system's, on the folder itself: it leaves no file behind and ends
-    with the process. Where folders cannot be locked, nothing is.
+    The lock is the operating system's, on the folder itself, or the nearest above as long as
+    there is none: it leaves no file behind and ends with the process. Where folders cannot be
+    locked, nothing is.
     """
-    if sys.platform == "win32" or folder in _held:
+    place = next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+    if sys.platform == "win32" or place in _held:
         yield
         return
     import fcntl
 
     handle = None
     with contextlib.suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
+        handle = os.open(place, os.O_RDONLY)
         fcntl.flock(handle, fcntl.LOCK_EX)
-        _held.add(folder)
+        _held.add(place)
     try:
         yield
     finally:
-        _held.discard(folder)
+        _held.discard(place)
         if handle is not None:
             os.close(handle)
 
