@@ -12,6 +12,8 @@ from pathlib import Path, PurePosixPath
 import msgspec
 
 from idlc.disk.read import is_file, read_bytes
+from idlc.model.ir import TypeName
+from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.visible import one_line
@@ -112,6 +114,11 @@ def decode(data: bytes) -> Lock:
         parts = PurePosixPath(path).parts
         if not parts or path.startswith("/") or ".." in parts or "\\" in path or ":" in path:
             raise ValueError(f"it lists a file outside of its folder: {path}")
+    names = [*lock.types, *(name.replace(".", "/") + "/X" for name in lock.imports)]
+    names += [f"{package}/msg/X" for package in lock.vendored]
+    for name in names:
+        if not is_package_name(TypeName.parse(name).package):
+            raise ValueError(f"it names what cannot be a package: {name}")
     return lock
 
 

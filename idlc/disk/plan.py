@@ -32,11 +32,15 @@ class Change(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Changes in the order in which to make them, and the digests of all files afterwards."""
+    """Changes in the order in which to make them, and the digests of all files afterwards.
+
+    `record` is what the changes were planned against: the lock's content, if there was one.
+    """
 
     out: Path
     changes: tuple[Change, ...]
     outputs: dict[str, str]
+    record: bytes | None = None
 
 
 def plan(
@@ -55,6 +59,7 @@ def plan(
     Reports IDL613 and IDL614.
     """
     tree = Tree(out)
+    record = tree.read(FILE)
     changes: list[Change] = []
     refused: list[Diagnostic] = []
     outputs: dict[str, str] = {}
@@ -76,8 +81,12 @@ def plan(
                 diff = len(refused) < DIFFS
                 refused.append(_refusal(name, path, old, new, path in owned, diff))
             changes.append(Change(path, old, new, backup=not mine))
+    if isinstance(record, Obstacle):
+        refused.append(_in_the_way(name, FILE, record))
     report.extend(refused)
-    return None if refused else Plan(out, tuple(changes), outputs)
+    if refused or isinstance(record, Obstacle):
+        return None
+    return Plan(out, tuple(changes), outputs, record)
 
 
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:

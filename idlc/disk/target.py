@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from functools import cached_property
 from pathlib import Path
 
 from idlc.disk import fresh, surroundings, write
+from idlc.disk.alone import alone
 from idlc.disk.library import Library
 from idlc.disk.lock import FILE, Lock, digest, encode, load
 from idlc.disk.plan import Change, Plan, plan
@@ -25,6 +27,10 @@ class Target:
         self._path = absolute(name)
         self.report = report
         self._force = force
+
+    def alone(self) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here meanwhile."""
+        return alone(self._path)
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
@@ -51,9 +57,12 @@ class Target:
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
         """Whether what is here is what compiling the inputs would write."""
-        return fresh.unchanged(
+        found = fresh.unchanged(
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
+        if found:
+            write.sweep(self._path)
+        return found
 
     def missing(self) -> list[str]:
         """Return the packages that the generated code needs and this Python cannot import."""

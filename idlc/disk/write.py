@@ -17,8 +17,10 @@ from pathlib import Path
 import msgspec
 
 from idlc.disk import lock
+from idlc.disk.alone import alone, uninterrupted
 from idlc.disk.plan import Change, Plan, emptied
-from idlc.disk.read import is_file, is_folder, reason
+from idlc.disk.read import is_folder, reason
+from idlc.disk.tree import Tree
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 
@@ -65,18 +67,12 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
 
     After a failure every file is as it was, or the report says which are not.
     """
-    lock_path = plan.out / lock.FILE
-    try:
-        old_lock = lock_path.read_bytes() if is_file(lock_path) else None
-        if not plan.changes and old_lock == new_lock:
-            with contextlib.suppress(OSError):  # a package that cannot be written may be right
-                os.utime(lock_path)
-            _sweep(plan.out)
-            return True
-    except OSError as error:
-        report.add(_failure(name, error))
-        return False
-    change = Change(lock.FILE, old_lock, new_lock)
+    if not plan.changes and plan.record == new_lock:
+        with contextlib.suppress(OSError):  # a package that cannot be written may be right
+            os.utime(plan.out / lock.FILE)
+        sweep(plan.out)
+        return True
+    change = Change(lock.FILE, plan.record, new_lock)
     return _carry_out(plan.out, (*plan.changes, change), new_lock, name, report)
 
 
@@ -89,18 +85,47 @@ def _carry_out(
     except OSError as error:
         report.add(_failure(name, error))
         return False
-    try:
-        transaction.run(changes, journal)
-    except BaseException as error:
-        torn = transaction.undo()
-        if not isinstance(error, OSError):
-            raise
-        where = f"{name}/{transaction.current}" if transaction.current else name
-        message = f"cannot write `{where}`: {reason(error)}"
-        report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
-        return False
-    _sweep(out)
+    with alone(out):
+        left, changed = _left(out, changes)
+        if changed is not None:
+            transaction.undo()
+            report.add(_meanwhile(name, changed))
+            return False
+        try:
+            transaction.run(left, journal)
+        except BaseException as error:
+            with uninterrupted():
+                torn = transaction.undo()
+            if not isinstance(error, OSError):
+                raise
+            where = f"{name}/{transaction.current}" if transaction.current else name
+            message = f"cannot write `{where}`: {reason(error)}"
+            report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
+            return False
+        sweep(out)
     return True
+
+
+def _left(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
+    """Return the changes that nobody else has made meanwhile, and the first that cannot be made."""
+    tree = Tree(out)
+    left = []
+    for change in changes:
+        now = tree.read(change.path)
+        if now == change.new:
+            continue
+        if now != change.old:
+            return (), change.path
+        left.append(change)
+    return tuple(left), None
+
+
+def _meanwhile(name: str, path: str) -> Diagnostic:
+    return codes.CANNOT_WRITE.of(
+        f"{name}/{path}",
+        f"`{name}/{path}` was changed while idlc was running",
+        hint=f"nothing in `{name}` was changed by this run; run it again",
+    )
 
 
 def _failure(name: str, error: OSError) -> Diagnostic:
@@ -120,7 +145,8 @@ def _outcome(torn: list[str], name: str) -> str:
     return "undoing failed as well; these files are new, the others as before: " + ", ".join(torn)
 
 
-def _sweep(out: Path) -> None:
+def sweep(out: Path) -> None:
+    """Remove what killed runs left behind."""
     for stage in _abandoned(out):
         _remove(stage)
 
@@ -161,6 +187,13 @@ class _Transaction:
             if change.new is not None:
                 self.current = change.path
                 (self._stage / str(number)).write_bytes(change.new)
+        with uninterrupted():
+            self._move(changes)
+        self.current = ""
+        self._remove_empty(changes)
+        _remove(self._stage)
+
+    def _move(self, changes: tuple[Change, ...]) -> None:
         for number, change in enumerate(changes):
             self.current = change.path
             target = self._out / change.path
@@ -174,9 +207,6 @@ class _Transaction:
                 self._make_folder(target.parent)
                 (self._stage / str(number)).replace(target)
             self._done.append((change.path, change.old))
-        self.current = ""
-        self._remove_empty(changes)
-        _remove(self._stage)
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""

@@ -62,6 +62,13 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     target = Target(options.out, given.package, report, force=options.force)
     if not target.usable():
         return ()
+    with target.alone():
+        return _made(target, given, options, report)
+
+
+def _made(
+    target: Target, given: inputs.Inputs, options: GenOptions, report: Report
+) -> tuple[Generated, ...]:
     library = Library(options.include, report, own=given.own)
     if not (options.check or report.had_errors):
         current = _current(target, given.digests, library, options.vendor_deps)

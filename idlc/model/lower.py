@@ -73,7 +73,7 @@ def _check_reading(file: tree.File, report: Report) -> None:
 def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Report) -> None:
     count = len(file.separators)
     needed = expected - 1
-    if count == needed or _has_near_separator(file):
+    if count == needed or _has_near_separator(file, expected):
         return
     rule = f"a .{kind} file has {_NUMBERS[needed]} `---` line{'s' * (needed > 1)}"
     if count > needed:
@@ -92,11 +92,14 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
         )
 
 
-def _has_near_separator(file: tree.File) -> bool:
-    """Tell whether some line was meant as a separator and is reported as such."""
+def _has_near_separator(file: tree.File, expected: int) -> bool:
+    """Tell whether some line was meant as a separator and is reported as such.
+
+    What stands behind the `expected` sections is not looked at any more.
+    """
     if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
         return True
-    lines = (line for section in file.sections for line in section.lines)
+    lines = (line for section in file.sections[:expected] for line in section.lines)
     return any(text and set(text) == {"-"} for line in lines if (text := line.definition))
 
 
