@@ -153,6 +153,7 @@ def test_files_keep_their_mode(package):
         (["node", "Talker"], "cannot be a node"),
         (["node", "class"], "cannot be a node"),
         (["node", "msg"], "taken"),
+        (["node", "signal"], "taken"),
         (["node", "a", "--publisher", "String"], "TYPE:TOPIC"),
         (["node", "a", "--publisher", "std_msgs/String:a@0"], "above 0"),
         (["node", "a", "--publisher", "std_msgs/String:1a"], "cannot be the name"),

@@ -195,8 +195,9 @@ class Endpoints:
                 *call(f"self.{word}_server = ActionServer", words, depth=2),
             ),
             rest=(
-                f"if self.{word}_goal is not None and self.{word}_goal.is_active:",
-                f"    self.{word}_goal.abort()",
+                f"goal_handle = self.{word}_goal",
+                "if goal_handle is not None and goal_handle.is_active:",
+                "    goal_handle.abort()",
             ),
             remove=(f"self.{word}_server.destroy()",),
         )

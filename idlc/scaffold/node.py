@@ -9,20 +9,20 @@ from idlc.emit.render import environment
 from idlc.model import derive
 from idlc.scaffold import arguments, spec
 from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part, interval
-from idlc.scaffold.layout import imports
+from idlc.scaffold.layout import call, imports
 from idlc.scaffold.plan import Plan
-from idlc.scaffold.samples import Page
+from idlc.scaffold.samples import INDENT, Page
 
 #: Names that a module of a node uses itself.
 _OWN = (
     *("Any", "Callable", "ExternalShutdownException", "Future", "LifecycleNode", "LifecycleState"),
     *("Node", "SignalHandlerOptions", "SingleThreadedExecutor", "TransitionCallbackReturn"),
     *("ActionServer", "ActionClient", "CancelResponse", "ClientGoalHandle", "GoalResponse"),
-    *("GoalStatus", "ServerGoalHandle", "DurabilityPolicy", "QoSProfile", "LATCHED"),
+    *("Event", "GoalStatus", "ServerGoalHandle", "DurabilityPolicy", "QoSProfile", "LATCHED"),
 )
 #: Roles whose methods wait for something.
 _PAUSING = {"client", "action_client", "action_server"}
-_STANDARD = {"argparse", "collections.abc", "sys", "time", "typing"}
+_STANDARD = {"argparse", "collections.abc", "sys", "time", "threading", "typing"}
 #: The longest description of a node that fits wherever it stands.
 SUMMARY = 70
 CLOCK = "self.get_clock().now().to_msg()"
@@ -222,16 +222,23 @@ def _given_tasks(planned: Plan) -> tuple[str, ...]:
     """Return what `main` starts: what clients do, unless they wait for the node's activation."""
     if planned.node.lifecycle:
         return ()
-    found = [f"node.{method}, {request}(given)" for method, request in _tasks(planned)]
-    return tuple(found if planned.once else [f"executor.create_task({one})" for one in found])
+    head = "task = executor.create_task" if planned.once else "executor.create_task"
+    calls = (
+        call(head, [f"node.{method}", f"{request}(given)"], depth=2)
+        for method, request in _tasks(planned)
+    )
+    return tuple(
+        "\n".join([first, *(INDENT * 2 + line for line in rest)]) for first, *rest in calls
+    )
 
 
 def _started(tasks: list[tuple[str, str]]) -> list[str]:
     """Return the lines of an activation that start what clients do."""
     if not tasks:
         return []
-    lines = [f"    self.executor.create_task(self.{m}, {r}(self.given))" for m, r in tasks]
-    return ["if self.executor is not None:", *lines]
+    create = "self.executor.create_task"
+    calls = [call(create, [f"self.{m}", f"{r}(self.given)"], depth=3) for m, r in tasks]
+    return ["if self.executor is not None:", *(f"    {line}" for one in calls for line in one)]
 
 
 class _Given(NamedTuple):
@@ -272,15 +279,18 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
         add("rclpy.utilities", "remove_ros_args")
     add("rclpy.utilities", "try_shutdown")
     add("rclpy.executors", "ExternalShutdownException", "SingleThreadedExecutor")
-    add("rclpy.signals", "SignalHandlerOptions")
-    if not planned.once:
-        add("rclpy.signals", "install_signal_handlers")
+    if planned.once:
+        add("rclpy.signals", "SignalHandlerOptions")
+        add("threading", "Event")
+    else:
+        add("rclpy.utilities", "ok")
     if node.lifecycle:
         add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
     else:
         add("rclpy.node", "Node")
     standard = {module: found for module, found in names.items() if module in _STANDARD}
     others = {module: found for module, found in names.items() if module not in _STANDARD}
-    plain = ("signal", *(("argparse", "sys", "time") if planned.clients else ()))
+    reading = ("argparse", "sys", "time") if planned.clients else ()
+    plain = (*reading, *(("signal",) if planned.once else ()))
     groups = (imports(standard, plain), imports(others, ("rclpy",)))
     return tuple(tuple(group) for group in groups if group)

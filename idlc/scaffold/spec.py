@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import keyword
 import re
+import sys
 from collections.abc import Iterable
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -94,8 +95,10 @@ def check_name(name: str) -> str:
             f"`{name}` cannot be a node: use lower-case letters, digits and single underscores, "
             "a letter first"
         )
-    if keyword.iskeyword(name) or name in TAKEN:
-        raise ValueError(f"`{name}` cannot be a node: the name is taken by Python or by interfaces")
+    if keyword.iskeyword(name) or name in TAKEN or name in sys.stdlib_module_names:
+        raise ValueError(
+            f"`{name}` cannot be a node: the name is taken by a module of Python or by interfaces"
+        )
     return name
 
 

@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable
 import signal
 import sys
+from threading import Event
 import time
 
 from my_robot_controller.srv import AddTwoInts
@@ -91,22 +92,22 @@ def add_two_ints_request(given: argparse.Namespace) -> AddTwoInts.Request:
 def main(args: list[str] | None = None) -> int:
     """Do what the command line asks for; return 0 if all went well."""
     given = parse_arguments(args)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupted = Event()
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, lambda *_: interrupted.set())
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = AddTwoIntsClient(given.server_timeout)
         executor = SingleThreadedExecutor()
+        node = AddTwoIntsClient(given.server_timeout)
         executor.add_node(node)
-        try:
-            well = True
-            task = executor.create_task(node.call_add_two_ints, add_two_ints_request(given))
-            executor.spin_until_future_complete(task)
-            well = bool(task.result()) and well
-            return 0 if well else 1
-        except KeyboardInterrupt:
-            return 130
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return 130
+        well = True
+        task = executor.create_task(node.call_add_two_ints, add_two_ints_request(given))
+        while not (task.done() or interrupted.is_set()):
+            executor.spin_once(timeout_sec=0.1)
+        well = well and bool(task.result())
+        return 130 if interrupted.is_set() else 0 if well else 1
+    except ExternalShutdownException:
+        return 1
     finally:
         try_shutdown()
 

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-import signal
 import sys
 import time
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import ok, remove_ros_args, try_shutdown
 from std_msgs.msg import Empty
 from std_srvs.srv import Empty as std_srvs_srv_Empty
 from std_srvs.srv import SetBool
@@ -148,16 +146,18 @@ def switch_request(given: argparse.Namespace) -> SetBool.Request:
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
     given = parse_arguments(args)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = Keeper(given)
+        rclpy.init(args=args)
         executor = SingleThreadedExecutor()
+        node = Keeper(given)
         executor.add_node(node)
-        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        if ok():
+            raise
+        # otherwise it was asked to end before it was complete
     finally:
         try_shutdown()
 

@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Callable
 import signal
 import sys
+from threading import Event
 import time
 from typing import Any
 
@@ -51,7 +52,7 @@ class Both(Node):
         return True
 
     async def send_dock(self, goal: Dock.Goal) -> bool:
-        """Send a goal to dock and see it through; return whether it was reached."""
+        """Send a goal to dock; return whether it was reached."""
         if not await self.until(self.dock_client.server_is_ready):
             self.get_logger().error('dock: there is no server')
             return False
@@ -150,27 +151,28 @@ def dock_request(given: argparse.Namespace) -> Dock.Goal:
 def main(args: list[str] | None = None) -> int:
     """Do what the command line asks for; return 0 if all went well."""
     given = parse_arguments(args)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupted = Event()
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, lambda *_: interrupted.set())
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = Both(given.server_timeout)
         executor = SingleThreadedExecutor()
+        node = Both(given.server_timeout)
         executor.add_node(node)
-        try:
-            well = True
-            task = executor.create_task(node.call_ask, ask_request(given))
-            executor.spin_until_future_complete(task)
-            well = bool(task.result()) and well
-            task = executor.create_task(node.send_dock, dock_request(given))
-            executor.spin_until_future_complete(task)
-            well = bool(task.result()) and well
-            return 0 if well else 1
-        except KeyboardInterrupt:
-            ending = executor.create_task(node.cancel_dock)
-            executor.spin_until_future_complete(ending)
-            return 130
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return 130
+        well = True
+        task = executor.create_task(node.call_ask, ask_request(given))
+        while not (task.done() or interrupted.is_set()):
+            executor.spin_once(timeout_sec=0.1)
+        well = well and bool(task.result())
+        task = executor.create_task(node.send_dock, dock_request(given))
+        while not (task.done() or interrupted.is_set()):
+            executor.spin_once(timeout_sec=0.1)
+        well = well and bool(task.result())
+        if interrupted.is_set():
+            executor.spin_until_future_complete(executor.create_task(node.cancel_dock))
+        return 130 if interrupted.is_set() else 0 if well else 1
+    except ExternalShutdownException:
+        return 1
     finally:
         try_shutdown()
 

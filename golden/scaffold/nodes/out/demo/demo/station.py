@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-import signal
-
 from demo.action import Dock
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import install_signal_handlers, SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import try_shutdown
+from rclpy.utilities import ok, try_shutdown
 
 
 class Station(Node):
@@ -87,16 +84,18 @@ class Station(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = Station()
+        rclpy.init(args=args)
         executor = SingleThreadedExecutor()
+        node = Station()
         executor.add_node(node)
-        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        if ok():
+            raise
+        # otherwise it was asked to end before it was complete
     finally:
         try_shutdown()
 

@@ -5,16 +5,13 @@
 
 from __future__ import annotations
 
-import signal
-
 from demo.msg import Command
 from geometry_msgs.msg import Twist, Vector3
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
-from rclpy.signals import install_signal_handlers, SignalHandlerOptions
-from rclpy.utilities import try_shutdown
+from rclpy.utilities import ok, try_shutdown
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -82,16 +79,18 @@ class Talker(Node):
 
 def main(args: list[str] | None = None) -> None:
     """Run the node until it is asked to end."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = Talker()
+        rclpy.init(args=args)
         executor = SingleThreadedExecutor()
+        node = Talker()
         executor.add_node(node)
-        install_signal_handlers()  # not before: they would shut down what is being created
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except Exception:
+        if ok():
+            raise
+        # otherwise it was asked to end before it was complete
     finally:
         try_shutdown()
 
