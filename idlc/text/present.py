@@ -56,6 +56,9 @@ def text(
 ) -> Iterator[str]:
     """Yield each problem as a block of lines, then a count of those beyond `limit`."""
     paint = _Paint(colour)
+    diagnostics = list(diagnostics)
+    if len(diagnostics) > limit:  # no error is left out for a warning
+        diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
     left_out = 0
     for number, diagnostic in enumerate(diagnostics):
         if number < limit:

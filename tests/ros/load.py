@@ -1,0 +1,213 @@
+"""What a busy and hostile system does to idlc's classes, each a function.
+
+load.py NAME [ARGUMENT...]. The package `same` on PYTHONPATH is idlc's; `Thing` has other fields
+on the attacker's side. A function fails by raising; it prints what the test looks at.
+"""
+
+import array
+import contextlib
+import logging
+import os
+import random
+import sys
+import threading
+import time
+from pathlib import Path
+
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+from same.msg import Thing
+
+PATIENCE = 60.0
+SIDES = 8
+QOS = QoSProfile(depth=400)
+#: Messages on their way at once, so that none is dropped where nobody dies.
+WINDOW = 200
+
+
+def eventually(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "not in time"
+        time.sleep(0.002)
+
+
+def resident():
+    """Return the resident memory in megabytes."""
+    words = Path("/proc/self/statm").read_text("ascii").split()
+    return int(words[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def thing(sender, number):
+    return Thing(
+        name=f"{sender} {number}",
+        numbers=array.array("i", [sender, number, sender ^ number]),
+        words=[str(number)] * (number % 5),
+    )
+
+
+class Listener:
+    """A subscription that checks each message; it may end at any moment and begin anew."""
+
+    def __init__(self, node, group):
+        self.node, self.group = node, group
+        self.received = self.deaths = 0
+        self.problems = []
+        self.begin()
+
+    def begin(self):
+        self.subscription = self.node.create_subscription(
+            Thing, "things", self.check, QOS, callback_group=self.group
+        )
+
+    def die(self):
+        self.node.destroy_subscription(self.subscription)
+        self.deaths += 1
+        self.begin()
+
+    def check(self, message):
+        sender, number = map(int, message.name.split())
+        if message != thing(sender, number):
+            self.problems.append(message)
+        self.received += 1
+
+
+def eight_by_eight(count):
+    """Publish from eight threads, receive in eight subscriptions, some of which keep dying."""
+    rclpy.init()
+    node = rclpy.create_node("load")
+    executor = MultiThreadedExecutor(SIDES)
+    executor.add_node(node)
+    group = ReentrantCallbackGroup()
+    listeners = [Listener(node, group) for _ in range(SIDES)]
+    steady = listeners[: SIDES // 2]
+    publishers = [node.create_publisher(Thing, "things", QOS) for _ in range(SIDES)]
+    for publisher in publishers:
+        eventually(lambda one=publisher: one.get_subscription_count() == SIDES)
+    spinning = threading.Thread(target=executor.spin)
+    spinning.start()
+    chance = random.Random(1)
+    total = int(count)
+    published = [0] * SIDES
+    memory = []
+
+    def publish(sender, until):
+        for number in range(published[sender], until):
+            eventually(lambda: sum(published) - min(one.received for one in steady) < WINDOW)
+            publishers[sender].publish(thing(sender, number))
+            published[sender] += 1
+
+    for round_number in range(1, 11):
+        until = total * round_number // 10 // SIDES
+        threads = [threading.Thread(target=publish, args=(one, until)) for one in range(SIDES)]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            chance.choice(listeners[SIDES // 2 :]).die()
+            time.sleep(chance.random() / 20)
+        memory.append(resident())
+    eventually(lambda: all(one.received == sum(published) for one in steady))
+    assert not any(one.problems for one in listeners)
+    assert memory[-1] - memory[4] < 6, memory
+    executor.shutdown()
+    spinning.join()
+    print(sum(published), sum(one.deaths for one in listeners))
+
+
+def ends_within_a_callback(how):
+    """Let the interpreter end while other threads convert messages and are in callbacks."""
+    rclpy.init()
+    node = rclpy.create_node("ending")
+    executor = SingleThreadedExecutor()  # its callbacks run in the thread that spins
+    executor.add_node(node)
+    inside = threading.Event()
+
+    def slow(message):
+        inside.set()
+        for _ in range(10**7):
+            Thing.deserialize(message.serialize())
+
+    node.create_subscription(Thing, "things", slow, QOS)
+    publisher = node.create_publisher(Thing, "things", QOS)
+
+    def flood():
+        for number in range(10**6):
+            publisher.publish(thing(1, number))
+
+    threading.Thread(target=executor.spin, daemon=True).start()
+    threading.Thread(target=flood, daemon=True).start()
+    assert inside.wait(PATIENCE)
+    if how == "exit":
+        sys.exit(0)
+    if how == "shutdown":
+        rclpy.shutdown()
+    if how == "raise":
+        raise SystemExit(0)
+
+
+def victim():
+    """Count the sound messages among what anybody sends, until the input ends."""
+    logging.disable()
+    rclpy.init()
+    node = rclpy.create_node("victim")
+    sound = {"": 0}
+
+    def check(message):
+        if message.name == "sound" and message.words == ["a", "b"]:
+            sound[""] += 1
+        repr(message), message.serialize()
+
+    node.create_subscription(Thing, "things", check, QoSProfile(depth=2000))
+    executor = MultiThreadedExecutor(2)
+    executor.add_node(node)
+    threading.Thread(target=spin, args=(executor,), daemon=True).start()
+    print("ready", flush=True)
+    for _ in sys.stdin:
+        print(sound[""], flush=True)
+    rclpy.shutdown()
+
+
+def spin(executor):
+    with contextlib.suppress(ExternalShutdownException):
+        executor.spin()
+
+
+def attacker(count):
+    """Send, under the name of the victim's type, messages of another one, and raw garbage."""
+    rclpy.init()
+    node = rclpy.create_node("attacker")
+    publisher = node.create_publisher(Thing, "things", QoSProfile(depth=2000))
+    eventually(lambda: publisher.get_subscription_count() > 0)
+    chance = random.Random(3)
+    other = Thing(value=-1.5, count=2**32 - 1, name="other")
+    raw = bytearray(other.serialize())
+    for number in range(int(count)):
+        if number % 3 == 0:
+            publisher.publish(other)
+            continue
+        data = bytearray(raw)
+        for _ in range(chance.randrange(8)):
+            data[chance.randrange(len(data))] = chance.choice([0, 1, 255, chance.randrange(256)])
+        publisher.publish(bytes(data[: chance.randrange(1, len(data) + 1)]))
+    print("done", flush=True)
+    sys.stdin.read()
+    rclpy.shutdown()
+
+
+def friend(count):
+    """Send sound messages."""
+    rclpy.init()
+    node = rclpy.create_node("friend")
+    publisher = node.create_publisher(Thing, "things", QoSProfile(depth=2000))
+    eventually(lambda: publisher.get_subscription_count() > 0)
+    for _ in range(int(count)):
+        publisher.publish(Thing(name="sound", words=["a", "b"]))
+    print("done", flush=True)
+    sys.stdin.read()
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    globals()[sys.argv[1]](*sys.argv[2:])

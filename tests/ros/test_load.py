@@ -1,0 +1,92 @@
+"""idlc's classes in a busy, dying and hostile system; IDLC_LONG makes it a million messages."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from installed import HERE, generate
+
+#: Each is delivered eight times.
+MESSAGES = 125_000 if os.environ.get("IDLC_LONG") else 1_200
+TIMEOUT = 3600 if os.environ.get("IDLC_LONG") else 120
+THING = "string name\nint32[] numbers\nstring[] words\n"
+#: A type of the same name that means something else.
+OTHER = "float64 value\nuint32 count\nuint32[8] more\nstring name\n"
+
+
+@pytest.fixture(scope="module")
+def sides(tmp_path_factory) -> dict[str, Path]:
+    """Return a folder with the package `same` for each side."""
+    found = {}
+    for side, text in (("sound", THING), ("other", OTHER)):
+        folder = tmp_path_factory.mktemp(side)
+        (folder / "files/msg").mkdir(parents=True)
+        (folder / "files/msg/Thing.msg").write_text(text, encoding="utf-8")
+        generate(folder / "files", folder / "same")
+        found[side] = folder
+    return found
+
+
+@pytest.fixture
+def start(sides, ros_environment):
+    """Start a function of load.py; it is ended with the test."""
+    processes = []
+
+    def begin(*words, side="sound"):
+        process = subprocess.Popen(
+            [sys.executable, str(HERE / "load.py"), *map(str, words)],
+            env={**ros_environment, "PYTHONPATH": str(sides[side])},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def test_eight_publishers_and_eight_subscribers_that_die(start):
+    out, complaints = (process := start("eight_by_eight", MESSAGES)).communicate(timeout=TIMEOUT)
+    assert (process.returncode, complaints) == (0, "")
+    published, deaths = map(int, out.split())
+    assert published > MESSAGES * 0.9
+    assert deaths > 5
+
+
+@pytest.mark.parametrize("how", ["exit", "shutdown", "raise", "end"])
+def test_the_interpreter_ends_within_a_callback(how, start):
+    process = start("ends_within_a_callback", how)
+    _, complaints = process.communicate(timeout=TIMEOUT)
+    assert process.returncode == 0, complaints
+    assert "Fatal" not in complaints
+
+
+def test_hostile_peers(start):
+    victim = start("victim")
+    assert victim.stdout.readline() == "ready\n"
+    count = 400
+    hostile = [start("attacker", count, side="other") for _ in range(2)]
+    friend = start("friend", count // 4)
+    for process in (*hostile, friend):
+        assert process.stdout.readline() == "done\n", process.stderr.read()
+    received = 0
+    for _ in range(TIMEOUT * 20):
+        time.sleep(0.05)
+        victim.stdin.write("?\n")
+        victim.stdin.flush()
+        received = int(victim.stdout.readline())
+        if received == count // 4:
+            break
+    assert received > count // 8
+    for process in (*hostile, friend, victim):
+        _, complaints = process.communicate(timeout=TIMEOUT)
+        assert process.returncode == 0, complaints
