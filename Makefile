@@ -3,11 +3,14 @@
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   ARGS='-k name'      more words for pytest
+#   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
 
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
 INTERPRETERS ?= 3.10 3.11 3.12 3.13
 ARGS ?=
+FUZZ ?= 5000
+SEED ?= 2
 
 TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 TEST_ENV := .venv/test-$(TAG)$(if $(filter no,$(ROS)),-without-ros)
@@ -23,7 +26,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all lint bench clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint bench clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -46,6 +49,26 @@ test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels o
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/every_python.sh $(INTERPRETERS)
+
+test-lowest: ## run the tests that need no ROS with the lowest versions that idlc allows
+	@rm -rf .venv/lowest-$(TAG)
+	@$(PYTHON) -m venv .venv/lowest-$(TAG)
+	@$(PYTHON) tests/lowest.py test > .venv/lowest-$(TAG)/versions.txt
+	@.venv/lowest-$(TAG)/bin/python $(PIP_INSTALL) --editable '.[test]' --constraint .venv/lowest-$(TAG)/versions.txt
+	.venv/lowest-$(TAG)/bin/python -m pytest -n 2 --dist worksteal -m "not ros" $(ARGS)
+
+fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
+	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
+	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/test_fuzz.py tests/test_limits.py \
+	    tests/test_emit_hostile.py $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
+	@if $(TEST_ENV)/bin/python $(PIP_INSTALL) atheris; then \
+	    for target in msg srv action lock pyproject package_xml; do \
+	        PYTHONPATH=tests $(TEST_ENV)/bin/python tests/fuzz_atheris.py $$target 300 || exit 1; \
+	    done; \
+	else echo 'atheris has no build for this Python: its part is left out'; fi
+
+soak: $(TEST_ENV)/installed ## send a million messages through rclpy
+	IDLC_LONG=1 $(TEST_ENV)/bin/python -m pytest tests/ros/test_load.py $(ARGS)
 
 lint: $(TEST_ENV)/installed ## check style and types
 	$(TEST_ENV)/bin/ruff check .

@@ -202,6 +202,14 @@ def test_nothing_reaches_outside_the_clone():
     assert [name_of(path) for path in project_files() if neighbour in path.read_bytes()] == []
 
 
+def test_the_security_policy_names_real_tests():
+    text = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", text)
+    assert len(named) >= 15
+    for path, function in named:
+        assert f"def {function}(" in (ROOT / path).read_text(encoding="utf-8"), function
+
+
 def test_this_document_names_real_tests():
     text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
     named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)

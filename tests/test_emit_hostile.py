@@ -1,5 +1,6 @@
 """Buffers that somebody else made: a value or DecodeError, in memory bounded by the buffer."""
 
+import os
 import random
 import tracemalloc
 from contextlib import suppress
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("standard")
 
 INTERFACES = catalog.interfaces()
 #: Mutations of each structure; raise it for a longer search.
-BUDGET = 40
+BUDGET = max(40, int(os.environ.get("IDLC_FUZZ", "0")) // 10)
 HUGE = [b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\x00\x00\x00\x80", b"\xff\xff\0\0", b"\0\0\0\1"]
 #: Bytes of memory that one byte of a buffer may cost: an object for each byte.
 PER_BYTE = 400

@@ -131,6 +131,17 @@ def test_visible_text_has_the_width_that_is_claimed(text):
     assert "\n" not in one_line(text)
 
 
+def test_no_error_is_left_out_for_a_warning():
+    report = Report()
+    source = Source("a.msg", "x" * 300)
+    for at in range(200):
+        report.add(codes.UNUSUAL_LINE_END.at(Span(source, at, at + 1), "a warning"))
+    report.add(codes.BAD_VALUE.at(Span(source, 250, 251), "an error"))
+    first, *_, rest = present.text(report)
+    assert "an error" in first
+    assert rest.startswith("… and 101 more")
+
+
 @given(st.text(), st.text())
 def test_json_lines_are_lines_of_ascii(path, message):
     report = Report()
