@@ -7,7 +7,9 @@ import pty
 import shutil
 import subprocess
 import sys
+import unicodedata
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from hostile import (
@@ -198,12 +200,7 @@ BROKEN = [
 
 @pytest.mark.parametrize("style", ["text", "json"])
 def test_what_is_wrong_is_shown_without_harm(style, tmp_path):
-    (tmp_path / ".git").mkdir()
-    msg = tmp_path / "pkg" / "msg"
-    msg.mkdir(parents=True)
-    for number, attack in enumerate((*PAYLOADS.values(), *OTHER_LINE_ENDS)):
-        lines = "".join(line.replace("{}", attack) + "\n" for line in BROKEN)
-        (msg / f"B{number}.msg").write_text(lines, encoding="utf-8")
+    msg = write_broken(tmp_path)
     for path in sorted(msg.iterdir()) if style == "text" else [msg]:
         done = run(["check", str(path.relative_to(tmp_path)), "--format", style], tmp_path)
         assert done.status == 1
@@ -213,6 +210,49 @@ def test_what_is_wrong_is_shown_without_harm(style, tmp_path):
             for line in done.stdout.splitlines():
                 assert json.loads(line)["type"] in ("diagnostic", "summary")
     assert_untouched(tmp_path)
+
+
+def write_broken(folder: Path) -> Path:
+    (folder / ".git").mkdir()
+    msg = folder / "pkg" / "msg"
+    msg.mkdir(parents=True)
+    for number, attack in enumerate((*PAYLOADS.values(), *OTHER_LINE_ENDS)):
+        lines = "".join(line.replace("{}", attack) + "\n" for line in BROKEN)
+        (msg / f"B{number}.msg").write_text(lines, encoding="utf-8")
+    for name, path in FILE_NAMES.items():
+        if name != "not utf-8":
+            (msg / f"{path}.msg").write_text("int8 A\n", encoding="utf-8")
+    return msg
+
+
+@pytest.mark.parametrize("style", ["github", "sarif", "junit", "gitlab"])
+def test_reports_for_ci_systems_cannot_be_forged(style, tmp_path):
+    msg = write_broken(tmp_path)
+    errors = 0
+    for line in run(["check", "pkg", "--format", "json"], tmp_path).stdout.splitlines():
+        errors += json.loads(line)["type"] == "diagnostic"
+    found = run(["check", "pkg", "--format", style], tmp_path)
+    assert found.status == 1
+    hidden = {c for c in found.stdout if c != "\n" and unicodedata.category(c) in ("Cc", "Cf")}
+    assert not hidden
+    if style == "github":
+        lines = found.stdout.splitlines()
+        assert {line.partition(" ")[0] for line in lines if line.startswith("::")} <= {
+            "::error",
+            "::warning",
+            "::notice",
+        }
+        assert sum(line.startswith("::") for line in lines) == errors
+        assert not [line for line in lines if line.startswith(("##[", "forged", "error[IDL999]"))]
+    elif style == "junit":
+        tags = [element.tag for element in ElementTree.fromstring(found.stdout).iter()]  # noqa: S314
+        assert set(tags) == {"testsuite", "testcase", "failure"}
+        assert tags.count("failure") == errors
+        assert "\nerror[IDL999]" not in found.stdout
+    else:
+        text = json.dumps(json.loads(found.stdout))
+        assert '"IDL999"' not in text
+    assert_untouched(msg)
 
 
 FILE_NAMES = {

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from idlc.text.codes import CODES
 from idlc.text.diagnostics import Diagnostic
+from idlc.text.visible import one_line
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -30,7 +31,8 @@ def _failed(one: Diagnostic) -> str:
     if one.span:
         line = ":{}:{}".format(*one.span.source.position(one.span.start))
     slug = CODES[one.code].slug if one.code in CODES else ""
-    text = f"{path}{line}: {one.message}" + (f"\nhint: {one.hint}" if one.hint else "")
+    lines = (f"{path}{line}: {one.message}", *([f"hint: {one.hint}"] if one.hint else []))
+    text = "\n".join(map(one_line, lines))
     name = f"{one.code} {slug}{line}"
     return (
         f"  <testcase classname={_quoted(path or 'idlc')} name={_quoted(name)}>\n"
@@ -41,7 +43,7 @@ def _failed(one: Diagnostic) -> str:
 
 
 def _quoted(text: str) -> str:
-    return quoteattr(_legal(text))
+    return quoteattr(_legal(one_line(text)))
 
 
 def _legal(text: str) -> str:
