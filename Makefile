@@ -26,7 +26,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint bench clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -74,6 +74,9 @@ lint: $(TEST_ENV)/installed ## check style and types
 	$(TEST_ENV)/bin/ruff check .
 	$(TEST_ENV)/bin/ruff format --check .
 	$(TEST_ENV)/bin/mypy
+
+example: $(TEST_ENV)/installed ## compile the committed example again
+	cd examples/my_robot_controller && $(CURDIR)/$(TEST_ENV)/bin/python -m idlc gen
 
 bench: $(TEST_ENV)/installed ## measure against rosbags, rclpy and rosidl
 	@for script in benchmarks/[a-z]*.py; do $(TEST_ENV)/bin/python $$script || exit 1; done

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,7 +41,12 @@ def facts(given: Inputs, known: Callable[[], Iterable[str]]) -> Facts | None:
     folder = path.parent
     files = list(_files(folder))
     locks = [file for file in files if file.name == lock.FILE]
-    generated = [file.parent for file in locks]
+    generated = {
+        file.parent / path
+        for file in locks
+        if (known_lock := lock.load(file.parent, "", Report()))
+        for path in known_lock.outputs
+    }
     cmake = folder / "CMakeLists.txt"
     makes = read_bytes(cmake, "", unheard) if cmake.is_file() else None
     modules = dict(_modules(folder, files, generated))
@@ -86,14 +91,16 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _modules(
-    folder: Path, files: Iterable[Path], generated: Iterable[Path]
+    folder: Path, files: Iterable[Path], generated: Container[Path]
 ) -> Iterator[tuple[str, Source]]:
-    """Yield a package's own Python files by their dotted names, without tests and the like."""
-    beside = set(generated)
+    """Yield a package's own Python files by their dotted names, without tests and the like.
+
+    Nodes may lie in the folder that classes are generated into.
+    """
     for file in files:
         parts = file.relative_to(folder).parts
         ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and not beside.intersection(file.parents) and (source := _optional(file)):
+        if ours and file not in generated and (source := _optional(file)):
             yield ".".join((*parts[:-1], file.stem)), source
 
 

@@ -196,6 +196,14 @@ class Message(metaclass=MessageMeta):
         message: typing_extensions.Self = from_dict(cls, values)
         return message
 
+    if not TYPE_CHECKING:
+
+        def __replace__(self, /, **changes):
+            """Return a copy with other values for some fields, for `copy.replace`."""
+            from dataclasses import replace
+
+            return replace(self, **changes)
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):
             return NotImplemented

@@ -16,7 +16,6 @@ RESERVED = frozenset(
         "from_dict",
         "get_fields_and_field_types",
         "mro",
-        "self",
         "serialize",
         "to_dict",
         "validate",

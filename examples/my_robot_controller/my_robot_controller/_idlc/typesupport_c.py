@@ -189,6 +189,9 @@ _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
 _capsule_pointer = ctypes.PYFUNCTYPE(c_void_p, py_object, c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
+if sys.maxsize < 1 << 62:
+    raise ImportError("idlc's type support needs a 64-bit Python")
+
 #: All memory of the process, by address, as bytes and as words: `MEMORY[start:stop]`,
 #: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C.
 MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")
@@ -243,13 +246,12 @@ class MessageSupport(NamedTuple):
 
 
 def callback(prototype: Any, function: Callable[..., object]) -> int:
-    """Return the C function that calls `function`, which must catch every exception.
+    """Return the C function that calls `function`, a `try` that catches everything.
 
     Signal handlers run on entry of a Python function, before its first `try`, and what
     they raise would be lost with the result. The interpreter does not look for signals
-    where a function resumes inside a `yield from`, so the function is told that it
-    does. (Python 3.10 has no such instruction; it does not look before a leading `try`
-    either.)
+    where a function resumes inside a `yield from`, so the function is told that it does.
+    (Python 3.10 has no such instruction; it does not look before a leading `try` either.)
     """
     assert isinstance(function, FunctionType)
     code = function.__code__

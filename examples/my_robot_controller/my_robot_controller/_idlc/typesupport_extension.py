@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import re
+from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -57,6 +58,7 @@ def _snake(name: str) -> str:
     return re.sub("([a-z0-9])([A-Z])", r"\1_\2", name).lower()
 
 
+@cache
 def _import(package: str) -> ModuleType | None:
     name = f"{package}_s__rosidl_typesupport_c"
     try:

@@ -40,11 +40,11 @@ class Memory:
     bytecode runs where C asks for the size: an interrupt there could not be told.
     """
 
-    __slots__ = ("body", "length", "message", "rest")
+    __slots__ = ("body", "length", "message", "parts")
 
-    #: The encoded message without header: bytes, and buffers that follow them, if any.
-    body: bytes
-    rest: list[memoryview] | None
+    #: The encoded message without header; large ones are in several parts instead.
+    body: bytes | None
+    parts: list[memoryview]
     length: Callable[[], int]
     message: Any
 
@@ -76,7 +76,6 @@ def _memory_type(cls: Any) -> type[Memory]:
     true = c.TRUE
 
     def store(memory: Any, message: Any) -> object:
-        rest = None
         try:
             parts = encode(message)
             body = parts[0][_HEADER:]
@@ -85,12 +84,12 @@ def _memory_type(cls: Any) -> type[Memory]:
                 if sum(map(len, parts)) < _LARGE:
                     body = b"".join(parts)
                 else:
-                    body, rest = b"", _joined(parts)
+                    body = None
+                    memory.parts = parts = _joined(parts)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        size = sum(map(len, rest)) if rest else len(body)
         memory.body = body
-        memory.rest = rest
+        size = sum(map(len, parts)) if body is None else len(body)
         memory.length = size.__index__
         memory.message = message
         return true
@@ -133,13 +132,14 @@ def _serializer() -> int:
         try:
             here = cdr >> 3
             start = words[here + position]
-            stop = start + memory.length()
+            body = memory.body
+            stop = start + (memory.length() if body is None else len(body))
             if words[here + end] < stop:
                 return False
-            if memory.rest is None:
-                everything[start:stop] = memory.body
+            if body is not None:
+                everything[start:stop] = body
             else:
-                for part in memory.rest:
+                for part in memory.parts:
                     everything[start : start + len(part)] = part
                     start += len(part)
             words[here + position] = stop
@@ -170,8 +170,10 @@ def _deserializer(name: str, cls: Any) -> int:
         try:
             here = cdr >> 3
             view = everything[words[here + position] - _HEADER : words[here + end]]
-            large = bulk and len(view) > _SMALL
-            data: Any = view if large else view.tobytes()
+            if bulk and len(view) > _SMALL:
+                memory.message = decode_any(view)
+                return True
+            data = view.tobytes()
             if data[1] == native and not data[0]:
                 try:
                     memory.message = decode(data)
@@ -198,7 +200,10 @@ def _unbounded() -> int:
     """Return `max_serialized_size(bounds_info)`, which says that there is no maximum."""
 
     def maximum(bounds_info: Any) -> int:
-        bounds_info[0] = b"\0"
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            bounds_info[0] = b"\0"
+        except BaseException:  # noqa: S110
+            pass
         return 0
 
     return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)

@@ -187,10 +187,16 @@ def _get(fixed: bool, size: int) -> int:
     """
 
     def in_array(field: int, index: int) -> int:
-        return field + index * size
+        try:
+            return field + index * size
+        except BaseException:
+            return 0
 
     def in_sequence(field: Any, index: int) -> int:
-        return field[0].data + index * size  # type: ignore[no-any-return]
+        try:
+            return field[0].data + index * size  # type: ignore[no-any-return]
+        except BaseException:
+            return 0
 
     if fixed:
         return c.callback(PYFUNCTYPE(c_void_p, c_size_t, c_size_t), in_array)
