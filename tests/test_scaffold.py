@@ -52,6 +52,8 @@ def nothing_installed(monkeypatch):
 def test_golden_tree(case, tmp_path, monkeypatch):
     commands = (case / "commands").read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)
+    if (case / "in").is_dir():
+        shutil.copytree(case / "in", tmp_path, dirs_exist_ok=True)
     carry_out(commands, monkeypatch)
     found = tree(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -78,10 +80,14 @@ def test_golden_packages_are_valid(case):
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_golden_packages_pass_the_checks_of_style(case, tmp_path):
     shutil.copytree(case / "out", tmp_path / "out")
+    for path in (case / "in").rglob("*.py"):  # the user's own style is the user's
+        (tmp_path / "out" / path.relative_to(case / "in")).unlink()
     for package in sorted((tmp_path / "out").glob("*")):
+        ours = package / "pyproject.toml"
+        style = [] if ours.is_file() else ["--config", str(GOLDEN / "package/out/demo" / ours.name)]
         for words in (["ruff", "check", "."], ["ruff", "format", "--check", "."]):
             done = subprocess.run(
-                [sys.executable, "-m", *words, "--no-cache"],
+                [sys.executable, "-m", *words, *style, "--no-cache"],
                 cwd=package,
                 capture_output=True,
                 text=True,

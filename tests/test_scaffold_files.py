@@ -5,7 +5,7 @@ import difflib
 import pytest
 from catkin_pkg.package import parse_package_string
 
-from idlc.scaffold import launch_py, package_xml
+from idlc.scaffold import data_files, launch_py, package_xml
 from idlc.scaffold.console_script import add_script
 from idlc.scaffold.edit import Edited, Outcome, Refused, Script
 
@@ -226,3 +226,13 @@ def test_what_is_refused_outside_of_setup_py(files, path):
     assert where == path
     assert isinstance(outcome, Refused)
     assert "demo.talker:main" in outcome.line
+
+
+def test_a_launch_file_is_installed_if_none_was():
+    text = SETUP.replace("setup(", "setup(data_files=[('share/demo', ['package.xml'])], ")
+    after = text_of(data_files.add_launch(text, "demo", "launch/demo_launch.py"))
+    assert "('share/demo/launch', ['launch/demo_launch.py'])]" in after
+    assert data_files.add_launch(after, "demo", "launch/demo_launch.py") == Edited(after)
+    assert data_files.add_launch(SETUP, "demo", "launch/demo_launch.py") == Edited(SETUP)
+    computed = SETUP.replace("setup(", "setup(data_files=files(), ")
+    assert isinstance(data_files.add_launch(computed, "demo", "launch/demo_launch.py"), Refused)

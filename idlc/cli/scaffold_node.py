@@ -91,7 +91,7 @@ def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  
     Writes the module and its test, and adds the command to setup.py, the packages that it needs
     to package.xml and the node to the launch file.
     """
-    from idlc.driver import scaffold
+    from idlc.driver import scaffold, scaffold_node
     from idlc.scaffold import spec
     from idlc.text.diagnostics import Report
 
@@ -116,5 +116,5 @@ def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  
         raise click.UsageError(str(error)) from error
     settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
     report = Report()
-    result = scaffold.node(wanted, settings, report)
+    result = scaffold_node.node(wanted, settings, report)
     return finish(result, report)

@@ -39,6 +39,10 @@ class Project:
         """Return how messages call a file in the folder."""
         return path if self.name in ("", ".") else f"{self.name}/{path}"
 
+    def has(self, path: str) -> bool:
+        """Whether there is anything of this name."""
+        return (self.path / path).exists()
+
     def text(self, path: str) -> str | None:
         """Return a file's text, `None` where there is none; reports what cannot be read."""
         if not (self.path / path).is_file():

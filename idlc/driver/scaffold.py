@@ -12,16 +12,13 @@ from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.scaffold import cmake, node_test, package_xml, spec
+from idlc.scaffold import cmake, package_xml
 from idlc.scaffold import interface as interface_text
-from idlc.scaffold import node as node_page
 from idlc.scaffold import package as package_files
-from idlc.scaffold.edit import Edited, Outcome, Script
-from idlc.scaffold.plan import Plan, plan
+from idlc.scaffold.edit import Edited, Outcome
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 from idlc.text.source import Source
-from idlc.text.suggest import did_you_mean
 
 
 class Settings(NamedTuple):
@@ -53,17 +50,13 @@ def package(
     new = {
         path: text
         for path, text in files.items()
-        if path not in growing or settings.force or not _there(project, path)
+        if path not in growing or settings.force or not project.has(path)
     }
-    return _write(project, new, {}, settings, report)
+    return write(project, new, {}, settings, report)
 
 
 #: Files of a new package that are edited later on.
 _GROWING = (MANIFEST, "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt")
-
-
-def _there(project: Project, path: str) -> bool:
-    return (project.path / path).exists()
 
 
 def interface(
@@ -75,7 +68,7 @@ def interface(
     report: Report,
 ) -> Result | None:
     """Write an interface file into the package that the working folder belongs to."""
-    found = _package(settings, report)
+    found = find_package(settings, report)
     if found is None:
         return None
     project, own = found
@@ -90,17 +83,17 @@ def interface(
         return None
     needed = set(derive.IMPLICIT_PACKAGES[kind]) | {one.package for one in model.interfaces}
     depends = sorted(needed - {own} - _reached_only(model))
-    edits = _manifest(project, depends, [], group=True)
+    edits = manifest_edit(project, depends, [], group=True)
     lists = project.text("CMakeLists.txt")
     if lists is not None:
         edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
-    edited = _accepted(project, edits, report)
+    edited = accepted(project, edits, report)
     if edited is None:
         return None
     if lists is None:
-        there = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
-        edited |= dict([interface_text.index(own, there | {path})])
-    return _write(project, {path: text}, edited, settings, report)
+        keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
+        edited |= dict([interface_text.index(own, keys | {path})])
+    return write(project, {path: text}, edited, settings, report)
 
 
 def _reached_only(model: Model) -> set[str]:
@@ -116,32 +109,7 @@ def _reached_only(model: Model) -> set[str]:
     return {name.package for name in model.interfaces} - direct - implied
 
 
-def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None:
-    """Write a node and its test, and enter it wherever its package lists its nodes."""
-    found = _package(settings, report)
-    if found is None:
-        return None
-    project, own = found
-    wanted = wanted._replace(package=own)
-    planned = _planned(wanted, project, settings, report)
-    if planned is None:
-        return None
-    with stage("scaffold", wanted.name):
-        added = {
-            f"{own}/{wanted.name}.py": node_page.render(planned),
-            f"test/test_{wanted.name}.py": node_test.render(planned),
-        }
-        for path, text in added.items():
-            compile(text, path, "exec", dont_inherit=True)
-        added |= _support(project, own)
-        edits = _edits(project, planned, added)
-    edited = _accepted(project, edits, report)
-    if edited is None:
-        return None
-    return _write(project, added, edited, settings, report)
-
-
-def _package(settings: Settings, report: Report) -> tuple[Project, str] | None:
+def find_package(settings: Settings, report: Report) -> tuple[Project, str] | None:
     """Return the package that the working folder belongs to, and its name."""
     manifest.cache_clear()
     path = manifest(absolute("."))
@@ -155,104 +123,15 @@ def _package(settings: Settings, report: Report) -> tuple[Project, str] | None:
     return None if name is None else (Project(folder, report, force=settings.force), name)
 
 
-def _planned(
-    wanted: spec.Node, project: Project, settings: Settings, report: Report
-) -> Plan | None:
-    """Return the node with the interfaces that its endpoints name; reports IDL618."""
-    library = Library(settings.include, report, own={wanted.package: (project.path,)})
-    interfaces: list[ir.Interface] = []
-    messages: dict[ir.TypeName, ir.Message] = {}
-    for endpoint in wanted.endpoints:
-        name = _type_name(endpoint, wanted.package, library, report)
-        source = name and library.source(name)
-        if not name or source is None:
-            continue
-        model = compile_package(name.package, [(name, source)], library, report)
-        if not report.had_errors:
-            interfaces.append(model.interfaces[name])
-            messages.update(model.messages)
-    return None if report.had_errors else plan(wanted, interfaces, messages)
-
-
-def _type_name(
-    endpoint: spec.Endpoint, own: str, library: Library, report: Report
-) -> ir.TypeName | None:
-    """Return the interface that `Name`, `package/Name` or `package/kind/Name` means here."""
-    kind: ir.Kind = spec.ROLES[endpoint.role]
-    parts = endpoint.type.split("/")
-    package_name = parts[0] if len(parts) > 1 else own
-    name = ir.TypeName(package_name, kind, parts[-1])
-    fits = len(parts) <= 2 or (len(parts) == 3 and parts[1] == kind)
-    if fits and library.source(name) is not None:
-        return name
-    known = [str(one) for one in library.interfaces(package_name) if one.kind == kind]
-    hint = did_you_mean(str(name), known)
-    if package_name == own:
-        hint = hint or f"write it with `idlc scaffold interface {kind} {parts[-1]} FIELD...`"
-    hint = hint or did_you_mean(package_name, library.packages())
-    article = {"msg": "message", "srv": "service", "action": "action"}[kind]
-    message = f"no such {article}: `{endpoint.type}`"
-    report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
-    return None
-
-
-def _support(project: Project, own: str) -> dict[str, str]:
-    """Return the files that nodes need beside them and that their package lacks."""
-    plain = package_files.Package(own, "", "", "", "Apache-2.0")
-    found = {}
-    if not _there(project, "test/conftest.py"):
-        template = "scaffold_conftest.py.jinja"
-        found["test/conftest.py"] = package_files.rendered(template, plain)
-    if not _there(project, f"{own}/__init__.py"):
-        found[f"{own}/__init__.py"] = ""
-    return found
-
-
-def _edits(project: Project, planned: Plan, added: dict[str, str]) -> list[tuple[str, Outcome]]:
-    """Return the edits of the package's own files; new launch files go to `added`."""
-    from idlc.scaffold import console_script, launch_py
-
-    own, name = planned.node.package, planned.node.name
-    texts = {
-        path: text
-        for path in ("pyproject.toml", "setup.cfg", "setup.py")
-        if (text := project.text(path)) is not None
-    }
-    edits = [console_script.add_script(texts, Script(name, f"{own}.{name}:main"))]
-    tests = ["python3-pytest", *(["lifecycle_msgs"] if planned.node.lifecycle else [])]
-    edits += _manifest(project, planned.packages, tests, group=False)
-    launch = _launch_file(project, own)
-    text = project.text(launch)
-    if text is None:
-        plain = package_files.Package(own, "", "", "", "Apache-2.0")
-        made = launch_py.add_node(
-            package_files.rendered("scaffold_launch.py.jinja", plain), own, name
-        )
-        assert isinstance(made, Edited)
-        added[launch] = made.text
-    else:
-        edits.append((launch, launch_py.add_node(text, own, name)))
-    return edits
-
-
-def _launch_file(project: Project, own: str) -> str:
-    """Return the launch file that lists the package's nodes."""
-    found = [name for name in project.names("launch") if name.endswith("launch.py")]
-    preferred = [f"{own}_launch.py", f"{own}.launch.py"]
-    for name in (*preferred, *(found if len(found) == 1 else ())):
-        if name in found:
-            return f"launch/{name}"
-    return f"launch/{preferred[0]}"
-
-
-def _manifest(
+def manifest_edit(
     project: Project, depends: Sequence[str], tests: Sequence[str], *, group: bool
 ) -> list[tuple[str, Outcome]]:
+    """Return the edit that adds the dependencies that a package.xml lacks."""
     text = project.text(MANIFEST) or ""
     return [(MANIFEST, package_xml.add(text, depends=depends, tests=tests, group=group))]
 
 
-def _accepted(
+def accepted(
     project: Project, edits: Sequence[tuple[str, Outcome]], report: Report
 ) -> dict[str, str] | None:
     """Return the edited texts; report IDL621 for each refusal and return `None`."""
@@ -273,13 +152,14 @@ def _accepted(
     return None if report.had_errors else edited
 
 
-def _write(
+def write(
     project: Project,
     added: dict[str, str],
     edited: dict[str, str],
     settings: Settings,
     report: Report,
 ) -> Result | None:
+    """Write all files or none, or show what that would change; `None` after a problem."""
     found = project.plan(added, edited)
     if found is None or report.had_errors:
         return None

@@ -28,10 +28,10 @@ def add_script(text: str, script: Script) -> Outcome:
     if module is None:
         return _refusal(script, "this is not valid Python")
     known = constants(module)
-    found = _strings(module, known)
+    found = strings(module, known)
     if any(script.same(one) for one in found):
         return Edited(text)
-    calls = _setup_calls(module)
+    calls = setup_calls(module)
     if len(calls) != 1:
         return _refusal(script, f"there are {len(calls) or 'no'} calls of setup()")
     change = _edit(module, calls[0], script, known)
@@ -45,7 +45,7 @@ def add_script(text: str, script: Script) -> Outcome:
 def _checked(text: str, script: Script, before: list[str]) -> Outcome:
     """Return the edited text if it is sound: valid, with the entry, nothing lost."""
     module = parsed(text)
-    after = _strings(module, constants(module)) if module else []
+    after = strings(module, constants(module)) if module else []
     if not any(script.same(line) for one in after for line in one.splitlines()):
         return _refusal(script, "the entry points are written in a way that idlc does not know")
     lost = set(_lines(before)) - set(_lines(after))
@@ -62,7 +62,7 @@ def _refusal(script: Script, why: str) -> Refused:
     return Refused(why, f"'{script.line}',", WHERE)
 
 
-def _strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
+def strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
     """Return every string of a module that can be read off the source."""
     found: list[str] = []
 
@@ -78,7 +78,7 @@ def _strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
     return found
 
 
-def _setup_calls(module: cst.Module) -> list[cst.Call]:
+def setup_calls(module: cst.Module) -> list[cst.Call]:
     """Return the calls of setuptools' function, however it was imported."""
     names = {"setup"}
     found: list[cst.Call] = []

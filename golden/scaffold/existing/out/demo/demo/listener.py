@@ -1,0 +1,52 @@
+"""The node listener listens to chatter."""
+
+# Only some of the functions of rclpy have types.
+# mypy: disallow-untyped-calls=False
+
+from __future__ import annotations
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.utilities import ok, try_shutdown
+from std_msgs.msg import String
+
+
+class Listener(Node):
+    """The node listener listens to chatter."""
+
+    def __init__(self) -> None:
+        """Create what the node consists of."""
+        super().__init__('listener')
+        self.chatter_subscription = self.create_subscription(
+            String,
+            'chatter',
+            self.receive_chatter,
+            10,
+        )
+
+    def receive_chatter(self, message: String) -> None:
+        """Act on a message from chatter."""
+        self.get_logger().info(f'chatter: data={message.data!r}')
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node until it is asked to end."""
+    try:
+        rclpy.init(args=args)
+        executor = SingleThreadedExecutor()
+        node = Listener()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except Exception:
+        if ok():
+            raise
+        # otherwise it was asked to end before it was complete
+    finally:
+        try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

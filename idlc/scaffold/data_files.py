@@ -1,0 +1,48 @@
+"""Adding files to the `data_files` of a setup.py, so that they are installed."""
+
+from __future__ import annotations
+
+import libcst as cst
+
+from idlc.scaffold.edit import Edited, Outcome, Refused
+from idlc.scaffold.python_text import appended, constants, parsed, quoted
+from idlc.scaffold.setup_py import setup_calls, strings
+
+WHERE = "to `data_files` in the call of setup()"
+
+
+def add_launch(text: str, package: str, path: str) -> Outcome:
+    """Return a setup.py that installs a launch file.
+
+    One that names `launch` anywhere does so already; one without `data_files` installs none.
+    """
+    line = f"('share/{package}/launch', ['{path}']),"
+    module = parsed(text)
+    if module is None:
+        return Refused("this is not valid Python", line, WHERE)
+    if any("launch" in one for one in strings(module, constants(module))):
+        return Edited(text)
+    calls = setup_calls(module)
+    given = [
+        arg.value
+        for call in calls
+        for arg in call.args
+        if arg.keyword and arg.keyword.value == "data_files"
+    ]
+    if not given:
+        return Edited(text)
+    listed = [value for value in given if isinstance(value, cst.List)]
+    if len(calls) != 1 or len(listed) != 1:
+        return Refused("the data files are not written out as a list", line, WHERE)
+    like = [part for element in listed[0].elements for part in _literals(element.value)]
+    folder, file = (quoted(one, like).value for one in (f"share/{package}/launch", path))
+    new = cst.Element(cst.parse_expression(f"({folder}, [{file}])"))
+    changed = module.deep_replace(listed[0], appended(listed[0], new))
+    assert isinstance(changed, cst.Module)
+    return Edited(changed.code)
+
+
+def _literals(value: cst.BaseExpression) -> list[cst.BaseExpression]:
+    if isinstance(value, cst.Tuple):
+        return [element.value for element in value.elements]
+    return []
