@@ -41,7 +41,9 @@ def main(args: list[str] | None = None) -> None:
         executor = SingleThreadedExecutor()
         node = AddTwoIntsServer()
         executor.add_node(node)
-        executor.spin()
+        # a signal that comes while rclpy starts can fail to wake it, so it waits a second at most
+        while ok():
+            executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
