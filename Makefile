@@ -18,7 +18,7 @@ KILTED_ENV := .venv/kilted-$(TAG)
 DEMO_ENV := .venv/demo-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
-SELECTION := $(if $(filter no,$(ROS)),-m "not ros")
+SELECTION := $(if $(filter no,$(ROS)),--ignore=tests/ros)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # Nothing that we run leaves this machine.
@@ -55,7 +55,7 @@ test-lowest: ## run the tests that need no ROS with the lowest versions that idl
 	@$(PYTHON) -m venv .venv/lowest-$(TAG)
 	@$(PYTHON) tests/lowest.py test > .venv/lowest-$(TAG)/versions.txt
 	@.venv/lowest-$(TAG)/bin/python $(PIP_INSTALL) --editable '.[test]' --constraint .venv/lowest-$(TAG)/versions.txt
-	.venv/lowest-$(TAG)/bin/python -m pytest -n 2 --dist worksteal -m "not ros" $(ARGS)
+	.venv/lowest-$(TAG)/bin/python -m pytest -n 2 --dist worksteal --ignore=tests/ros $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \

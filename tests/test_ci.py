@@ -170,8 +170,10 @@ def test_the_gitlab_snippet(here, text, status):
 
 
 def run_pytest(*words):
+    # an installed idlc brings the plugin itself, and it can be there only once
     plugin = ["-p", "idlc.cli.pytest_plugin", "-p", "no:cacheprovider"]
-    return run(sys.executable, "-m", "pytest", *plugin, "-q", "-c", "/dev/null", *words)
+    words = ("-q", "-c", "/dev/null", *words)
+    return run(sys.executable, "-m", "pytest", *plugin, *words, PYTEST_DISABLE_PLUGIN_AUTOLOAD="1")
 
 
 @pytest.mark.usefixtures("here")

@@ -20,7 +20,8 @@ from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Edit, Severity
 from idlc.text.source import Source, Span
 
-_REMARK = re.compile(r"idlc:\s*ignore\s*[\[(]\s*([^\])]*?)\s*[\])]\s*(.*)")
+# the lengths are bounded, or a long comment without an end would take for ever
+_REMARK = re.compile(r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)")
 
 
 class Remark(NamedTuple):

@@ -5,12 +5,16 @@ from __future__ import annotations
 import msgspec
 
 from idlc.checks.scope import sections
-from idlc.checks.units import BRACKETS, REMARK, is_unit
+from idlc.checks.units import REMARK, is_unit
 from idlc.model import ir
+from idlc.model.comments import brackets
 from idlc.model.link import Model
 from idlc.text import codes
 from idlc.text.diagnostics import Edit, Report
 from idlc.text.source import Span
+
+#: Pairs of brackets that a message names.
+SHOWN = 5
 
 
 def wide_strings(model: Model, report: Report) -> None:
@@ -82,14 +86,15 @@ def several_units(model: Model, report: Report) -> None:
     for message in sections(model):
         for field in message.fields:
             text = "\n".join(field.comment)
-            found = BRACKETS.findall(text)
-            meant = any(is_unit(one[1:-1]) for one in found)
+            found = [inside for _, inside in brackets(text)]
+            meant = any(map(is_unit, found))
             if len(found) > 1 and meant and field.unit is None and field.name_span:
                 report.add(
                     codes.SEVERAL_UNITS.at(
                         field.name_span,
                         f"`{field.name}` has no unit for ROS 2, because its comment has several "
-                        f"pairs of brackets: {', '.join(found)}",
+                        f"pairs of brackets: {', '.join(f'[{one}]' for one in found[:SHOWN])}"
+                        + (f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""),
                         hint="write the remark with round ones, as in `ignore(IDL405)`"
                         if REMARK.search(text)
                         else "keep brackets for the unit alone",

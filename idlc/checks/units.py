@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from itertools import islice
 
 from idlc.model import ir
+from idlc.model.comments import brackets
 
-BRACKETS = re.compile(r"\[[^,\]]+\]")
-REMARK = re.compile(r"idlc:\s*ignore\[[^\]]*\]")
+# the lengths are bounded, or a long comment without an end would take for ever
+REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")
 
 #: Words of a field's name that ask for a unit, and the unit.
 QUANTITIES = {
@@ -115,8 +117,9 @@ def unit_of(field: ir.Field) -> str | None:
     """
     if field.unit is not None and not field.unit.startswith("IDL"):
         return field.unit
-    found = BRACKETS.findall(REMARK.sub("", "\n".join(field.comment)))
-    return found[0][1:-1] if len(found) == 1 else None
+    pairs = brackets(REMARK.sub("", "\n".join(field.comment)))
+    found = [inside for _, inside in islice(pairs, 2)]
+    return found[0] if len(found) == 1 else None
 
 
 def is_unit(text: str) -> bool:

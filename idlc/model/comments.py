@@ -28,7 +28,9 @@ def condense(lines: Sequence[str]) -> Comment:
         return Comment()
     unit: str | None = None
     kept = list(lines)
-    found = list(islice(_units("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
+    found = (
+        list(islice(brackets("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
+    )
     if len(found) == 1:
         whole, unit = found[0]
         kept = [line.replace(whole, "") for line in kept]
@@ -38,8 +40,11 @@ def condense(lines: Sequence[str]) -> Comment:
     return Comment(tuple(textwrap.dedent("\n".join(kept)).split("\n")) if kept else (), unit)
 
 
-def _units(text: str) -> Iterator[tuple[str, str]]:
-    r"""Yield what `(\s*\[([^,\]]+)\])` finds in `text`, looking at each character once."""
+def brackets(text: str) -> Iterator[tuple[str, str]]:
+    r"""Yield what `(\s*\[([^,\]]+)\])` finds in `text`, looking at each character once.
+
+    These may be units: the whole with the blanks before it, and what stands between the brackets.
+    """
     behind = 0
     at = text.find("[")
     while at >= 0 and (end := _UNIT_END.search(text, at)):
