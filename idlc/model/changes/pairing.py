@@ -5,7 +5,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
 
 class Named(Protocol):
@@ -19,7 +20,8 @@ class Named(Protocol):
 T = TypeVar("T", bound=Named)
 
 
-class Pairing(NamedTuple, Generic[T]):
+@dataclass(frozen=True)
+class Pairing(Generic[T]):
     """`kept` pairs have one name, `renamed` ones two; `moved` are names of kept elements."""
 
     kept: list[tuple[T, T]]
