@@ -16,6 +16,7 @@ from pathlib import Path
 
 import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from same.msg import Thing
@@ -86,7 +87,8 @@ def eight_by_eight(count):
     publishers = [node.create_publisher(Thing, "things", QOS) for _ in range(SIDES)]
     for publisher in publishers:
         eventually(lambda one=publisher: one.get_subscription_count() == SIDES)
-    spinning = threading.Thread(target=executor.spin)
+    over = threading.Event()
+    spinning = threading.Thread(target=spin_on, args=(executor, over))
     spinning.start()
     chance = random.Random(1)
     total = int(count)
@@ -111,9 +113,19 @@ def eight_by_eight(count):
     eventually(lambda: all(one.received == sum(published) for one in steady))
     assert not any(one.problems for one in listeners)
     assert memory[-1] - memory[4] < 6, memory
-    executor.shutdown()
+    over.set()
     spinning.join()
+    executor.shutdown()
     print(sum(published), sum(one.deaths for one in listeners))
+
+
+def spin_on(executor, over):
+    """Spin until `over`; rclpy's executor stumbles over what is destroyed while it looks for work."""
+    while not over.is_set():
+        try:
+            executor.spin_once(timeout_sec=0.5)
+        except InvalidHandle:
+            continue
 
 
 def ends_within_a_callback(how):
