@@ -120,7 +120,7 @@ def eight_by_eight(count):
 
 
 def spin_on(executor, over):
-    """Spin until `over`; rclpy's executor stumbles over what is destroyed while it looks for work."""
+    """Spin until `over`; the executor stumbles over what is destroyed while it looks for work."""
     while not over.is_set():
         try:
             executor.spin_once(timeout_sec=0.5)
