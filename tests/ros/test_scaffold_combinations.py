@@ -16,7 +16,7 @@ from nodes import nodes
 from idlc.cli.main import main
 
 SEED = int(os.environ.get("IDLC_SEED", "4"))
-COUNT = 100
+COUNT = 100 if os.environ.get("IDLC_LONG") else 30
 AT_ONCE = 5
 TYPES = {
     "msg": (

@@ -46,7 +46,10 @@ def main(args: list[str] | None = None) -> None:
             raise
         # otherwise it was asked to end before it was complete
     finally:
-        try_shutdown()
+        try:
+            try_shutdown()
+        except RuntimeError:
+            pass  # the signal that ended the node is shutting rclpy down at this very moment
 
 
 if __name__ == '__main__':
