@@ -54,6 +54,10 @@ def start(sides, ros_environment):
         process.communicate()
 
 
+@pytest.mark.skipif(
+    "IDLC_LONG" not in os.environ,
+    reason="for `make soak`: rclpy's own executor can stumble over a subscription that dies",
+)
 def test_eight_publishers_and_eight_subscribers_that_die(start):
     out, complaints = (process := start("eight_by_eight", MESSAGES)).communicate(timeout=TIMEOUT)
     assert (process.returncode, complaints) == (0, "")
