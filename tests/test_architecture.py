@@ -34,7 +34,7 @@ READS_ITS_OWN = {"idlc/emit/render.py", "idlc/scaffold/package.py"}
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
 RUNTIME_ON_DEMAND = {"numpy", "rclpy", "rosidl_parser"}
 #: The runtime modules that import numpy at once, and that no other imports at once.
-RUNTIME_WITH_NUMPY = {"arrays"}
+RUNTIME_WITH_NUMPY = {"arrays", "columns"}
 
 MODULE_BUDGET = 300
 FUNCTION_BUDGET = 40

@@ -8,6 +8,7 @@ import pytest
 import values
 
 PRIMITIVES = list(plain_cdr.CODES)
+NUMERIC = [name for name in PRIMITIVES if "int" in name or "float" in name]
 SEEDS = range(60)
 PER_SEED = 6
 
@@ -21,6 +22,8 @@ def random_package(rng):
             name = f"f{number}"
             element = rng.choice([*PRIMITIVES, "string", "string", "wstring", *shapes, *shapes])
             suffix, size = rng.choice([("", 0), ("", 0), ("[]", None), ("[<=5]", None), ("[3]", 3)])
+            if element in NUMERIC and rng.random() < 0.05:
+                suffix, size = ("[1040]", 1040)  # larger than what goes through a Struct
             lines.append(f"{element}{suffix} {name}\n")
             type_ = shapes.get(element, element)
             shape.append((name, (type_, size) if suffix else type_))
@@ -54,6 +57,11 @@ def test_any_layout_is_written_and_read_as_cdr_says(packages, seed):
                 assert raw.hex() == plain_cdr.encode(shape, plain, order).hex()
                 assert cls.deserialize(raw) == message
                 assert cls.deserialize(memoryview(raw + b"\0\0\0")) == message
+                viewed = cls.deserialize(raw, copy=False)
+                assert viewed == message
+                assert viewed == cls.deserialize(bytearray(raw), copy=False)
+                assert viewed.to_dict() == plain
+                assert viewed.serialize(byteorder=order) == raw
             assert b"".join(cls._codec_("<").encode(message)) == message.serialize()
 
 

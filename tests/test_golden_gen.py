@@ -147,6 +147,10 @@ full: int = Gauge.FULL
 rate_default: float = Gauge.RATE__DEFAULT
 assert_type(Gauge.deserialize(gauge.serialize()), Gauge)
 assert_type(Gauge.deserialize(bytearray()), Gauge)
+assert_type(Gauge.deserialize(b"", copy=False), Gauge)
+assert_type(Gauge.deserialize_many([b"", bytearray()], copy=False), list[Gauge])
+assert_type(Gauge.serialize_many(gauge for _ in range(3)), list[bytes])
+print(Gauge.to_columns([gauge.serialize()])["value"].mean())
 assert_type(Gauge.from_dict(gauge.to_dict()), Gauge)
 assert_type(dataclasses.replace(gauge, level=3, samples=[1]), Gauge)
 assert_type(Gauge.get_fields_and_field_types(), dict[str, str])

@@ -1,9 +1,10 @@
 """From a layout to the statements that read it.
 
 Numbers that follow each other are read by one precompiled Struct. A Struct and an index check
-their own bounds; before a sequence is read, its size is compared with the bytes that are left,
-so nothing is allocated that the buffer does not hold. Any failure is explained afterwards, by
-the runtime.
+their own bounds; a slice that ends behind the buffer's end is shorter, and whatever is read next,
+or a check at the end, fails. Before structures are made, their least size is compared with the
+bytes that are left: nothing is allocated that the buffer does not hold. Any failure is explained
+afterwards, by the runtime.
 """
 
 from __future__ import annotations
@@ -14,12 +15,9 @@ from idlc.emit import layout
 from idlc.emit.code import Block, Line, Statement
 from idlc.emit.cursor import Cursor
 from idlc.emit.encode import block_code
-from idlc.emit.pretty import Group, Node, call
+from idlc.emit.pretty import Comprehension, Group, Node, call
 from idlc.emit.tables import Tables
 from idlc.model import ir
-
-#: Up to this size slices of bytes are faster than slices of a memoryview.
-SMALL = 4096
 
 TOO_SHORT = (Line('raise ValueError("too short")'),)
 UNENDED = (Line('raise ValueError("text without end")'),)
@@ -27,9 +25,11 @@ TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
 def is_bulk(steps: tuple[layout.Step, ...]) -> bool:
-    """Whether a structure holds numeric sequences, which are read through a memoryview."""
+    """Whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
-        isinstance(step, layout.Numbers) or (isinstance(step, layout.Items) and is_bulk(step.body))
+        isinstance(step, layout.Numbers)
+        or (isinstance(step, layout.Block) and step.is_large)
+        or (isinstance(step, layout.Items) and is_bulk(step.body))
         for step in steps
     )
 
@@ -46,11 +46,12 @@ def decode(
     for step in steps:
         decoder.step(step)
     decoder.flush(last=True)
+    decoder.finish()
     first = []
+    if decoder.limited or decoder.source == "view":
+        first.append(Line("len(data)", "limit"))
     if decoder.source == "view":
-        first.append(Line(f"data if limit < {SMALL} else memoryview(data)", "view"))
-    if decoder.limited:
-        first.insert(0, Line("len(data)", "limit"))
+        first.append(Line(f"data if limit < {tables.small()} else memoryview(data)", "view"))
     return (*first, *decoder.body, Line("return message"))
 
 
@@ -94,10 +95,13 @@ class _Decoder:
         self.here = Cursor()
         self.run = _Run()
         self.limited = False
+        self.unchecked = False
 
     def step(self, step: layout.Step) -> None:
         """Emit one step."""
         match step:
+            case layout.Block() if step.is_large:
+                self.block(step)
             case layout.Number() | layout.Dummy() | layout.Block():
                 self.fixed(step, self.run)
             case layout.Enter(place, type_):
@@ -105,7 +109,7 @@ class _Decoder:
             case layout.Text(place, wide):
                 self.line(self.wide_text() if wide else self.text(), place.text)
             case layout.Bytes(place, primitive, bound):
-                name = "read_flags" if primitive == "bool" else "read_octets"
+                name = f"read_{layout.LIST_PRIMITIVES[primitive]}"
                 raw = self.buffer(self.count(bound), 1, 1, self.source)
                 self.line(call(self.tables.function(name, name), raw), place.text)
             case layout.Numbers():
@@ -143,6 +147,7 @@ class _Decoder:
         run, self.run = self.run, _Run()
         if not run.fields:
             return
+        self.unchecked = False
         widest = max(align for align, _ in run.sizes)
         if run.sizes[0][0] == widest:
             self.align(widest)
@@ -211,7 +216,7 @@ class _Decoder:
         self.line(f"{self.here.text(-1)} + size", "end")
         self.body.append(Block("if data[end]:", UNENDED))
         self.here = Cursor("end", 1, 1, 0)
-        return call("text", f"data{slice_of(start)}")
+        return call(self.tables.text(), f"data{slice_of(start)}")
 
     def wide_text(self) -> Node:
         """Read the size of a wstring; return the expression that reads the wstring."""
@@ -220,17 +225,25 @@ class _Decoder:
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
 
     def buffer(self, count: str, align: int, size: int, source: str) -> str:
-        """Check that `count` elements are there; return their slice, and go behind it."""
+        """Return the slice of `count` elements, and go behind it.
+
+        It is shorter if the buffer is, which whatever is read next notices.
+        """
         if not self.here.aligned(align):
             self.settle(Cursor("at", 0))
             self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
             self.here = self.here.known(4, 0)
         start = self.start()
         self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
-        self.short_if("end > limit")
+        self.unchecked = True
         modulus = min(self.here.modulus, size & -size)
         self.here = self.here.at("end").known(modulus, self.here.residue)
         return f"{source}{slice_of(start)}"
+
+    def finish(self) -> None:
+        """Emit the check that nothing after the last buffer makes."""
+        if self.unchecked:
+            self.short_if(f"{self.here.text()} > limit")
 
     def short_if(self, condition: str) -> None:
         """Emit a check that the buffer is long enough."""
@@ -238,38 +251,35 @@ class _Decoder:
         self.body.append(Block(f"if {condition}:", TOO_SHORT))
 
     def numbers(self, step: layout.Numbers) -> None:
-        """Read a numeric sequence: a copy of an empty array, filled from the buffer."""
-        local = step.place.local
+        """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
-        self.line(f"{self.tables.empty_array(step)}[:]", local)
-        self.line(call(f"{local}.frombytes", raw))
-        if step.unit > 1:
-            swapped = (Line(f"{local}.byteswap()"),)
-            self.body.append(Block(f"if {self.tables.swap()}:", swapped))
-        self.line(local, step.place.text)
+        self.line(call(self.tables.sequence_reader(step), raw), step.place.text)
 
-    def begin(self, step: layout.Texts | layout.Items, least: int) -> str:
-        """Read the count and check that so many can be there, or return the size."""
-        if step.size is not None:
-            self.flush()
-            count = str(step.size)
-        else:
-            count = self.count(step.bound)
-            wanted = count if least == 1 else f"{least} * {count}"
-            if least:
-                self.short_if(f"{self.here.text()} + {wanted} > limit")
-        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
-        self.line(step.place.local, step.place.text)
-        return count
+    def block(self, step: layout.Block) -> None:
+        """Read a large array of fixed size as one buffer."""
+        self.flush()
+        self.align(step.unit)
+        start, end = self.here.text(), self.here.text(step.size)
+        self.short_if(f"{end} > limit")
+        self.here = self.here.skip(step.size)
+        reader = self.tables.block_reader(step)
+        self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
+
+    def begin(self, step: layout.Texts | layout.Items) -> str:
+        """Read the count, or return the size."""
+        if step.size is None:
+            return self.count(step.bound)
+        self.flush()
+        return str(step.size)
 
     def texts(self, step: layout.Texts) -> None:
         """Read an array or sequence of strings."""
-
-        def element() -> None:
-            value = self.wide_text() if step.wide else self.text()
-            self.line(call(f"{step.place.local}.append", value))
-
-        self.loop(f"for _ in range({self.begin(step, 4)}):", element)
+        count = self.begin(step)
+        self.align(4)
+        reader = self.tables.texts_reader(step)
+        texts = call(reader, "data", self.here.text(), count)
+        self.line(texts, Group("", (step.place.text, "end")))
+        self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
 
     def items(self, step: layout.Items) -> None:
         """Read an array or sequence of structures."""
@@ -279,18 +289,25 @@ class _Decoder:
             return
 
         def element() -> None:
-            self.line(f"{self.makers[step.type]}()", step.item)
-            self.line(call(f"{step.place.local}.append", step.item))
             for part in step.body:
                 self.step(part)
             self.flush()
 
-        count = self.begin(step, layout.smallest(step.body))
-        self.loop(f"for _ in range({count}):", element)
+        count = self.begin(step)
+        if step.size is None:
+            least = layout.smallest(step.body)
+            wanted = count if least == 1 else f"{least} * {count}"
+            self.short_if(f"{self.here.text()} + {wanted} > limit")
+        empty = Comprehension(f"{self.makers[step.type]}()", f"for _ in range({count})")
+        self.line(empty, step.place.local)
+        self.line(step.place.local, step.place.text)
+        self.loop(f"for {step.item} in {step.place.local}:", element)
 
     def rows(self, step: layout.Items, repeat: layout.Fixed) -> None:
         """Read structures of constant size: one Struct yields the values of each."""
-        count = self.begin(step, 0)
+        count = self.begin(step)
+        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
+        self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
         run = _Run()
@@ -319,6 +336,7 @@ class _Decoder:
         Between two rounds the position is in `at`, or in `end` if the body ends with a string.
         """
         outside, entry = self.body, self.here
+        unchecked = self.unchecked
         first = entry.at("at")
         while True:
             mark = self.tables.mark()
@@ -337,10 +355,11 @@ class _Decoder:
         self.settle(first)
         self.body.append(loop)
         self.here = first
+        self.unchecked |= unchecked
 
 
-def slice_of(start: str) -> str:
-    """Return the slice from an expression to `end`."""
-    if start.isidentifier() or start.isdigit():
-        return f"[{start}:end]"
-    return f"[{start} : end]"
+def slice_of(start: str, end: str = "end") -> str:
+    """Return the slice from one expression to another."""
+    if " " in start + end:
+        return f"[{start} : {end}]"
+    return f"[{start}:{end}]"

@@ -58,13 +58,10 @@ class _Encoder:
     def step(self, step: layout.Step) -> None:
         """Emit one step."""
         match step:
-            case layout.Number(place, letter, size):
-                self.field(letter, size, size, place.text)
-            case layout.Dummy():
-                self.field("x", 1, 1)
-            case layout.Block(place, primitive, count):
-                value = call(self.tables.block_writer(step), place.text)
-                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
+            case layout.Block() if step.is_large:
+                self.block(step)
+            case layout.Number() | layout.Dummy() | layout.Block():
+                self.fixed(step)
             case layout.Enter(place):
                 if not step.empty:
                     self.line(place.text, place.local)
@@ -75,7 +72,7 @@ class _Encoder:
                 else:
                     self.text(place)
             case layout.Bytes(place, primitive, bound):
-                function = "flags" if primitive == "bool" else "octets"
+                function = layout.LIST_PRIMITIVES[primitive]
                 writer = self.tables.function(function, function)
                 self.buffer(place, call(writer, place.text), 1, bound)
             case layout.Numbers():
@@ -95,6 +92,17 @@ class _Encoder:
         self.body.append(code.Put(part, names))
 
     # Values of fixed size, and one text among them, gather in a frame.
+
+    def fixed(self, step: layout.Step) -> None:
+        """Add a value of fixed size to the frame."""
+        match step:
+            case layout.Number(place, letter, size):
+                self.field(letter, size, size, place.text)
+            case layout.Block(place, primitive, count):
+                value = call(self.tables.block_writer(step), place.text)
+                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
+            case _:
+                self.field("x", 1, 1)
 
     def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
         """Add a value to the frame."""
@@ -156,7 +164,15 @@ class _Encoder:
             words = value.replace("(", " ").split()
             self.body.append(code.Note(target, value, frozenset({"at", "low"} & set(words))))
 
-    # Values of variable size are parts of their own.
+    # Values of variable or large size are parts of their own.
+
+    def block(self, step: layout.Block) -> None:
+        """Emit a large array of fixed size."""
+        self.flush(step.unit)
+        self.pad(step.unit)
+        self.put(call(self.tables.buffer_writer(step), step.place.text))
+        self.here.advance(step.size)
+        self.settle()
 
     def check(self, condition: str, problem: str) -> None:
         """Emit a check; `validate` finds the field and the words afterwards."""
@@ -241,7 +257,7 @@ class _Encoder:
         self.flush(1 if step.size is None else repeat.align)
         inner = _Encoder(self.tables, Position(8, 4))
         for part in inlined(step):
-            inner.step(part)
+            inner.fixed(part)
         writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
         row = Group(writer, tuple(inner.frame.values))
         block = self.tables.local(f"{local}_block")

@@ -61,6 +61,11 @@ class Block(msgspec.Struct, frozen=True):
         """Bytes of all."""
         return self.unit * self.count
 
+    @property
+    def is_large(self) -> bool:
+        """Whether moving the bytes once more would be noticed: it is a buffer of its own."""
+        return self.size > LARGE
+
 
 class Text(msgspec.Struct, frozen=True):
     """A string or wstring."""
@@ -127,7 +132,10 @@ Step: TypeAlias = Number | Dummy | Block | Text | Numbers | Bytes | Texts | Ente
 
 #: The struct character where it is not the one of PRIMITIVES.
 CODES = {"bool": "?", "byte": "c"}
-LIST_PRIMITIVES = frozenset({"bool", "byte"})
+#: What is a list in Python, and the runtime's word for it.
+LIST_PRIMITIVES = {"bool": "flags", "byte": "octets"}
+#: From more than so many bytes on, a fixed-size array is not part of a Struct.
+LARGE = 1024
 
 
 def steps(message: ir.Message, messages: Messages, names: pynames.Locals) -> tuple[Step, ...]:

@@ -22,7 +22,7 @@ Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
     {"at", "count", "data", "decode", "encode", "end", "limit", "low", "message", "order"}
-    | {"parts", "put", "size", "struct", "text", "view"}
+    | {"parts", "put", "reading", "size", "struct", "view"}
 )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from idlc.emit import layout, pynames
-from idlc.emit.pretty import Group, Node
+from idlc.emit.pretty import Group, Node, call
 from idlc.model import ir
 
 
@@ -15,7 +15,6 @@ class Tables:
     def __init__(self, names: pynames.Locals) -> None:
         self._names = names
         self._made: dict[str, tuple[str, Node]] = {}
-        self._counts: dict[str, int] = {}
 
     @property
     def definitions(self) -> tuple[tuple[str, Node], ...]:
@@ -46,7 +45,8 @@ class Tables:
         """Return the name of an expression, made as `stem` and a number."""
         if key in self._made:
             return self._made[key][0]
-        number = 1 + sum(name.startswith(stem) for name, _ in self._made.values())
+        names = (name for name, _ in self._made.values())
+        number = 1 + sum(name.removeprefix(f"{stem}_").isdigit() for name in names)
         return self.define(f"{stem}_{number}", key, expression)
 
     def function(self, name: str, expression: str) -> str:
@@ -91,38 +91,56 @@ class Tables:
 
     def block_writer(self, step: layout.Block) -> str:
         """Return the function that turns a fixed-size array into bytes."""
-        return self._block(step, "writer")
+        if step.primitive in layout.LIST_PRIMITIVES:
+            kind = layout.LIST_PRIMITIVES[step.primitive]
+            name = f"{kind}_{step.count}"
+            return self.define(name, name, f"_idlc.{kind}_writer({step.count})")
+        return self._array("bytes", "array_writer", step)
+
+    def buffer_writer(self, step: layout.Block) -> str:
+        """Return the function that turns a fixed-size array into any kind of buffer."""
+        if step.primitive in layout.LIST_PRIMITIVES:
+            return self.block_writer(step)
+        return self._array("buffer", "buffer_writer", step)
 
     def block_reader(self, step: layout.Block) -> str:
         """Return the function that turns bytes into a fixed-size array."""
-        return self._block(step, "reader")
-
-    def _block(self, step: layout.Block, what: str) -> str:
         if step.primitive in layout.LIST_PRIMITIVES:
-            kind = "flags" if step.primitive == "bool" else "octets"
-            if what == "reader":
-                return self.function(f"read_{kind}", f"read_{kind}")
-            return self.define(
-                f"{kind}_{step.count}", f"{kind} {step.count}", f"_idlc.{kind}_writer({step.count})"
-            )
+            kind = layout.LIST_PRIMITIVES[step.primitive]
+            return self.function(f"read_{kind}", f"read_{kind}")
+        return self._array("array", "array_reader", step, "reading")
+
+    def _array(self, stem: str, function: str, step: layout.Block, *more: str) -> str:
         dtype = numpy_name(step.primitive)
-        expression = Group(f"_arrays.array_{what}", ("order", json.dumps(dtype), str(step.count)))
-        verb = "array" if what == "reader" else "bytes"
-        return self.define(f"{verb}_{dtype}_{step.count}", expression.flat(), expression)
+        expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
+        return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
 
     def sequence_writer(self, step: layout.Numbers) -> str:
         """Return the function that turns a sequence of numbers into a buffer."""
         expression = f'_idlc.sequence_writer(order, "{step.code}")'
         return self.define(f"buffer_{step.code}", expression, expression)
 
-    def empty_array(self, step: layout.Numbers) -> str:
-        """Return the name of an empty array, of which sequences are copies."""
-        expression = f'_idlc.array("{step.code}")'
-        return self.define(f"empty_{step.code}", expression, expression)
+    def sequence_reader(self, step: layout.Numbers) -> str:
+        """Return the function that turns a buffer into a sequence of numbers."""
+        expression = f'_idlc.sequence_reader(order, "{step.code}", reading)'
+        return self.define(f"numbers_{step.code}", expression, expression)
 
-    def swap(self) -> str:
-        """Return the name of the flag that numeric sequences are in the other byte order."""
-        return self.define("swap", "swap", "order != _idlc.NATIVE")
+    def texts_reader(self, step: layout.Texts) -> str:
+        """Return the function that reads an array of strings; one for each field."""
+        local = step.place.local
+        if step.wide:
+            expression = call("_idlc.wide_texts_reader", "order")
+        else:
+            expression = call("_idlc.texts_reader", "order", self.text())
+        return self.define(f"read_{local}", f"texts {local}", expression)
+
+    def text(self) -> str:
+        """Return the name of the function that makes a string of bytes."""
+        return self.define("text", "text", "reading.text")
+
+    def small(self) -> str:
+        """Return the name of the size up to which no view is worth its cost."""
+        return self.define("small", "small", "reading.small")
 
 
 def numpy_name(primitive: str) -> str:

@@ -142,10 +142,10 @@ def _message(
 def _codec_head(name: ir.TypeName) -> tuple[str, ...]:
     # with a suffix, or the codec of a message `Arrays` would hide the import `_arrays`
     function = f"def _{snake_case(name.name)}_codec"
-    head = f"{function}(order: str, text: _idlc.Text) -> _idlc.Codec:"
+    head = f"{function}(order: str, reading: _idlc.Reading) -> _idlc.Codec:"
     if len(head) <= WIDTH:
         return (head,)
-    return (f"{function}(", "    order: str, text: _idlc.Text", ") -> _idlc.Codec:")
+    return (f"{function}(", "    order: str, reading: _idlc.Reading", ") -> _idlc.Codec:")
 
 
 def _has_arrays(interface: ir.Interface) -> bool:

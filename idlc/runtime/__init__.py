@@ -27,10 +27,12 @@ from .cdr import (
     read_wide_text,
     text_block,
     text_phases,
+    texts_reader,
     wide_block,
     wide_text,
+    wide_texts_reader,
 )
-from .codec import Codec, Text, codec_for, maker
+from .codec import Codec, Reading, codec_for, maker
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
@@ -46,6 +48,7 @@ from .sequences import (
     UInt16Sequence,
     UInt32Sequence,
     UInt64Sequence,
+    sequence_reader,
     sequence_writer,
     to_array,
 )
@@ -76,8 +79,8 @@ __all__ = [
     "Int64Sequence",
     "Integers",
     "Message",
+    "Reading",
     "Service",
-    "Text",
     "Texts",
     "TypeAlias",
     "UInt8Sequence",
@@ -101,11 +104,14 @@ __all__ = [
     "read_flags",
     "read_octets",
     "read_wide_text",
+    "sequence_reader",
     "sequence_writer",
     "several",
     "text_block",
     "text_phases",
+    "texts_reader",
     "to_array",
     "wide_block",
     "wide_text",
+    "wide_texts_reader",
 ]

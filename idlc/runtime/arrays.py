@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from numpy.typing import ArrayLike, NDArray
+
+    from .codec import Reading
 
     Values: TypeAlias = ArrayLike
 
@@ -154,15 +157,39 @@ def array_writer(order: str, name: str, size: int) -> Callable[[Any], bytes]:
     return native if order == NATIVE or dtype.itemsize == 1 else swapped
 
 
-def array_reader(order: str, name: str, size: int) -> Callable[[bytes], Any]:
+def buffer_writer(order: str, name: str, size: int) -> Callable[[Any], Any]:
+    """Return a function that turns a field's value into a buffer, without a copy if it is one."""
+    dtype = np.dtype(name)
+    write = array_writer(order, name, size)
+
+    def native(values: Any) -> Any:
+        right = type(values) is np.ndarray and values.dtype is dtype
+        if right and values.shape == (size,) and values.flags.c_contiguous:
+            return values
+        return write(values)
+
+    return native if order == NATIVE or dtype.itemsize == 1 else write
+
+
+def view_reader(order: str, name: str) -> Callable[[Any], Any]:
+    """Return a function that makes an array over a buffer, in whichever byte order that is."""
+    dtype: Any = np.dtype(name)
+    return partial(np.frombuffer, dtype=dtype.newbyteorder(order))
+
+
+def array_reader(
+    order: str, name: str, size: int, reading: Reading
+) -> Callable[[Any], Any]:
     """Return a function that turns bytes of byte order `order` into a field's value."""
+    if not reading.copy:
+        return view_reader(order, name)
     dtype = np.dtype(name)
     ndarray = np.ndarray
 
-    def native(raw: bytes) -> Any:
+    def native(raw: Any) -> Any:
         return ndarray(size, dtype, bytearray(raw))
 
-    def swapped(raw: bytes) -> Any:
+    def swapped(raw: Any) -> Any:
         return ndarray(size, dtype, bytearray(raw)).byteswap()
 
     return native if order == NATIVE or dtype.itemsize == 1 else swapped
@@ -192,6 +219,8 @@ __all__ = [
     "array",
     "array_reader",
     "array_writer",
+    "buffer_writer",
     "to_ndarray",
+    "view_reader",
     "zeros",
 ]

@@ -157,6 +157,58 @@ def read_wide_text(order: str) -> Callable[[bytes], str]:
     return read
 
 
+def texts_reader(order: str, text: Callable[[Any], str]) -> Callable[..., Any]:
+    """Return a function that reads the strings of one field's arrays.
+
+    It takes a buffer, the position of the first string and their number, and returns them and
+    the position after them. What such arrays hold, names above all, is mostly the same in each
+    message of a stream, so the last one is kept: equal bytes are equal strings.
+    """
+    size_at = Struct(order + "I").unpack_from
+    last: tuple[int, bytes, list[str]] = (0, b"", [])
+
+    def read(data: Any, start: int, count: int) -> tuple[list[str], int]:
+        nonlocal last
+        known, raw, values = last
+        end = start + len(raw)
+        if count == known and data[start:end] == raw:
+            return values[:], end
+        values = []
+        zero = start - 1
+        for _ in range(count):
+            at = zero + 4 & -4
+            (size,) = size_at(data, at)
+            zero = at + 3 + size
+            if data[zero]:
+                raise ValueError("text without end")
+            values.append(text(data[at + 4 : zero]))
+        end = zero + 1
+        if end - start <= LONG_TEXT:
+            last = count, bytes(data[start:end]), values[:]
+        return values, end
+
+    return read
+
+
+def wide_texts_reader(order: str) -> Callable[..., Any]:
+    """Return the same for arrays of wstrings."""
+    size_at = Struct(order + "I").unpack_from
+    read_one = read_wide_text(order)
+
+    def read(data: Any, at: int, count: int) -> tuple[list[str], int]:
+        values = []
+        for _ in range(count):
+            (units,) = size_at(data, at)
+            end = at + 4 + 4 * units
+            if end > len(data):
+                raise ValueError("too short")
+            values.append(read_one(data[at + 4 : end]))
+            at = end
+        return values, at
+
+    return read
+
+
 def flags(values: Iterable[object]) -> bytes:
     """Return one byte per bool."""
     return bytes(map(bool, values))

@@ -21,6 +21,21 @@ Text = Callable[[Any], str]
 #: Takes a memoryview, too. Slower than `bytes.decode`.
 text_of_view: Text = partial(str, encoding="utf-8")
 
+
+class Reading(NamedTuple):
+    """How a decoder makes values: strings by `text`, numeric arrays as copies or as views."""
+
+    text: Text = bytes.decode
+    copy: bool = True
+
+    @property
+    def small(self) -> int:
+        """Up to this size of a message, slices of bytes are faster than those of a view."""
+        return 8192 if self.copy else 0
+
+
+COPYING = Reading()
+
 #: What decoding raises when a buffer is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 
@@ -42,24 +57,24 @@ class Codec(NamedTuple):
 class Codecs(Protocol):
     """Gives the codec of a byte order, making it on first use."""
 
-    def __call__(self, order: str, text: Text = bytes.decode) -> Codec:
-        """Return the codec whose `decode` makes strings by `text`."""
+    def __call__(self, order: str, reading: Reading = COPYING) -> Codec:
+        """Return the codec whose `decode` makes values as `reading` says."""
         ...
 
 
-Make = Callable[[str, Text], Codec]
+Make = Callable[[str, Reading], Codec]
 
 
 def codec_for(kind: Any) -> Callable[[Make], Make]:
     """Return a decorator that gives a message class the function that makes its codecs."""
 
     def give(make: Make) -> Make:
-        made: dict[tuple[str, Text], Codec] = {}
+        made: dict[tuple[str, Reading], Codec] = {}
 
-        def codecs(order: str, text: Text = bytes.decode) -> Codec:
-            found = made.get((order, text))
+        def codecs(order: str, reading: Reading = COPYING) -> Codec:
+            found = made.get((order, reading))
             if found is None:
-                found = made[order, text] = make(order, text)
+                found = made[order, reading] = make(order, reading)
             return found
 
         kind._codec_ = staticmethod(codecs)
@@ -90,7 +105,7 @@ def install(kind: type[Message]) -> None:
     encode, decode, _ = codecs("<")
     join = b"".join
 
-    def serialize(self: Any, *, byteorder: str = "little") -> bytes:
+    def serialize(self: Any, byteorder: str = "little") -> bytes:
         try:
             if byteorder == "little":
                 return join(encode(self))
@@ -98,11 +113,11 @@ def install(kind: type[Message]) -> None:
         except Exception as error:
             raise encode_error(self, byteorder, error) from error
 
-    def deserialize(buffer: Any) -> Any:
+    def deserialize(buffer: Any, copy: bool = True) -> Any:
         try:
-            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0] and copy:
                 return decode(buffer)
-            return read(codecs, buffer)
+            return read(codecs, buffer, copy)
         except FAILURES as error:
             failure = error
         return recover(owner, buffer, failure)
@@ -113,20 +128,22 @@ def install(kind: type[Message]) -> None:
     owner.deserialize = staticmethod(deserialize)
 
 
-def read(codecs: Codecs, buffer: Any) -> Any:
+def read(codecs: Codecs, buffer: Any, copy: bool = True) -> Any:
     """Return a message from any buffer, in either byte order."""
+    text: Text = bytes.decode
     if type(buffer) is not bytes:
-        buffer = memoryview(buffer).cast("B")
+        view = memoryview(buffer).cast("B")
         if codecs(NATIVE).bulk:
-            return codecs(order_of(buffer), text_of_view).decode(buffer)
-        buffer = bytes(buffer)
-    return codecs(order_of(buffer)).decode(buffer)
+            text, buffer = text_of_view, view.toreadonly()
+        else:
+            buffer = bytes(view)
+    return codecs(order_of(buffer), Reading(text, copy)).decode(buffer)
 
 
-def read_as_subclass(kind: Any, buffer: Any) -> Any:
+def read_as_subclass(kind: Any, buffer: Any, *, copy: bool = True) -> Any:
     """Return a message of a user's subclass."""
     owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
-    message = owner.deserialize(buffer)
+    message = owner.deserialize(buffer, copy=copy)
     result = kind.__new__(kind)
     for slot in owner.__slots__:
         setattr(result, slot, getattr(message, slot))
@@ -170,4 +187,4 @@ def encode_error(message: Message, byteorder: str, error: Exception) -> Exceptio
     return error
 
 
-__all__ = ["Codec", "Text", "codec_for", "encode_error", "install", "maker"]
+__all__ = ["Codec", "Reading", "Text", "codec_for", "encode_error", "install", "maker"]

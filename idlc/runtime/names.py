@@ -13,10 +13,13 @@ from keyword import iskeyword
 RESERVED = frozenset(
     {
         "deserialize",
+        "deserialize_many",
         "from_dict",
         "get_fields_and_field_types",
         "mro",
         "serialize",
+        "serialize_many",
+        "to_columns",
         "to_dict",
         "validate",
     }

@@ -14,7 +14,7 @@ from . import codec
 from .names import public_name, slot_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from dataclasses import Field, dataclass
 
     import typing_extensions
@@ -161,14 +161,57 @@ class Message(metaclass=MessageMeta):
 
     @classmethod
     def deserialize(
-        cls, buffer: bytes | bytearray | memoryview
+        cls, buffer: bytes | bytearray | memoryview, *, copy: bool = True
     ) -> typing_extensions.Self:
         """Return the message that `buffer` begins with, in the byte order that its header names.
 
         Raises DecodeError. Bytes after the message are ignored; invalid UTF-8 becomes U+FFFD.
+        With `copy=False`, numeric sequences and arrays are read-only `numpy.ndarray`s, which of
+        all but short arrays are views of the buffer.
         """
         codec.install(cls)
-        return cls.deserialize(buffer)
+        return cls.deserialize(buffer, copy=copy)
+
+    @classmethod
+    def serialize_many(
+        cls,
+        messages: Iterable[typing_extensions.Self],
+        *,
+        byteorder: Literal["little", "big"] = "little",
+    ) -> list[bytes]:
+        """Return what `serialize` returns of each message.
+
+        A ValidationError's path begins with the message's index. `_idlc.batches.delimited` makes
+        one stream of the buffers.
+        """
+        from .batches import serialize_many
+
+        return serialize_many(cls, messages, byteorder)
+
+    @classmethod
+    def deserialize_many(
+        cls, buffers: Iterable[bytes | bytearray | memoryview], *, copy: bool = True
+    ) -> list[typing_extensions.Self]:
+        """Return what `deserialize` returns of each buffer: a rosbag's rows, for example.
+
+        A DecodeError's path begins with the buffer's index. `_idlc.batches` splits length-delimited
+        streams and the chunks of MCAP files into buffers.
+        """
+        from .batches import deserialize_many
+
+        return deserialize_many(cls, buffers, copy)
+
+    @classmethod
+    def to_columns(cls, buffers: Iterable[bytes | bytearray | memoryview]) -> Any:
+        """Return many serialized messages as a `numpy.ndarray`, without making messages.
+
+        It is a structured array with a row for each buffer: `rows["pose"]["position"]["x"]`.
+        Names are those on the wire, texts are UTF-8 bytes. Raises DecodeError, and ValueError
+        where a sequence has another number of elements than in the messages before.
+        """
+        from .columns import to_columns
+
+        return to_columns(cls, buffers)
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""

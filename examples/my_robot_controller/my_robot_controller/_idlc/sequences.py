@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from .cdr import NATIVE
 
+if TYPE_CHECKING:
+    from .codec import Reading
+
 Number = TypeVar("Number", int, float)
 
 #: The array type code of each IDL type, as rosidl chooses it.
@@ -144,6 +147,30 @@ def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:
 
     def swapped(values: Any) -> Any:
         result = array(code, to_array(code, values))
+        result.byteswap()
+        return result
+
+    return native if order == NATIVE else swapped
+
+
+def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], Any]:
+    """Return a function that turns a buffer in the wire's byte order into a field's value.
+
+    That is a new `array.array`, or a `numpy.ndarray` over the buffer itself.
+    """
+    if not reading.copy:
+        from .arrays import view_reader
+
+        return view_reader(order, code)
+    empty = array(code)
+
+    def native(raw: Any) -> Any:
+        result = empty[:]
+        result.frombytes(raw)
+        return result
+
+    def swapped(raw: Any) -> Any:
+        result = native(raw)
         result.byteswap()
         return result
 

@@ -37,7 +37,7 @@ class Countdown_Goal(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Goal)
-def _countdown__goal_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack
@@ -84,7 +84,7 @@ class Countdown_Result(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Result)
-def _countdown__result_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si?").pack
@@ -123,7 +123,7 @@ class Countdown_Feedback(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_Feedback)
-def _countdown__feedback_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack
@@ -172,7 +172,9 @@ class Countdown_SendGoal_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Request)
-def _countdown__send_goal__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__request_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -185,7 +187,7 @@ def _countdown__send_goal__request_codec(order: str, text: _idlc.Text) -> _idlc.
     new_countdown_send_goal_request = _idlc.maker(Countdown_SendGoal_Request)
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -239,7 +241,9 @@ class Countdown_SendGoal_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Response)
-def _countdown__send_goal__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__response_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
@@ -300,7 +304,9 @@ class Countdown_SendGoal_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_SendGoal_Event)
-def _countdown__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__send_goal__event_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_SendGoal_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -322,7 +328,7 @@ def _countdown__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Co
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     new_countdown_send_goal_response = _idlc.maker(Countdown_SendGoal_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_2 = _idlc.layout(order, "16Bi").unpack_from
     read_3 = _idlc.layout(order, "I").unpack_from
@@ -379,12 +385,10 @@ def _countdown__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Co
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
             raise ValueError("too short")
-        request: list[_idlc.Any] = []
+        request = [new_countdown_send_goal_request() for _ in range(count)]
         message._request = request
         at = 48
-        for _ in range(count):
-            item = new_countdown_send_goal_request()
-            request.append(item)
+        for item in request:
             goal_id = new_uuid()
             item._goal_id = goal_id
             goal = new_countdown_goal()
@@ -397,12 +401,10 @@ def _countdown__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Co
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
             raise ValueError("too short")
-        response: list[_idlc.Any] = []
+        response = [new_countdown_send_goal_response() for _ in range(count)]
         message._response = response
         at = at + 4
-        for _ in range(count):
-            item_2 = new_countdown_send_goal_response()
-            response.append(item_2)
+        for item_2 in response:
             item_2_stamp = new_time()
             item_2._stamp = item_2_stamp
             (
@@ -442,7 +444,9 @@ class Countdown_GetResult_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Request)
-def _countdown__get_result__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__request_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -454,7 +458,7 @@ def _countdown__get_result__request_codec(order: str, text: _idlc.Text) -> _idlc
     write_1 = _idlc.layout(order, "4s16B").pack
     new_countdown_get_result_request = _idlc.maker(Countdown_GetResult_Request)
     new_uuid = _idlc.maker(UUID)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -500,7 +504,9 @@ class Countdown_GetResult_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Response)
-def _countdown__get_result__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__response_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sbi?").pack
@@ -565,7 +571,9 @@ class Countdown_GetResult_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_GetResult_Event)
-def _countdown__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__get_result__event_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -587,7 +595,7 @@ def _countdown__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.C
     new_uuid = _idlc.maker(UUID)
     new_countdown_get_result_response = _idlc.maker(Countdown_GetResult_Response)
     new_countdown_result = _idlc.maker(Countdown_Result)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "16B", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
@@ -653,8 +661,6 @@ def _countdown__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.C
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_values in rows_1(data[48:end]):
             item = new_countdown_get_result_request()
             request.append(item)
@@ -667,12 +673,10 @@ def _countdown__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.C
             raise ValueError("too many elements")
         if end + 4 + 6 * count > limit:
             raise ValueError("too short")
-        response: list[_idlc.Any] = []
+        response = [new_countdown_get_result_response() for _ in range(count)]
         message._response = response
         at = end + 4
-        for _ in range(count):
-            item_2 = new_countdown_get_result_response()
-            response.append(item_2)
+        for item_2 in response:
             result = new_countdown_result()
             item_2._result = result
             struct = read_3[at & 7]
@@ -718,7 +722,9 @@ class Countdown_FeedbackMessage(_idlc.Message):
 
 
 @_idlc.codec_for(Countdown_FeedbackMessage)
-def _countdown__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _countdown__feedback_message_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Countdown_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -731,7 +737,7 @@ def _countdown__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Co
     new_countdown_feedback_message = _idlc.maker(Countdown_FeedbackMessage)
     new_uuid = _idlc.maker(UUID)
     new_countdown_feedback = _idlc.maker(Countdown_Feedback)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:

@@ -37,12 +37,13 @@ class ExecuteTask_Goal(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Goal)
-def _execute_task__goal_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*")
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    text = reading.text
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         task_name = message._task_name.encode()
@@ -82,7 +83,7 @@ class ExecuteTask_Result(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Result)
-def _execute_task__result_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4s?").pack
@@ -121,12 +122,13 @@ class ExecuteTask_Feedback(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_Feedback)
-def _execute_task__feedback_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*")
     new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    text = reading.text
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         current_status = message._current_status.encode()
@@ -183,7 +185,7 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Request)
 def _execute_task__send_goal__request_codec(
-    order: str, text: _idlc.Text
+    order: str, reading: _idlc.Reading
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
@@ -197,8 +199,9 @@ def _execute_task__send_goal__request_codec(
     new_execute_task_send_goal_request = _idlc.maker(ExecuteTask_SendGoal_Request)
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
+    text = reading.text
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         goal_id = message._goal_id
@@ -263,7 +266,7 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Response)
 def _execute_task__send_goal__response_codec(
-    order: str, text: _idlc.Text
+    order: str, reading: _idlc.Reading
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Response in one byte order."""
     with _idlc.importing():
@@ -325,7 +328,9 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Event)
-def _execute_task__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__send_goal__event_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_SendGoal_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -347,9 +352,10 @@ def _execute_task__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     new_execute_task_send_goal_response = _idlc.maker(ExecuteTask_SendGoal_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_2 = _idlc.phases(order, "16BI")
+    text = reading.text
     read_3 = _idlc.layout(order, "I").unpack_from
     read_4 = _idlc.layout(order, "?iI").unpack_from
 
@@ -414,12 +420,10 @@ def _execute_task__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
             raise ValueError("too short")
-        request: list[_idlc.Any] = []
+        request = [new_execute_task_send_goal_request() for _ in range(count)]
         message._request = request
         end = 47
-        for _ in range(count):
-            item = new_execute_task_send_goal_request()
-            request.append(item)
+        for item in request:
             goal_id = new_uuid()
             item._goal_id = goal_id
             goal = new_execute_task_goal()
@@ -438,12 +442,10 @@ def _execute_task__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
             raise ValueError("too short")
-        response: list[_idlc.Any] = []
+        response = [new_execute_task_send_goal_response() for _ in range(count)]
         message._response = response
         at = at + 4
-        for _ in range(count):
-            item_2 = new_execute_task_send_goal_response()
-            response.append(item_2)
+        for item_2 in response:
             item_2_stamp = new_time()
             item_2._stamp = item_2_stamp
             (
@@ -484,7 +486,7 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
 
 @_idlc.codec_for(ExecuteTask_GetResult_Request)
 def _execute_task__get_result__request_codec(
-    order: str, text: _idlc.Text
+    order: str, reading: _idlc.Reading
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Request in one byte order."""
     from .._idlc import arrays as _arrays
@@ -497,7 +499,7 @@ def _execute_task__get_result__request_codec(
     write_1 = _idlc.layout(order, "4s16B").pack
     new_execute_task_get_result_request = _idlc.maker(ExecuteTask_GetResult_Request)
     new_uuid = _idlc.maker(UUID)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -544,7 +546,7 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
 
 @_idlc.codec_for(ExecuteTask_GetResult_Response)
 def _execute_task__get_result__response_codec(
-    order: str, text: _idlc.Text
+    order: str, reading: _idlc.Reading
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
@@ -603,7 +605,9 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Event)
-def _execute_task__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__get_result__event_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -625,7 +629,7 @@ def _execute_task__get_result__event_codec(order: str, text: _idlc.Text) -> _idl
     new_uuid = _idlc.maker(UUID)
     new_execute_task_get_result_response = _idlc.maker(ExecuteTask_GetResult_Response)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "16B", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
@@ -682,8 +686,6 @@ def _execute_task__get_result__event_codec(order: str, text: _idlc.Text) -> _idl
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_values in rows_1(data[48:end]):
             item = new_execute_task_get_result_request()
             request.append(item)
@@ -698,14 +700,14 @@ def _execute_task__get_result__event_codec(order: str, text: _idlc.Text) -> _idl
         message._response = response
         at = end + 4
         end = at + 2 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_2_values in rows_2(data[at:end]):
             item_2 = new_execute_task_get_result_response()
             response.append(item_2)
             result = new_execute_task_result()
             item_2._result = result
             item_2._status, result._success = item_2_values
+        if end > limit:
+            raise ValueError("too short")
         return message
 
     return _idlc.Codec(encode, decode)
@@ -742,7 +744,9 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
 
 
 @_idlc.codec_for(ExecuteTask_FeedbackMessage)
-def _execute_task__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _execute_task__feedback_message_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -755,8 +759,9 @@ def _execute_task__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc
     new_execute_task_feedback_message = _idlc.maker(ExecuteTask_FeedbackMessage)
     new_uuid = _idlc.maker(UUID)
     new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
+    text = reading.text
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         goal_id = message._goal_id

@@ -37,7 +37,7 @@ class Fill_Goal(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_Goal)
-def _fill__goal_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sf").pack
@@ -76,7 +76,7 @@ class Fill_Result(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_Result)
-def _fill__result_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sf").pack
@@ -115,7 +115,7 @@ class Fill_Feedback(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_Feedback)
-def _fill__feedback_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sf").pack
@@ -164,7 +164,7 @@ class Fill_SendGoal_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_SendGoal_Request)
-def _fill__send_goal__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__send_goal__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_SendGoal_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -177,7 +177,7 @@ def _fill__send_goal__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec
     new_fill_send_goal_request = _idlc.maker(Fill_SendGoal_Request)
     new_uuid = _idlc.maker(UUID)
     new_fill_goal = _idlc.maker(Fill_Goal)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -229,7 +229,7 @@ class Fill_SendGoal_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_SendGoal_Response)
-def _fill__send_goal__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_SendGoal_Response in one byte order."""
     with _idlc.importing():
         from builtin_interfaces.msg import Time
@@ -290,7 +290,7 @@ class Fill_SendGoal_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_SendGoal_Event)
-def _fill__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_SendGoal_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -312,7 +312,7 @@ def _fill__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_uuid = _idlc.maker(UUID)
     new_fill_goal = _idlc.maker(Fill_Goal)
     new_fill_send_goal_response = _idlc.maker(Fill_SendGoal_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_2 = _idlc.layout(order, "16Bf").unpack_from
     read_3 = _idlc.layout(order, "I").unpack_from
@@ -369,12 +369,10 @@ def _fill__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
             raise ValueError("too short")
-        request: list[_idlc.Any] = []
+        request = [new_fill_send_goal_request() for _ in range(count)]
         message._request = request
         at = 48
-        for _ in range(count):
-            item = new_fill_send_goal_request()
-            request.append(item)
+        for item in request:
             goal_id = new_uuid()
             item._goal_id = goal_id
             goal = new_fill_goal()
@@ -387,12 +385,10 @@ def _fill__send_goal__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
             raise ValueError("too short")
-        response: list[_idlc.Any] = []
+        response = [new_fill_send_goal_response() for _ in range(count)]
         message._response = response
         at = at + 4
-        for _ in range(count):
-            item_2 = new_fill_send_goal_response()
-            response.append(item_2)
+        for item_2 in response:
             item_2_stamp = new_time()
             item_2._stamp = item_2_stamp
             (
@@ -432,7 +428,7 @@ class Fill_GetResult_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_GetResult_Request)
-def _fill__get_result__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__get_result__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_GetResult_Request in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -444,7 +440,7 @@ def _fill__get_result__request_codec(order: str, text: _idlc.Text) -> _idlc.Code
     write_1 = _idlc.layout(order, "4s16B").pack
     new_fill_get_result_request = _idlc.maker(Fill_GetResult_Request)
     new_uuid = _idlc.maker(UUID)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -490,7 +486,9 @@ class Fill_GetResult_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_GetResult_Response)
-def _fill__get_result__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__get_result__response_codec(
+    order: str, reading: _idlc.Reading
+) -> _idlc.Codec:
     """Return what writes and reads Fill_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sbf").pack
@@ -548,7 +546,7 @@ class Fill_GetResult_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_GetResult_Event)
-def _fill__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__get_result__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_GetResult_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -570,7 +568,7 @@ def _fill__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_uuid = _idlc.maker(UUID)
     new_fill_get_result_response = _idlc.maker(Fill_GetResult_Response)
     new_fill_result = _idlc.maker(Fill_Result)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "16B", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
@@ -628,8 +626,6 @@ def _fill__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_values in rows_1(data[48:end]):
             item = new_fill_get_result_request()
             request.append(item)
@@ -642,12 +638,10 @@ def _fill__get_result__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if end + 4 + 5 * count > limit:
             raise ValueError("too short")
-        response: list[_idlc.Any] = []
+        response = [new_fill_get_result_response() for _ in range(count)]
         message._response = response
         at = end + 4
-        for _ in range(count):
-            item_2 = new_fill_get_result_response()
-            response.append(item_2)
+        for item_2 in response:
             result = new_fill_result()
             item_2._result = result
             item_2._status, result._reached = read_3(data, at)
@@ -688,7 +682,7 @@ class Fill_FeedbackMessage(_idlc.Message):
 
 
 @_idlc.codec_for(Fill_FeedbackMessage)
-def _fill__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _fill__feedback_message_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Fill_FeedbackMessage in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -701,7 +695,7 @@ def _fill__feedback_message_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_fill_feedback_message = _idlc.maker(Fill_FeedbackMessage)
     new_uuid = _idlc.maker(UUID)
     new_fill_feedback = _idlc.maker(Fill_Feedback)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:

@@ -93,7 +93,7 @@ class Gauge(_idlc.Message):
 
 
 @_idlc.codec_for(Gauge)
-def _gauge_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Gauge in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sfBI*I", align=4)
@@ -104,11 +104,13 @@ def _gauge_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     write_3 = _idlc.phases(order, "9dc")
     new_gauge = _idlc.maker(Gauge)
     read_1 = _idlc.layout(order, "fBI", start=4).unpack_from
+    text = reading.text
     read_2 = _idlc.layout(order, "I").unpack_from
-    empty_h = _idlc.array("h")
-    swap = order != _idlc.NATIVE
-    array_float64_9 = _arrays.array_reader(order, "float64", 9)
+    read_notes = _idlc.texts_reader(order, text)
+    numbers_h = _idlc.sequence_reader(order, "h", reading)
+    array_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
     read_3 = _idlc.layout(order, "9dc", start=4).unpack_from
+    small = reading.small
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         label = message._label.encode()
@@ -140,7 +142,7 @@ def _gauge_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
-        view = data if limit < 4096 else memoryview(data)
+        view = data if limit < small else memoryview(data)
         message = new_gauge()
         message._rate, message._level, size = read_1(data, 4)
         end = 15 + size
@@ -151,28 +153,11 @@ def _gauge_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         (count,) = read_2(data, at)
         if count > 3:
             raise ValueError("too many elements")
-        if at + 4 + 4 * count > limit:
-            raise ValueError("too short")
-        notes: list[_idlc.Any] = []
-        message._notes = notes
-        end = at + 3
-        for _ in range(count):
-            at = end + 4 & -4
-            (size,) = read_2(data, at)
-            end = at + 3 + size
-            if data[end]:
-                raise ValueError("text without end")
-            notes.append(text(data[at + 4 : end]))
-        at = end + 4 & -4
+        message._notes, end = read_notes(data, at + 4, count)
+        at = end + 3 & -4
         (count,) = read_2(data, at)
         end = at + 4 + 2 * count
-        if end > limit:
-            raise ValueError("too short")
-        samples = empty_h[:]
-        samples.frombytes(view[at + 4 : end])
-        if swap:
-            samples.byteswap()
-        message._samples = samples
+        message._samples = numbers_h(view[at + 4 : end])
         at = (end + 3 & -8) + 4
         covariance, message._flags = read_3(data, at)
         message._covariance = array_float64_9(covariance)

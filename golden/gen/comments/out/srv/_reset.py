@@ -35,12 +35,13 @@ class Reset_Request(_idlc.Message):
 
 
 @_idlc.codec_for(Reset_Request)
-def _reset__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _reset__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*")
     new_reset_request = _idlc.maker(Reset_Request)
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    text = reading.text
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         reason = message._reason.encode()
@@ -80,7 +81,7 @@ class Reset_Response(_idlc.Message):
 
 
 @_idlc.codec_for(Reset_Response)
-def _reset__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _reset__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4s?").pack
@@ -134,7 +135,7 @@ class Reset_Event(_idlc.Message):
 
 
 @_idlc.codec_for(Reset_Event)
-def _reset__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -153,9 +154,10 @@ def _reset__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_time = _idlc.maker(Time)
     new_reset_request = _idlc.maker(Reset_Request)
     new_reset_response = _idlc.maker(Reset_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     read_2 = _idlc.layout(order, "I").unpack_from
+    text = reading.text
     rows_1 = _idlc.layout(order, "?", start=4).iter_unpack
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
@@ -210,12 +212,10 @@ def _reset__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             raise ValueError("too many elements")
         if 48 + 4 * count > limit:
             raise ValueError("too short")
-        request: list[_idlc.Any] = []
+        request = [new_reset_request() for _ in range(count)]
         message._request = request
         end = 47
-        for _ in range(count):
-            item = new_reset_request()
-            request.append(item)
+        for item in request:
             at = end + 4 & -4
             (size,) = read_2(data, at)
             end = at + 3 + size
@@ -229,12 +229,12 @@ def _reset__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         response: list[_idlc.Any] = []
         message._response = response
         end = at + 4 + count
-        if end > limit:
-            raise ValueError("too short")
         for item_2_values in rows_1(data[at + 4 : end]):
             item_2 = new_reset_response()
             response.append(item_2)
             (item_2._ok,) = item_2_values
+        if end > limit:
+            raise ValueError("too short")
         return message
 
     return _idlc.Codec(encode, decode)

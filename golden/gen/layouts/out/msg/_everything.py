@@ -136,7 +136,7 @@ class Everything(_idlc.Message):
 
 
 @_idlc.codec_for(Everything)
-def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Everything in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
@@ -166,22 +166,25 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_nothing = _idlc.maker(Nothing)
     new_time = _idlc.maker(Time)
     read_1 = _idlc.layout(order, "?BdI", start=4).unpack_from
+    text = reading.text
     read_2 = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
-    read_4 = _idlc.phases(order, "BdI")
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3)
-    read_5 = _idlc.layout(order, "IH3B").unpack_from
-    read_6 = _idlc.phases(order, "xI")
+    read_3 = _idlc.phases(order, "BdI")
+    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
+    read_4 = _idlc.layout(order, "IH3B").unpack_from
+    read_5 = _idlc.phases(order, "xI")
     rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
-    empty_d = _idlc.array("d")
-    swap = order != _idlc.NATIVE
-    empty_h = _idlc.array("h")
+    numbers_d = _idlc.sequence_reader(order, "d", reading)
+    numbers_h = _idlc.sequence_reader(order, "h", reading)
     read_flags = _idlc.read_flags
     read_octets = _idlc.read_octets
-    read_9 = _idlc.phases(order, "2BI")
+    read_6 = _idlc.phases(order, "2BI")
+    read_texts = _idlc.texts_reader(order, text)
+    read_wides = _idlc.wide_texts_reader(order)
     rows_2 = _idlc.layout(order, "iI", start=4).iter_unpack
-    array_float32_4 = _arrays.array_reader(order, "float32", 4)
-    read_10 = _idlc.phases(order, "4fq")
+    array_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
+    read_7 = _idlc.phases(order, "4fq")
+    small = reading.small
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         inner = message._inner
@@ -306,7 +309,7 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
-        view = data if limit < 4096 else memoryview(data)
+        view = data if limit < small else memoryview(data)
         message = new_everything()
         inner = new_inner()
         message._inner = inner
@@ -318,19 +321,15 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         at = end + 4 & -4
         (count,) = read_2(data, at)
         end = at + 4 + 4 * count
-        if end > limit:
-            raise ValueError("too short")
         inner._d = read_wide_text(data[at + 4 : end])
         (count,) = read_2(data, end)
         if end + 4 + 17 * count > limit:
             raise ValueError("too short")
-        inners: list[_idlc.Any] = []
+        inners = [new_inner() for _ in range(count)]
         message._inners = inners
         end = end + 4
-        for _ in range(count):
-            item = new_inner()
-            inners.append(item)
-            struct = read_4[end & 7]
+        for item in inners:
+            struct = read_3[end & 7]
             item._a, item._b, size = struct.unpack_from(data, end)
             at = end + struct.size
             end = at - 1 + size
@@ -340,43 +339,35 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             at = end + 4 & -4
             (count,) = read_2(data, at)
             end = at + 4 + 4 * count
-            if end > limit:
-                raise ValueError("too short")
             item._d = read_wide_text(data[at + 4 : end])
         (count,) = read_2(data, end)
         if count > 4:
             raise ValueError("too many elements")
         if end + 4 + 9 * count > limit:
             raise ValueError("too short")
-        rows: list[_idlc.Any] = []
+        rows = [new_row() for _ in range(count)]
         message._rows = rows
         at = end + 4
-        for _ in range(count):
-            item_2 = new_row()
-            rows.append(item_2)
+        for item_2 in rows:
             at = at + 3 & -4
-            item_2._a, item_2._b, item_2_c = read_5(data, at)
+            item_2._a, item_2._b, item_2_c = read_4(data, at)
             item_2._c = array_uint8_3(item_2_c)
             at = at + 9
-        pair: list[_idlc.Any] = []
+        pair = [new_row() for _ in range(2)]
         message._pair = pair
-        for _ in range(2):
-            item_3 = new_row()
-            pair.append(item_3)
+        for item_3 in pair:
             at = at + 3 & -4
-            item_3._a, item_3._b, item_3_c = read_5(data, at)
+            item_3._a, item_3._b, item_3_c = read_4(data, at)
             item_3._c = array_uint8_3(item_3_c)
             at = at + 9
         nothing = new_nothing()
         message._nothing = nothing
-        struct = read_6[at & 7]
+        struct = read_5[at & 7]
         (count,) = struct.unpack_from(data, at)
         at = at + struct.size
         nothings: list[_idlc.Any] = []
         message._nothings = nothings
         end = at + count
-        if end > limit:
-            raise ValueError("too short")
         for _ in rows_1(view[at:end]):
             item_4 = new_nothing()
             nothings.append(item_4)
@@ -386,69 +377,34 @@ def _everything_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        if end > limit:
-            raise ValueError("too short")
-        doubles = empty_d[:]
-        doubles.frombytes(view[at:end])
-        if swap:
-            doubles.byteswap()
-        message._doubles = doubles
+        message._doubles = numbers_d(view[at:end])
         (count,) = read_2(data, end)
         if count > 3:
             raise ValueError("too many elements")
         at = end + 4
         end = at + 2 * count
-        if end > limit:
-            raise ValueError("too short")
-        shorts = empty_h[:]
-        shorts.frombytes(view[at:end])
-        if swap:
-            shorts.byteswap()
-        message._shorts = shorts
+        message._shorts = numbers_h(view[at:end])
         at = end + 3 & -4
         (count,) = read_2(data, at)
         end = at + 4 + count
-        if end > limit:
-            raise ValueError("too short")
         message._flags = read_flags(view[at + 4 : end])
-        struct = read_9[end & 7]
+        struct = read_6[end & 7]
         octets, count = struct.unpack_from(data, end)
         at = end + struct.size
         message._octets = read_octets(octets)
-        if at + 4 * count > limit:
-            raise ValueError("too short")
-        texts: list[_idlc.Any] = []
-        message._texts = texts
-        end = at - 1
-        for _ in range(count):
-            at = end + 4 & -4
-            (size,) = read_2(data, at)
-            end = at + 3 + size
-            if data[end]:
-                raise ValueError("text without end")
-            texts.append(text(data[at + 4 : end]))
-        wides: list[_idlc.Any] = []
-        message._wides = wides
-        end = end + 1
-        for _ in range(2):
-            at = end + 3 & -4
-            (count,) = read_2(data, at)
-            end = at + 4 + 4 * count
-            if end > limit:
-                raise ValueError("too short")
-            wides.append(read_wide_text(data[at + 4 : end]))
+        message._texts, end = read_texts(data, at, count)
         at = end + 3 & -4
-        (count,) = read_2(data, at)
+        message._wides, end = read_wides(data, at, 2)
+        (count,) = read_2(data, end)
         stamps: list[_idlc.Any] = []
         message._stamps = stamps
-        end = at + 4 + 8 * count
-        if end > limit:
-            raise ValueError("too short")
-        for item_5_values in rows_2(view[at + 4 : end]):
+        at = end + 4
+        end = at + 8 * count
+        for item_5_values in rows_2(view[at:end]):
             item_5 = new_time()
             stamps.append(item_5)
             item_5._sec, item_5._nanosec = item_5_values
-        weights, message._last = read_10[end & 7].unpack_from(data, end)
+        weights, message._last = read_7[end & 7].unpack_from(data, end)
         message._weights = array_float32_4(weights)
         return message
 

@@ -46,13 +46,14 @@ class Inner(_idlc.Message):
 
 
 @_idlc.codec_for(Inner)
-def _inner_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _inner_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Inner in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
     write_1 = _idlc.Texts(order, "4sBdI*I")
     new_inner = _idlc.maker(Inner)
     read_1 = _idlc.layout(order, "BdI", start=4).unpack_from
+    text = reading.text
     read_2 = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
 
@@ -83,9 +84,9 @@ def _inner_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         at = end + 4 & -4
         (count,) = read_2(data, at)
         end = at + 4 + 4 * count
+        message._d = read_wide_text(data[at + 4 : end])
         if end > limit:
             raise ValueError("too short")
-        message._d = read_wide_text(data[at + 4 : end])
         return message
 
     return _idlc.Codec(encode, decode)

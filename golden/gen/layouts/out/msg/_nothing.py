@@ -20,7 +20,7 @@ class Nothing(_idlc.Message):
 
 
 @_idlc.codec_for(Nothing)
-def _nothing_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _nothing_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Nothing in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sx").pack

@@ -45,13 +45,13 @@ class Row(_idlc.Message):
 
 
 @_idlc.codec_for(Row)
-def _row_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _row_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Row in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
     write_1 = _idlc.layout(order, "4sIH3B").pack
     new_row = _idlc.maker(Row)
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3)
+    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
     read_1 = _idlc.layout(order, "IH3B", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:

@@ -34,7 +34,7 @@ class Any(_idlc.Message):
 
 
 @_idlc.codec_for(Any)
-def _any_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _any_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Any in one byte order."""
     with _idlc.importing():
         from geometry_msgs.msg import Point, Quaternion

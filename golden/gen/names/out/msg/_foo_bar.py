@@ -30,7 +30,7 @@ class FOOBar(_idlc.Message):
 
 
 @_idlc.codec_for(FOOBar)
-def _foo_bar_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads FOOBar in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack

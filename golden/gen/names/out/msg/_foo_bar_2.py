@@ -29,7 +29,7 @@ class FooBar(_idlc.Message):
 
 
 @_idlc.codec_for(FooBar)
-def _foo_bar_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads FooBar in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4si").pack

@@ -134,7 +134,7 @@ class Odd(_idlc.Message):
 
 
 @_idlc.codec_for(Odd)
-def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4siiiiiI*c?fI", align=4)
@@ -147,12 +147,13 @@ def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_odd = _idlc.maker(Odd)
     new_point = _idlc.maker(Point)
     read_1 = _idlc.layout(order, "iiiiiI", start=4).unpack_from
+    text = reading.text
     read_2 = _idlc.phases(order, "c?fI")
-    read_3 = _idlc.layout(order, "I").unpack_from
-    read_4 = _idlc.layout(order, "iiiI").unpack_from
+    read_str_2 = _idlc.texts_reader(order, text)
+    read_3 = _idlc.layout(order, "iiiI").unpack_from
     rows_1 = _idlc.layout(order, "dd", start=4).iter_unpack
-    array_int32_3 = _arrays.array_reader(order, "int32", 3)
-    read_5 = _idlc.layout(order, "dd3i", start=4).unpack_from
+    array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
+    read_4 = _idlc.layout(order, "dd3i", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         list_2 = message._list.encode()
@@ -198,7 +199,6 @@ def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         return parts
 
     def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
         message = new_odd()
         (
             message._class,
@@ -220,28 +220,15 @@ def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
             count,
         ) = struct.unpack_from(data, end + 1)
         at = end + 1 + struct.size
-        if at + 4 * count > limit:
-            raise ValueError("too short")
-        str_2: list[_idlc.Any] = []
-        message._str = str_2
-        end = at - 1
-        for _ in range(count):
-            at = end + 4 & -4
-            (size,) = read_3(data, at)
-            end = at + 3 + size
-            if data[end]:
-                raise ValueError("text without end")
-            str_2.append(text(data[at + 4 : end]))
-        at = end + 4 & -4
-        message._message, message._data, message._at, count = read_4(data, at)
+        message._str, end = read_str_2(data, at, count)
+        at = end + 3 & -4
+        message._message, message._data, message._at, count = read_3(data, at)
         item: list[_idlc.Any] = []
         message._item = item
         at = at + 16
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_2_values in rows_1(data[at:end]):
             item_2 = new_point()
             item.append(item_2)
@@ -249,7 +236,7 @@ def _odd_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         array = new_point()
         message._array = array
         at = (end + 3 & -8) + 4
-        array._x, array._y, order_2 = read_5(data, at)
+        array._x, array._y, order_2 = read_4(data, at)
         message._order = array_int32_3(order_2)
         return message
 

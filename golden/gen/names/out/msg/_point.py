@@ -33,7 +33,7 @@ class Point(_idlc.Message):
 
 
 @_idlc.codec_for(Point)
-def _point_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _point_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Point in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sdd").pack

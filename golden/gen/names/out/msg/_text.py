@@ -48,7 +48,7 @@ class Text(_idlc.Message):
 
 
 @_idlc.codec_for(Text)
-def _text_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Text in one byte order."""
     with _idlc.importing():
         from geometry_msgs.msg import Pose, Quaternion
@@ -116,8 +116,6 @@ def _text_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         if count:
             at = (at + 3 & -8) + 4
         end = at + 56 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_values in rows_1(data[at:end]):
             item = new_any()
             any_2.append(item)
@@ -136,6 +134,8 @@ def _text_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
                 orientation._z,
                 orientation._w,
             ) = item_values
+        if end > limit:
+            raise ValueError("too short")
         return message
 
     return _idlc.Codec(encode, decode)

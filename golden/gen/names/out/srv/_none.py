@@ -26,7 +26,7 @@ class None_Request(_idlc.Message):
 
 
 @_idlc.codec_for(None_Request)
-def _none__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _none__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads None_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sx").pack
@@ -56,7 +56,7 @@ class None_Response(_idlc.Message):
 
 
 @_idlc.codec_for(None_Response)
-def _none__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _none__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads None_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sx").pack
@@ -110,7 +110,7 @@ class None_Event(_idlc.Message):
 
 
 @_idlc.codec_for(None_Event)
-def _none__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _none__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads None_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -128,7 +128,7 @@ def _none__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_time = _idlc.maker(Time)
     new_none_request = _idlc.maker(None_Request)
     new_none_response = _idlc.maker(None_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
@@ -181,8 +181,6 @@ def _none__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + count
-        if end > limit:
-            raise ValueError("too short")
         for _ in rows_1(data[48:end]):
             item = new_none_request()
             request.append(item)
@@ -193,11 +191,11 @@ def _none__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         response: list[_idlc.Any] = []
         message._response = response
         end = at + 4 + count
-        if end > limit:
-            raise ValueError("too short")
         for _ in rows_1(data[at + 4 : end]):
             item_2 = new_none_response()
             response.append(item_2)
+        if end > limit:
+            raise ValueError("too short")
         return message
 
     return _idlc.Codec(encode, decode)

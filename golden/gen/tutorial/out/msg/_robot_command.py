@@ -58,13 +58,14 @@ class RobotCommand(_idlc.Message):
 
 
 @_idlc.codec_for(RobotCommand)
-def _robot_command_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _robot_command_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sI*ff", align=4)
     write_2 = _idlc.Texts(order, "I*")
     new_robot_command = _idlc.maker(RobotCommand)
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    text = reading.text
     read_2 = _idlc.layout(order, "ffI").unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:

@@ -39,7 +39,7 @@ class AddTwoInts_Request(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Request)
-def _add_two_ints__request_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sqq").pack
@@ -78,7 +78,7 @@ class AddTwoInts_Response(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Response)
-def _add_two_ints__response_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.layout(order, "4sq").pack
@@ -132,7 +132,7 @@ class AddTwoInts_Event(_idlc.Message):
 
 
 @_idlc.codec_for(AddTwoInts_Event)
-def _add_two_ints__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
+def _add_two_ints__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Event in one byte order."""
     from .._idlc import arrays as _arrays
 
@@ -152,7 +152,7 @@ def _add_two_ints__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
     new_time = _idlc.maker(Time)
     new_add_two_ints_request = _idlc.maker(AddTwoInts_Request)
     new_add_two_ints_response = _idlc.maker(AddTwoInts_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16)
+    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "qq", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
@@ -214,8 +214,6 @@ def _add_two_ints__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_values in rows_1(data[at:end]):
             item = new_add_two_ints_request()
             request.append(item)
@@ -229,12 +227,12 @@ def _add_two_ints__event_codec(order: str, text: _idlc.Text) -> _idlc.Codec:
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        if end > limit:
-            raise ValueError("too short")
         for item_2_values in rows_2(data[at:end]):
             item_2 = new_add_two_ints_response()
             response.append(item_2)
             (item_2._sum,) = item_2_values
+        if end > limit:
+            raise ValueError("too short")
         return message
 
     return _idlc.Codec(encode, decode)
