@@ -86,7 +86,8 @@ def without_repeated_constants(structures):
 
 
 def _comment(described):
-    return [through_idl(line) for line in described.comment]
+    # the .idl file holds one text, which the parser splits again: an empty last line is lost
+    return "\n".join(through_idl(line) for line in described.comment).splitlines()
 
 
 def _member(field):
