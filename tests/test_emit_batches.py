@@ -291,3 +291,16 @@ def test_arrays_of_strings_are_independent_of_each_other(msg):
         assert msg.Joints.deserialize(memoryview(two)).name == ["a", "c"]
         assert msg.Joints.deserialize(msg.Joints(name=["a"]).serialize()).name == ["a"]
         assert msg.Joints.deserialize(msg.Joints().serialize()).name == []
+
+
+def test_arrays_of_strings_are_written_as_they_are_now(msg):
+    joints = msg.Joints(name=["a", "b"])
+    for names in (["a", "b"], ["a", "c"], [], ["a"], ("a", "b"), ["é" * 5, ""], ["a", "b"]):
+        joints.name = names
+        assert msg.Joints.deserialize(joints.serialize()).name == list(names)
+    joints.name = names = ["a", "b"]
+    joints.serialize()
+    names[0] = "changed in place"
+    assert msg.Joints.deserialize(joints.serialize()).name == names
+    joints.name = ["x", "y"]
+    assert joints.serialize() == msg.Joints(name=["x", "y"]).serialize()

@@ -210,12 +210,10 @@ class _Encoder:
         """Emit an array or sequence of strings."""
         local = step.place.local
         block = self.tables.local(f"{local}_block")
-        function = "wide_block" if step.wide else "text_block"
         self.begin(step)
         self.flush(4)
         self.pad(4)
-        writer = self.tables.function(function, f"{function}(order)")
-        self.line(call(writer, local), block)
+        self.line(call(self.tables.texts_writer(step), local), block)
         self.put(block)
         self.here.skip(f"len({block})", 4 if step.wide else 1)
         self.settle()

@@ -125,6 +125,12 @@ class Tables:
         expression = f'_idlc.sequence_reader(order, "{step.code}", reading)'
         return self.define(f"numbers_{step.code}", expression, expression)
 
+    def texts_writer(self, step: layout.Texts) -> str:
+        """Return the function that writes an array of strings; one for each field."""
+        local = step.place.local
+        function = "wide_block" if step.wide else "text_block"
+        return self.define(f"write_{local}", f"write texts {local}", f"_idlc.{function}(order)")
+
     def texts_reader(self, step: layout.Texts) -> str:
         """Return the function that reads an array of strings; one for each field."""
         local = step.place.local

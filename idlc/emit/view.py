@@ -43,7 +43,6 @@ class ModuleView(msgspec.Struct, frozen=True):
     groups: tuple[groups.GroupView, ...]
 
 
-TYPES = "_ClassVar[dict[str, str]]"
 PRAGMAS = (
     '# mypy: disable-error-code="import-not-found,import-untyped"',
     "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
@@ -92,9 +91,6 @@ def _imports(
     standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
     if "sequence" in used:
         standard.append("from array import array as _array")
-    if references.implied:
-        standard.append("from typing import TYPE_CHECKING")
-    standard.append("from typing import ClassVar as _ClassVar")
     inside, outside = references.imports(references.direct, kind)
     relative = ["from .. import _idlc"]
     if "array" in used:
@@ -104,7 +100,8 @@ def _imports(
         result += ["", "with _idlc.importing():", *(f"    {line}" for line in wrapped(outside))]
     if references.implied:
         _, implied = references.imports(references.implied, kind)
-        result += ["", "if TYPE_CHECKING:", *(f"    {line}" for line in wrapped(implied))]
+        result += ["", "TYPE_CHECKING = False", "if TYPE_CHECKING:"]
+        result += [f"    {line}" for line in wrapped(implied)]
     return result
 
 
@@ -181,10 +178,14 @@ def _body(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         *literals.docstring(doc, 4),
         "",
         *_tuple("__match_args__", tuple(public)),
-        *lines(Group("", types, brackets="{}"), 4, f"_fields_and_field_types: {TYPES} = "),
+        *lines(_frozen(types), 4, "_fields_and_field_types = "),
         *_separated(_constants(structure)),
         *_separated([f"    {view.declaration}" for view in views]),
     ]
+
+
+def _frozen(items: tuple[str, ...]) -> Group:
+    return call("_idlc.frozen", Group("", items, brackets="{}"))
 
 
 def _separated(block: list[str]) -> list[str]:

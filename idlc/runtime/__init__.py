@@ -6,8 +6,6 @@ It imports the standard library only; `arrays` imports numpy, `typesupport` look
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable
-from typing import Any, TypeAlias
 
 from .cdr import (
     HEADERS,
@@ -36,7 +34,7 @@ from .codec import Codec, Reading, codec_for, maker
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
-from .message import Fresh, FreshList, Message, dataclass
+from .message import Fresh, FreshList, Message, dataclass, frozen
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -53,9 +51,15 @@ from .sequences import (
     to_array,
 )
 
-#: What numeric sequences take.
-Integers: TypeAlias = Iterable[int]
-Floats: TypeAlias = Iterable[float]
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any as Any
+    from typing import TypeAlias as TypeAlias
+
+    #: What numeric sequences take.
+    Integers: TypeAlias = Iterable[int]
+    Floats: TypeAlias = Iterable[float]
 
 __all__ = [
     "HEADERS",
@@ -64,12 +68,10 @@ __all__ = [
     "PAD4",
     "PAD8",
     "Action",
-    "Any",
     "Codec",
     "DecodeError",
     "Float32Sequence",
     "Float64Sequence",
-    "Floats",
     "Fresh",
     "FreshList",
     "Imported",
@@ -77,12 +79,10 @@ __all__ = [
     "Int16Sequence",
     "Int32Sequence",
     "Int64Sequence",
-    "Integers",
     "Message",
     "Reading",
     "Service",
     "Texts",
-    "TypeAlias",
     "UInt8Sequence",
     "UInt16Sequence",
     "UInt32Sequence",
@@ -93,6 +93,7 @@ __all__ = [
     "dataclass",
     "flags",
     "flags_writer",
+    "frozen",
     "importing",
     "layout",
     "lazily",

@@ -11,11 +11,17 @@ of 36 doubles that is passed as bytes, `x` for a zero byte, `4s` for the encapsu
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterable
 from struct import Struct, calcsize
 from sys import byteorder
-from typing import Any
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from typing import Any, TypeAlias
+
+    BySize: TypeAlias = dict[int, Callable[..., bytes]]
+else:
+    BySize = dict
 
 NATIVE = "<" if byteorder == "little" else ">"
 
@@ -40,7 +46,7 @@ def layout(
     """
     parts = [order]
     at = start
-    for count, code in re.findall(r"(\d*)(\D)", fields):
+    for count, code in _tokens(fields):
         if code == "*":
             code, size, padding = f"{text}sx", text + 1, 0
         elif code in "sx":
@@ -56,12 +62,23 @@ def layout(
     return Struct("".join(parts))
 
 
+def _tokens(fields: str) -> Iterator[tuple[str, str]]:
+    """Yield the count, perhaps empty, and the character of each part of a layout."""
+    count = ""
+    for character in fields:
+        if character.isdigit():
+            count += character
+        else:
+            yield count, character
+            count = ""
+
+
 def phases(order: str, fields: str, align: int = 1) -> tuple[Struct, ...]:
     """Return the Structs of `fields` by the position modulo 8 at which they begin."""
     return tuple(layout(order, fields, start, 0, align) for start in range(8))
 
 
-class Texts(dict[int, Callable[..., bytes]]):
+class Texts(BySize):
     """The `pack` functions of a layout with one text, by the size of the text in bytes."""
 
     def __init__(self, order: str, fields: str, start: int = 0, align: int = 1) -> None:
@@ -84,13 +101,25 @@ def text_phases(order: str, fields: str, align: int = 1) -> tuple[Texts, ...]:
 def text_block(order: str) -> Callable[[Iterable[str]], bytes]:
     """Return a function that writes the strings of an array, from a multiple of four on.
 
-    Short ASCII strings, as most are, are put together as text and encoded once.
+    Short ASCII strings, as most are, are put together as text and encoded once. The last block is
+    kept: what a node publishes has the same names in each message.
     """
     sized = [layout(order, "I").pack(size + 1).decode("latin-1") for size in range(127)]
     ended = [bytes(1 + (-size - 1) % 4).decode() for size in range(127)]
     padded = Texts(order, "I*", align=4)
+    last: tuple[list[str], bytes] = ([], b"")
 
     def write(values: Iterable[str]) -> bytes:
+        nonlocal last
+        known, block = last
+        if type(values) is list and values == known:
+            return block
+        block = encoded(values)
+        if type(values) is list and len(block) <= LONG_TEXT:
+            last = values[:], block
+        return block
+
+    def encoded(values: Iterable[str]) -> bytes:
         try:
             text = "".join([sized[len(v)] + v + ended[len(v)] for v in values])
             if text.isascii():

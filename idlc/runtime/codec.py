@@ -3,44 +3,62 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from .cdr import HEADERS, NATIVE
 from .errors import DecodeError, ValidationError
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from functools import partial
+    from typing import Any, Protocol, TypeAlias
+
     from .message import Message
 
-ORDERS = {"little": "<", "big": ">"}
+    #: What turns bytes into a str.
+    Text: TypeAlias = Callable[[Any], str]
+    Make: TypeAlias = Callable[[str, "Reading"], "Codec"]
 
-#: What turns bytes into a str.
-Text = Callable[[Any], str]
+    class Codecs(Protocol):
+        """Gives the codec of a byte order, making it on first use."""
+
+        def __call__(self, order: str, reading: Reading = ...) -> Codec:
+            """Return the codec whose `decode` makes values as `reading` says."""
+            ...
+
+else:
+    # functools takes longer to import than all that is here
+    from _functools import partial
+
+ORDERS = {"little": "<", "big": ">"}
 
 #: Takes a memoryview, too. Slower than `bytes.decode`.
 text_of_view: Text = partial(str, encoding="utf-8")
 
 
-class Reading(NamedTuple):
+class Reading:
     """How a decoder makes values: strings by `text`, numeric arrays as copies or as views."""
 
-    text: Text = bytes.decode
-    copy: bool = True
-
-    @property
-    def small(self) -> int:
-        """Up to this size of a message, slices of bytes are faster than those of a view."""
-        return 8192 if self.copy else 0
+    def __init__(self, text: Text, copy: bool) -> None:
+        self.text = text
+        self.copy = copy
+        #: Up to this size of a message, slices of bytes are faster than those of a view.
+        self.small = 8192 if copy else 0
 
 
-COPYING = Reading()
+READINGS: dict[tuple[Text, bool], Reading] = {
+    (text, copy): Reading(text, copy)
+    for text in (bytes.decode, text_of_view)
+    for copy in (True, False)
+}
+COPYING = READINGS[bytes.decode, True]
+
 
 #: What decoding raises when a buffer is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 
 
-class Codec(NamedTuple):
+class Codec:
     """The two functions of one class and byte order.
 
     `encode(message)` returns the parts of the message in order: buffers, of which the first
@@ -49,20 +67,15 @@ class Codec(NamedTuple):
     `bulk` says that there are numeric sequences, so that a memoryview saves a copy.
     """
 
-    encode: Callable[[Any], list[Any]]
-    decode: Callable[[Any], Any]
-    bulk: bool = False
-
-
-class Codecs(Protocol):
-    """Gives the codec of a byte order, making it on first use."""
-
-    def __call__(self, order: str, reading: Reading = COPYING) -> Codec:
-        """Return the codec whose `decode` makes values as `reading` says."""
-        ...
-
-
-Make = Callable[[str, Reading], Codec]
+    def __init__(
+        self,
+        encode: Callable[[Any], list[Any]],
+        decode: Callable[[Any], Any],
+        bulk: bool = False,
+    ) -> None:
+        self.encode = encode
+        self.decode = decode
+        self.bulk = bulk
 
 
 def codec_for(kind: Any) -> Callable[[Make], Make]:
@@ -102,7 +115,7 @@ def install(kind: type[Message]) -> None:
     """Replace `serialize` and `deserialize` of the class that owns the codec by direct ones."""
     owner: Any = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
     codecs = owner._codec_
-    encode, decode, _ = codecs("<")
+    encode, decode = codecs("<").encode, codecs("<").decode
     join = b"".join
 
     def serialize(self: Any, byteorder: str = "little") -> bytes:
@@ -137,7 +150,7 @@ def read(codecs: Codecs, buffer: Any, copy: bool = True) -> Any:
             text, buffer = text_of_view, view.toreadonly()
         else:
             buffer = bytes(view)
-    return codecs(order_of(buffer), Reading(text, copy)).decode(buffer)
+    return codecs(order_of(buffer), READINGS[text, copy]).decode(buffer)
 
 
 def read_as_subclass(kind: Any, buffer: Any, *, copy: bool = True) -> Any:

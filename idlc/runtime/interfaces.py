@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any, ClassVar
-
 from .errors import importing
 from .message import InterfaceMeta
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any, ClassVar
 
 
 class Imported:
@@ -18,14 +19,17 @@ class Imported:
 
     def __get__(self, instance: object, owner: type | None = None) -> Any:
         """Return the class."""
-        with importing():
-            return getattr(import_module(self._module), self._name)
+        return _imported(self._module, self._name)
 
 
 def make(module: str, name: str) -> Any:
     """Return a new instance of another package's class."""
+    return _imported(module, name)()
+
+
+def _imported(module: str, name: str) -> Any:
     with importing():
-        return getattr(import_module(module), name)()
+        return getattr(__import__(module, fromlist=[name]), name)
 
 
 def several(kind: Any, count: int) -> list[Any]:

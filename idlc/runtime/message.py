@@ -8,17 +8,21 @@ property that converts for numeric arrays. Nothing else is computed until it is 
 from __future__ import annotations
 
 from array import array
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeVar
 
 from . import codec
+from .generics import Generic, TypeVar
 from .names import public_name, slot_name
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
     from dataclasses import Field, dataclass
+    from types import MappingProxyType
+    from typing import Any, ClassVar, Literal
 
     import typing_extensions
 else:
+    MappingProxyType = type(vars(type))
 
     def dataclass(**_options):
         """Leave the class as it is: the generated class already is what a dataclass has."""
@@ -26,6 +30,8 @@ else:
 
 
 Value = TypeVar("Value")
+#: Makes a dictionary that nobody changes.
+frozen = MappingProxyType
 
 
 class Fresh(Generic[Value]):
@@ -122,15 +128,6 @@ class MessageMeta(InterfaceMeta):
         typesupport.import_message(cls._message)
 
 
-def _equal(mine: object, other: object) -> bool:
-    """Return whether two field values are equal, numpy arrays as a whole."""
-    if type(mine).__module__ == "numpy" or type(other).__module__ == "numpy":
-        import numpy as np
-
-        return np.array_equal(mine, other)  # type: ignore[arg-type]
-    return bool(mine == other)
-
-
 class Message(metaclass=MessageMeta):
     """The base of all generated messages.
 
@@ -140,10 +137,15 @@ class Message(metaclass=MessageMeta):
     __slots__ = ()
     __hash__ = None  # type: ignore[assignment]
 
-    _fields_and_field_types: ClassVar[dict[str, str]]
-    _codec_: ClassVar[codec.Codecs]
-    SLOT_TYPES: ClassVar[tuple[Any, ...]] = _SlotTypes()  # type: ignore[assignment]
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]] = _DataclassFields()  # type: ignore[assignment]
+    # no annotations at run time, where `typing.get_type_hints` would ask for their names
+    if TYPE_CHECKING:
+        _fields_and_field_types: ClassVar[Mapping[str, str]]
+        _codec_: ClassVar[codec.Codecs]
+        SLOT_TYPES: ClassVar[tuple[Any, ...]]
+        __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    else:
+        SLOT_TYPES = _SlotTypes()
+        __dataclass_fields__ = _DataclassFields()
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
@@ -248,13 +250,23 @@ class Message(metaclass=MessageMeta):
             return replace(self, **changes)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, type(self)):
-            return NotImplemented
-        slots = type(self)._fields_and_field_types
-        return all(
-            _equal(getattr(self, slot), getattr(other, slot))
-            for slot in map(slot_name, slots)
-        )
+        from .objects import equality
+
+        kind: Any = next(base for base in type(self).__mro__ if "_codec_" in vars(base))
+        kind.__eq__ = equality(kind)
+        return bool(kind.__eq__(self, other))
+
+    def __copy__(self) -> typing_extensions.Self:
+        from .objects import copied
+
+        copy: typing_extensions.Self = copied(self)
+        return copy
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> typing_extensions.Self:
+        from .objects import deeply_copied
+
+        copy: typing_extensions.Self = deeply_copied(self, memo)
+        return copy
 
     def __repr__(self) -> str:
         kind = type(self)
@@ -267,4 +279,12 @@ class Message(metaclass=MessageMeta):
         return f"{package}.{kind.__name__}({', '.join(parts)})"
 
 
-__all__ = ["Fresh", "FreshList", "InterfaceMeta", "Message", "MessageMeta", "dataclass"]
+__all__ = [
+    "Fresh",
+    "FreshList",
+    "InterfaceMeta",
+    "Message",
+    "MessageMeta",
+    "dataclass",
+    "frozen",
+]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from struct import Struct
-from typing import Any, NoReturn
 
-from .codec import FAILURES, ORDERS, Reading, encode_error, read
+from .codec import FAILURES, ORDERS, READINGS, encode_error, read
 from .errors import DecodeError, ValidationError
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+    from typing import Any, NoReturn
 
 #: What precedes each message in a length-delimited stream.
 LENGTH = Struct("<I")
@@ -45,7 +48,7 @@ def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]
     """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
     owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
     codecs = owner._codec_
-    decode = codecs("<", Reading(copy=copy)).decode
+    decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []
     put = result.append
     rest = iter(buffers)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from typing import Any
 
 
 def lazily(
@@ -17,7 +19,8 @@ def lazily(
         module = modules.get(name)
         if module is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(f"{package}.{module}"), name)
+        # what importlib.import_module does, without its import
+        value = getattr(__import__(f"{package}.{module}", fromlist=[name]), name)
         setattr(sys.modules[package], name, value)
         return value
 

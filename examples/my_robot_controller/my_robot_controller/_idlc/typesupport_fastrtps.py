@@ -162,7 +162,7 @@ def _deserializer(name: str, cls: Any) -> int:
     position, end = fast_cdr()
     everything, words = c.MEMORY, c.WORDS
     install(cls)
-    _, decode, bulk = cls._codec_(NATIVE)
+    decode, bulk = cls._codec_(NATIVE).decode, cls._codec_(NATIVE).bulk
     decode_any = cls.deserialize
     native = HEADERS[NATIVE][1]
 

@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
@@ -25,7 +23,7 @@ class ExecuteTask_Goal(_idlc.Message):
     """
 
     __match_args__ = ("task_name",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"task_name": "string"}
+    _fields_and_field_types = _idlc.frozen({"task_name": "string"})
 
     task_name: str
 
@@ -71,7 +69,7 @@ class ExecuteTask_Result(_idlc.Message):
     """
 
     __match_args__ = ("success",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"success": "boolean"}
+    _fields_and_field_types = _idlc.frozen({"success": "boolean"})
 
     success: bool
 
@@ -110,7 +108,7 @@ class ExecuteTask_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("current_status",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"current_status": "string"}
+    _fields_and_field_types = _idlc.frozen({"current_status": "string"})
 
     current_status: str
 
@@ -163,10 +161,12 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "goal": "my_robot_controller/ExecuteTask_Goal",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "goal_id": "unique_identifier_msgs/UUID",
+            "goal": "my_robot_controller/ExecuteTask_Goal",
+        },
+    )
 
     goal_id: UUID
     goal: ExecuteTask_Goal
@@ -244,10 +244,9 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "accepted": "boolean",
-        "stamp": "builtin_interfaces/Time",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
+    )
 
     accepted: bool
     stamp: Time
@@ -303,11 +302,13 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<my_robot_controller/ExecuteTask_SendGoal_Request, 1>",
-        "response": "sequence<my_robot_controller/ExecuteTask_SendGoal_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<my_robot_controller/ExecuteTask_SendGoal_Request, 1>",
+            "response": "sequence<my_robot_controller/ExecuteTask_SendGoal_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[ExecuteTask_SendGoal_Request]
@@ -468,9 +469,7 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-    }
+    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
 
     goal_id: UUID
 
@@ -527,10 +526,9 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "status": "int8",
-        "result": "my_robot_controller/ExecuteTask_Result",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"status": "int8", "result": "my_robot_controller/ExecuteTask_Result"},
+    )
 
     status: int
     result: ExecuteTask_Result
@@ -580,11 +578,13 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<my_robot_controller/ExecuteTask_GetResult_Request, 1>",
-        "response": "sequence<my_robot_controller/ExecuteTask_GetResult_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<my_robot_controller/ExecuteTask_GetResult_Request, 1>",
+            "response": "sequence<my_robot_controller/ExecuteTask_GetResult_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[ExecuteTask_GetResult_Request]
@@ -723,10 +723,12 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "feedback": "my_robot_controller/ExecuteTask_Feedback",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "goal_id": "unique_identifier_msgs/UUID",
+            "feedback": "my_robot_controller/ExecuteTask_Feedback",
+        },
+    )
 
     goal_id: UUID
     feedback: ExecuteTask_Feedback

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 
@@ -26,12 +24,14 @@ class RobotCommand(_idlc.Message):
         "angular_velocity_z",
         "frame_id",
     )
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "command_type": "string",
-        "linear_velocity_x": "float",
-        "angular_velocity_z": "float",
-        "frame_id": "string",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "command_type": "string",
+            "linear_velocity_x": "float",
+            "angular_velocity_z": "float",
+            "frame_id": "string",
+        },
+    )
 
     STOP = "stop"
     MOVE = "move"

@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from service_msgs.msg import ServiceEventInfo
 
@@ -24,7 +22,7 @@ class AddTwoInts_Request(_idlc.Message):
     """
 
     __match_args__ = ("a", "b")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"a": "int64", "b": "int64"}
+    _fields_and_field_types = _idlc.frozen({"a": "int64", "b": "int64"})
 
     a: int
     b: int
@@ -66,7 +64,7 @@ class AddTwoInts_Response(_idlc.Message):
     """
 
     __match_args__ = ("sum",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"sum": "int64"}
+    _fields_and_field_types = _idlc.frozen({"sum": "int64"})
 
     sum: int
 
@@ -107,11 +105,13 @@ class AddTwoInts_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<my_robot_controller/AddTwoInts_Request, 1>",
-        "response": "sequence<my_robot_controller/AddTwoInts_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<my_robot_controller/AddTwoInts_Request, 1>",
+            "response": "sequence<my_robot_controller/AddTwoInts_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[AddTwoInts_Request]

@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
@@ -25,7 +23,7 @@ class Fill_Goal(_idlc.Message):
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"level": "float"}
+    _fields_and_field_types = _idlc.frozen({"level": "float"})
 
     level: float
 
@@ -64,7 +62,7 @@ class Fill_Result(_idlc.Message):
     """
 
     __match_args__ = ("reached",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"reached": "float"}
+    _fields_and_field_types = _idlc.frozen({"reached": "float"})
 
     reached: float
 
@@ -103,7 +101,7 @@ class Fill_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"level": "float"}
+    _fields_and_field_types = _idlc.frozen({"level": "float"})
 
     level: float
 
@@ -143,10 +141,9 @@ class Fill_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "goal": "comments_msgs/Fill_Goal",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"goal_id": "unique_identifier_msgs/UUID", "goal": "comments_msgs/Fill_Goal"},
+    )
 
     goal_id: UUID
     goal: Fill_Goal
@@ -208,10 +205,9 @@ class Fill_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "accepted": "boolean",
-        "stamp": "builtin_interfaces/Time",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
+    )
 
     accepted: bool
     stamp: Time
@@ -265,11 +261,13 @@ class Fill_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<comments_msgs/Fill_SendGoal_Request, 1>",
-        "response": "sequence<comments_msgs/Fill_SendGoal_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<comments_msgs/Fill_SendGoal_Request, 1>",
+            "response": "sequence<comments_msgs/Fill_SendGoal_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[Fill_SendGoal_Request]
@@ -411,9 +409,7 @@ class Fill_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-    }
+    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
 
     goal_id: UUID
 
@@ -468,10 +464,9 @@ class Fill_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "status": "int8",
-        "result": "comments_msgs/Fill_Result",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"status": "int8", "result": "comments_msgs/Fill_Result"},
+    )
 
     status: int
     result: Fill_Result
@@ -521,11 +516,13 @@ class Fill_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<comments_msgs/Fill_GetResult_Request, 1>",
-        "response": "sequence<comments_msgs/Fill_GetResult_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<comments_msgs/Fill_GetResult_Request, 1>",
+            "response": "sequence<comments_msgs/Fill_GetResult_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[Fill_GetResult_Request]
@@ -661,10 +658,12 @@ class Fill_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "feedback": "comments_msgs/Fill_Feedback",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "goal_id": "unique_identifier_msgs/UUID",
+            "feedback": "comments_msgs/Fill_Feedback",
+        },
+    )
 
     goal_id: UUID
     feedback: Fill_Feedback

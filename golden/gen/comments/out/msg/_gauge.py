@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from array import array as _array
-from typing import ClassVar as _ClassVar
 
 from .. import _idlc
 from .._idlc import arrays as _arrays
@@ -41,15 +40,17 @@ class Gauge(_idlc.Message):
         "covariance",
         "flags",
     )
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "rate": "float",
-        "level": "uint8",
-        "label": "string<20>",
-        "notes": "sequence<string, 3>",
-        "samples": "sequence<int16>",
-        "covariance": "double[9]",
-        "flags": "octet",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "rate": "float",
+            "level": "uint8",
+            "label": "string<20>",
+            "notes": "sequence<string, 3>",
+            "samples": "sequence<int16>",
+            "covariance": "double[9]",
+            "flags": "octet",
+        },
+    )
 
     EMPTY = 0
     FULL = 255
@@ -97,7 +98,7 @@ def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Gauge in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4sfBI*I", align=4)
-    text_block = _idlc.text_block(order)
+    write_notes = _idlc.text_block(order)
     buffer_h = _idlc.sequence_writer(order, "h")
     write_2 = _idlc.phases(order, "I")
     bytes_float64_9 = _arrays.array_writer(order, "float64", 9)
@@ -119,7 +120,7 @@ def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         if len(notes) > 3:
             raise ValueError("too many elements")
         at = (label_size + 20 & -4) + 4
-        notes_block = text_block(notes)
+        notes_block = write_notes(notes)
         at = at + len(notes_block)
         low = len(notes_block)
         samples = buffer_h(message._samples)

@@ -3,10 +3,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from ._reset import Reset, Reset_Event, Reset_Request, Reset_Response
 

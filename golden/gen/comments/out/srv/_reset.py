@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from service_msgs.msg import ServiceEventInfo
 
@@ -23,7 +21,7 @@ class Reset_Request(_idlc.Message):
     """
 
     __match_args__ = ("reason",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"reason": "string"}
+    _fields_and_field_types = _idlc.frozen({"reason": "string"})
 
     reason: str
 
@@ -69,7 +67,7 @@ class Reset_Response(_idlc.Message):
     """
 
     __match_args__ = ("ok",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"ok": "boolean"}
+    _fields_and_field_types = _idlc.frozen({"ok": "boolean"})
 
     ok: bool
 
@@ -110,11 +108,13 @@ class Reset_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<comments_msgs/Reset_Request, 1>",
-        "response": "sequence<comments_msgs/Reset_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<comments_msgs/Reset_Request, 1>",
+            "response": "sequence<comments_msgs/Reset_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[Reset_Request]

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from array import array as _array
-from typing import ClassVar as _ClassVar
 
 from .. import _idlc
 from .._idlc import arrays as _arrays
@@ -59,24 +58,26 @@ class Everything(_idlc.Message):
         "weights",
         "last",
     )
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "flag": "boolean",
-        "inner": "layouts_msgs/Inner",
-        "inners": "sequence<layouts_msgs/Inner>",
-        "rows": "sequence<layouts_msgs/Row, 4>",
-        "pair": "layouts_msgs/Row[2]",
-        "nothing": "layouts_msgs/Nothing",
-        "nothings": "sequence<layouts_msgs/Nothing>",
-        "doubles": "sequence<double>",
-        "shorts": "sequence<int16, 3>",
-        "flags": "sequence<boolean>",
-        "octets": "octet[2]",
-        "texts": "sequence<string>",
-        "wides": "wstring[2]",
-        "stamps": "sequence<builtin_interfaces/Time>",
-        "weights": "float[4]",
-        "last": "int64",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "flag": "boolean",
+            "inner": "layouts_msgs/Inner",
+            "inners": "sequence<layouts_msgs/Inner>",
+            "rows": "sequence<layouts_msgs/Row, 4>",
+            "pair": "layouts_msgs/Row[2]",
+            "nothing": "layouts_msgs/Nothing",
+            "nothings": "sequence<layouts_msgs/Nothing>",
+            "doubles": "sequence<double>",
+            "shorts": "sequence<int16, 3>",
+            "flags": "sequence<boolean>",
+            "octets": "octet[2]",
+            "texts": "sequence<string>",
+            "wides": "wstring[2]",
+            "stamps": "sequence<builtin_interfaces/Time>",
+            "weights": "float[4]",
+            "last": "int64",
+        },
+    )
 
     flag: bool
     inner: Inner
@@ -155,8 +156,8 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     flags_2 = _idlc.flags
     octets_2 = _idlc.octets_writer(2)
     write_8 = _idlc.phases(order, "2BI", align=4)
-    text_block = _idlc.text_block(order)
-    wide_block = _idlc.wide_block(order)
+    write_texts = _idlc.text_block(order)
+    write_wides = _idlc.wide_block(order)
     write_9 = _idlc.layout(order, "iI", start=4).pack
     bytes_float32_4 = _arrays.array_writer(order, "float32", 4)
     write_10 = _idlc.phases(order, "4fq")
@@ -284,7 +285,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         low = len(flags)
         texts = message._texts
         at = (at + 5 & -4) + 4
-        texts_block = text_block(texts)
+        texts_block = write_texts(texts)
         at = at + len(texts_block)
         put(write_8[low & 3].pack(octets_2(message._octets), len(texts)))
         put(texts_block)
@@ -292,7 +293,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         wides = message._wides
         if len(wides) != 2:
             raise ValueError("wrong number of elements")
-        wides_block = wide_block(wides)
+        wides_block = write_wides(wides)
         at = (at + 3 & -4) + len(wides_block)
         stamps = message._stamps
         at = at + 4

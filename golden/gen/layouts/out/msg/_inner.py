@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 
@@ -20,12 +18,9 @@ class Inner(_idlc.Message):
     """
 
     __match_args__ = ("a", "b", "c", "d")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "a": "uint8",
-        "b": "double",
-        "c": "string",
-        "d": "wstring",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"a": "uint8", "b": "double", "c": "string", "d": "wstring"},
+    )
 
     a: int
     b: float

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 
@@ -13,7 +11,7 @@ class Nothing(_idlc.Message):
     """layouts_msgs/msg/Nothing."""
 
     __match_args__ = ()
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {}
+    _fields_and_field_types = _idlc.frozen({})
 
     def __init__(self) -> None:
         pass

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 from .._idlc import arrays as _arrays
 
@@ -20,11 +18,9 @@ class Row(_idlc.Message):
     """
 
     __match_args__ = ("a", "b", "c")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "a": "uint32",
-        "b": "uint16",
-        "c": "uint8[3]",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"a": "uint32", "b": "uint16", "c": "uint8[3]"},
+    )
 
     a: int
     b: int

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 with _idlc.importing():
@@ -22,7 +20,7 @@ class Any(_idlc.Message):
     """
 
     __match_args__ = ("pose",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"pose": "geometry_msgs/Pose"}
+    _fields_and_field_types = _idlc.frozen({"pose": "geometry_msgs/Pose"})
 
     pose: Pose
 

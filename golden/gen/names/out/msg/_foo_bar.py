@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 from ._foo_bar_2 import FooBar
 
@@ -18,7 +16,7 @@ class FOOBar(_idlc.Message):
     """
 
     __match_args__ = ("inner",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"inner": "names_msgs/FooBar"}
+    _fields_and_field_types = _idlc.frozen({"inner": "names_msgs/FooBar"})
 
     inner: FooBar
 

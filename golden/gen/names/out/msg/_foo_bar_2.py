@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 
@@ -17,7 +15,7 @@ class FooBar(_idlc.Message):
     """
 
     __match_args__ = ("a",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"a": "int32"}
+    _fields_and_field_types = _idlc.frozen({"a": "int32"})
 
     a: int
 

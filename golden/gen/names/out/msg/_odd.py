@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import builtins as _builtins
-from typing import ClassVar as _ClassVar
 
 from .. import _idlc
 from .._idlc import arrays as _arrays
@@ -52,24 +51,26 @@ class Odd(_idlc.Message):
         "array",
         "order",
     )
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "class": "int32",
-        "serialize": "int32",
-        "self": "int32",
-        "fields_and_field_types": "int32",
-        "int": "int32",
-        "list": "string",
-        "bytes": "octet",
-        "bool": "boolean",
-        "float": "float",
-        "str": "sequence<string>",
-        "message": "int32",
-        "data": "int32",
-        "at": "int32",
-        "item": "sequence<names_msgs/Point>",
-        "array": "names_msgs/Point",
-        "order": "int32[3]",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "class": "int32",
+            "serialize": "int32",
+            "self": "int32",
+            "fields_and_field_types": "int32",
+            "int": "int32",
+            "list": "string",
+            "bytes": "octet",
+            "bool": "boolean",
+            "float": "float",
+            "str": "sequence<string>",
+            "message": "int32",
+            "data": "int32",
+            "at": "int32",
+            "item": "sequence<names_msgs/Point>",
+            "array": "names_msgs/Point",
+            "order": "int32[3]",
+        },
+    )
 
     SERIALIZE__DEFAULT = 3
     INT__DEFAULT = 4
@@ -138,7 +139,7 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     write_1 = _idlc.Texts(order, "4siiiiiI*c?fI", align=4)
-    text_block = _idlc.text_block(order)
+    write_str_2 = _idlc.text_block(order)
     write_2 = _idlc.phases(order, "iiiI")
     write_3 = _idlc.layout(order, "dd", start=4).pack
     pad8 = _idlc.PAD8
@@ -160,7 +161,7 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         list_2_size = len(list_2)
         str_2 = message._str
         at = (list_2_size + 34 & -4) + 8
-        str_2_block = text_block(str_2)
+        str_2_block = write_str_2(str_2)
         at = at + len(str_2_block)
         low = len(str_2_block)
         item = message._item

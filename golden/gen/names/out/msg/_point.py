@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
 
@@ -18,7 +16,7 @@ class Point(_idlc.Message):
     """
 
     __match_args__ = ("x", "y")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"x": "double", "y": "double"}
+    _fields_and_field_types = _idlc.frozen({"x": "double", "y": "double"})
 
     x: float
     y: float

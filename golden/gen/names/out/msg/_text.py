@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 from ._any import Any
 from ._point import Point as names_msgs_Point
@@ -26,11 +24,13 @@ class Text(_idlc.Message):
     """
 
     __match_args__ = ("other", "own", "any")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "other": "geometry_msgs/Point",
-        "own": "names_msgs/Point",
-        "any": "sequence<names_msgs/Any, 2>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "other": "geometry_msgs/Point",
+            "own": "names_msgs/Point",
+            "any": "sequence<names_msgs/Any, 2>",
+        },
+    )
 
     other: geometry_msgs_Point
     own: names_msgs_Point

@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from service_msgs.msg import ServiceEventInfo
 
@@ -19,7 +17,7 @@ class None_Request(_idlc.Message):
     """names_msgs/srv/None_Request."""
 
     __match_args__ = ()
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {}
+    _fields_and_field_types = _idlc.frozen({})
 
     def __init__(self) -> None:
         pass
@@ -49,7 +47,7 @@ class None_Response(_idlc.Message):
     """names_msgs/srv/None_Response."""
 
     __match_args__ = ()
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {}
+    _fields_and_field_types = _idlc.frozen({})
 
     def __init__(self) -> None:
         pass
@@ -85,11 +83,13 @@ class None_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<names_msgs/None_Request, 1>",
-        "response": "sequence<names_msgs/None_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<names_msgs/None_Request, 1>",
+            "response": "sequence<names_msgs/None_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[None_Request]

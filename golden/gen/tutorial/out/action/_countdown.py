@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-from typing import ClassVar as _ClassVar
-
 from .. import _idlc
 
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
@@ -25,7 +23,7 @@ class Countdown_Goal(_idlc.Message):
     """
 
     __match_args__ = ("target_count",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"target_count": "int32"}
+    _fields_and_field_types = _idlc.frozen({"target_count": "int32"})
 
     target_count: int
 
@@ -66,10 +64,9 @@ class Countdown_Result(_idlc.Message):
     """
 
     __match_args__ = ("final_count", "success")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "final_count": "int32",
-        "success": "boolean",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"final_count": "int32", "success": "boolean"},
+    )
 
     final_count: int
     success: bool
@@ -111,7 +108,7 @@ class Countdown_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("current_count",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {"current_count": "int32"}
+    _fields_and_field_types = _idlc.frozen({"current_count": "int32"})
 
     current_count: int
 
@@ -151,10 +148,12 @@ class Countdown_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "goal": "tutorial_msgs/Countdown_Goal",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "goal_id": "unique_identifier_msgs/UUID",
+            "goal": "tutorial_msgs/Countdown_Goal",
+        },
+    )
 
     goal_id: UUID
     goal: Countdown_Goal
@@ -220,10 +219,9 @@ class Countdown_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "accepted": "boolean",
-        "stamp": "builtin_interfaces/Time",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
+    )
 
     accepted: bool
     stamp: Time
@@ -279,11 +277,13 @@ class Countdown_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<tutorial_msgs/Countdown_SendGoal_Request, 1>",
-        "response": "sequence<tutorial_msgs/Countdown_SendGoal_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<tutorial_msgs/Countdown_SendGoal_Request, 1>",
+            "response": "sequence<tutorial_msgs/Countdown_SendGoal_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[Countdown_SendGoal_Request]
@@ -427,9 +427,7 @@ class Countdown_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-    }
+    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
 
     goal_id: UUID
 
@@ -486,10 +484,9 @@ class Countdown_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "status": "int8",
-        "result": "tutorial_msgs/Countdown_Result",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {"status": "int8", "result": "tutorial_msgs/Countdown_Result"},
+    )
 
     status: int
     result: Countdown_Result
@@ -546,11 +543,13 @@ class Countdown_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "info": "service_msgs/ServiceEventInfo",
-        "request": "sequence<tutorial_msgs/Countdown_GetResult_Request, 1>",
-        "response": "sequence<tutorial_msgs/Countdown_GetResult_Response, 1>",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "info": "service_msgs/ServiceEventInfo",
+            "request": "sequence<tutorial_msgs/Countdown_GetResult_Request, 1>",
+            "response": "sequence<tutorial_msgs/Countdown_GetResult_Response, 1>",
+        },
+    )
 
     info: ServiceEventInfo
     request: list[Countdown_GetResult_Request]
@@ -701,10 +700,12 @@ class Countdown_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types: _ClassVar[dict[str, str]] = {
-        "goal_id": "unique_identifier_msgs/UUID",
-        "feedback": "tutorial_msgs/Countdown_Feedback",
-    }
+    _fields_and_field_types = _idlc.frozen(
+        {
+            "goal_id": "unique_identifier_msgs/UUID",
+            "feedback": "tutorial_msgs/Countdown_Feedback",
+        },
+    )
 
     goal_id: UUID
     feedback: Countdown_Feedback
