@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from sarif_schema import run_of
 
 ROOT = Path(__file__).parents[1]
 LOOSE = "float64   speed# [m/s]\n"
@@ -121,7 +122,7 @@ def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
     done = act(pull_request, paths="demo")
     assert (done.returncode, done.stderr) == (0, "1 file in order\n")
     assert done.stdout == ""
-    assert json.loads((here / "idlc.sarif").read_text())["runs"][0]["results"] == []
+    assert run_of((here / "idlc.sarif").read_text())["results"] == []
     assert (here / "output").read_text() == "sarif=idlc.sarif\n"
 
 
@@ -134,8 +135,8 @@ def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
     assert "+float32 speed" in done.stdout
     assert "::error file=demo/msg/Drive.msg,line=1,endLine=1,col=1" in done.stdout
     assert "title=IDL507 field-type-changed" in done.stdout
-    sarif = json.loads((here / "idlc.sarif").read_text())
-    assert [one["ruleId"] for one in sarif["runs"][0]["results"]] == ["IDL421"]
+    results = run_of((here / "idlc.sarif").read_text())["results"]
+    assert [one["ruleId"] for one in results] == ["IDL421"]
 
 
 def test_the_actions_inputs(pull_request):
