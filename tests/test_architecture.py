@@ -27,8 +27,13 @@ OUTERMOST = {"__main__": "cli", "__init__": "text", "build": "cli"}
 MAY_DO_IO = {"disk", "cli"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
-#: What may read idlc's own files: its templates, its runtime, texts of licences.
-READS_ITS_OWN = {"idlc/emit/render.py", "idlc/scaffold/package.py"}
+#: What may read files of idlc: grammar, catalogue, templates, runtime, texts of licences.
+READS_ITS_OWN = {
+    "idlc/emit/render.py",
+    "idlc/model/catalog.py",
+    "idlc/scaffold/package.py",
+    "idlc/syntax/grammar.py",
+}
 
 #: What runtime modules may import besides the standard library and each other, and only inside
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
@@ -222,17 +227,45 @@ def test_this_document_names_real_tests():
     assert "\n13. " not in text, "more invariants than anyone remembers"
 
 
+def imported_by(*words: str, cwd: Path, given: str = "runpy") -> set[str]:
+    """Return the modules that a run of idlc imports besides `given` and what that imports."""
+    code = (
+        f"import runpy, sys, {given}\n"
+        "before = set(sys.modules)\n"
+        f"sys.argv = {['idlc', *words]!r}\n"
+        "try:\n    runpy.run_module('idlc', run_name='__main__')\n"
+        "except SystemExit as done:\n    assert not done.code, done.code\n"
+        "print('imported', *set(sys.modules) - before)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=cwd, capture_output=True, text=True, check=True
+    )
+    first, *names = done.stdout.splitlines()[-1].split()
+    assert first == "imported"
+    return set(names)
+
+
 @pytest.mark.parametrize("option", ["--version", "--help"])
 def test_starting_up_imports_nothing_heavy(option, tmp_path):
     heavy = {"jinja2", "lark", "msgspec", "numpy", "rich"}
-    code = (
-        "import runpy, sys\n"
-        f"sys.argv = ['idlc', {option!r}]\n"
-        "try:\n    runpy.run_module('idlc', run_name='__main__')\n"
-        "except SystemExit as done:\n    assert not done.code, done.code\n"
-        f"print('imported', sorted({heavy!r}.intersection(sys.modules)))\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "imported []"
+    assert heavy & imported_by(option, cwd=tmp_path) == set()
+
+
+def test_checking_a_file_imports_little(tmp_path):
+    """A hook does it for each commit: it is to cost less than five starts of Python."""
+    files = {
+        "package.xml": '<package format="3"><name>demo</name><depend>std_msgs</depend></package>',
+        "msg/Drive.msg": "# How fast to drive.\nstd_msgs/Header header\nfloat64 speed  # [m/s]\n",
+        "msg/Other.msg": "int8 other\n",
+    }
+    for path, text in files.items():
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_text(text)
+    found = imported_by("check", "msg/Drive.msg", cwd=tmp_path, given="msgspec")
+    needless = {"argparse", "ast", "click", "dataclasses", "hashlib", "importlib.metadata"}
+    needless |= {"importlib.resources", "inspect", "jinja2", "json", "lark", "libcst", "logging"}
+    needless |= {"numpy", "pkgutil", "rich", "shutil", "subprocess", "tempfile", "tomllib"}
+    assert needless & found == set()
+    own = {name for name in found if name.partition(".")[0] == "idlc"}
+    assert "idlc.checks.package" in own
+    assert len(own) <= 70, "what a run without problems does not need can wait"

@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from idlc.syntax import lalr, quick
-from idlc.syntax.grammar import LINE_ENDS, grammar, terminal
+from idlc.syntax.grammar import LINE_ENDS, grammar, terminals
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "spec" / "accept_reject.jsonl"
 TEXTS = [
@@ -61,12 +61,12 @@ def test_nearly_all_lines_are_ordinary():
 
 
 def test_terminals_are_those_that_lark_reads():
-    terminals = {one.name: one.pattern.to_regexp() for one in lalr._lark().terminals}
+    read = {one.name: one.pattern.to_regexp() for one in lalr._lark().terminals}
     # lark spells control characters out
-    plain = {name for name in terminals if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar())}
+    plain = {name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar())}
     plain -= {"CODE", "COMMENT", "NEWLINE", "SEPARATOR"}
     assert len(plain) > 10
-    assert {name: terminal(name) for name in plain} == {name: terminals[name] for name in plain}
+    assert {name: terminals()[name] for name in plain} == {name: read[name] for name in plain}
 
 
 @pytest.mark.parametrize(("line", "needs_lark"), [("int8 a 5  # x", False), ("int8[][] a", True)])

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.text.source import Source, Span
 
 
-class Statement(NamedTuple):
+class Statement(msgspec.Struct, frozen=True):
     """An element directly below <package>, or below its <export>; `span` is its start tag."""
 
     tag: str
@@ -16,7 +17,7 @@ class Statement(NamedTuple):
     span: Span
 
 
-class Output(NamedTuple):
+class Output(msgspec.Struct, frozen=True):
     """Code that idlc generated within the package: its lock, and the inputs recorded in it."""
 
     path: str
@@ -24,14 +25,14 @@ class Output(NamedTuple):
     inputs: Mapping[str, str]
 
 
-class Facts(NamedTuple):
+class Facts(msgspec.Struct, frozen=True):
     """A package with a package.xml.
 
     `modules` are its Python files by dotted name, tests excluded. `inputs` are the digests of its
-    interface files by name within the package, `whole` is whether these are all that it has.
-    `generates` is whether its CMakeLists.txt calls rosidl_generate_interfaces, `native` whether it
-    has C or C++ sources, `marker` whether resource/NAME exists. `known` are the names of ROS
-    packages that can be found.
+    interface files by name within the package, empty without `outputs`; `whole` is whether these
+    files are all that it has. `generates` is whether its CMakeLists.txt calls
+    rosidl_generate_interfaces, `native` whether it has C or C++ sources, `marker` whether
+    resource/NAME exists. `known` are the names of ROS packages that can be found.
     """
 
     name: str

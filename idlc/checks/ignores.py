@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
 
 import msgspec
 
@@ -21,10 +20,10 @@ from idlc.text.diagnostics import Diagnostic, Edit, Severity
 from idlc.text.source import Source, Span
 
 # the lengths are bounded, or a long comment without an end would take for ever
-_REMARK = re.compile(r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)")
+_REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
 
 
-class Remark(NamedTuple):
+class Remark(msgspec.Struct, frozen=True):
     """One code that a remark names; `lines` are those that it is about, `None` for the file."""
 
     code: str
@@ -102,13 +101,14 @@ def _remarks(source: Source) -> Iterator[Remark]:
             else:
                 yield from found
             if line.definition:
-                yield from (remark._replace(lines=frozenset({here})) for remark in waiting)
+                lines = frozenset({here})
+                yield from (msgspec.structs.replace(one, lines=lines) for one in waiting)
                 waiting = []
         yield from waiting
 
 
 def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Iterator[Remark]:
-    match = _REMARK.search(line.comment)
+    match = re.search(_REMARK, line.comment)
     if match is None:
         return
     start = line.start + len(line.code)

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from idlc.checks.facts import Facts
-from idlc.checks.python_files import Text, defines, read_setup
 from idlc.model.link import Model
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 from idlc.text.source import Span
+
+if TYPE_CHECKING:
+    from idlc.checks.python_files import Setup, Text
+    from idlc.text.source import Source
+
+
+def _said(setup: Source) -> Setup:
+    from idlc.checks.python_files import read_setup  # what has no setup.py needs no ast
+
+    return read_setup(setup)
 
 
 def installed_interfaces(facts: Facts, model: Model, report: Report) -> None:
     """setup.py installs the interface files, without which `ros2 interface show` finds nothing."""
     if facts.setup_py is None or facts.build_type != "ament_python":
         return
-    said = read_setup(facts.setup_py).data_files
+    said = _said(facts.setup_py).data_files
     texts = [text.value for text in said or ()]
     for kind in sorted({interface.name.kind for interface in model.own}):
         if said is not None and not texts:
@@ -33,7 +44,7 @@ def resource_marker(facts: Facts, _: Model, report: Report) -> None:
     """The package's marker is there and installed, without which `ros2 run` does not find it."""
     if facts.setup_py is None or facts.build_type != "ament_python":
         return
-    said = read_setup(facts.setup_py).data_files
+    said = _said(facts.setup_py).data_files
     if not facts.marker:
         report.add(
             codes.NO_RESOURCE_MARKER.at(
@@ -57,13 +68,15 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
     """Each console script names a function that is there."""
     if facts.setup_py is None:
         return
-    for text in read_setup(facts.setup_py).scripts:
+    for text in _said(facts.setup_py).scripts:
         problem = _problem(text, facts)
         if problem:
             report.add(codes.BAD_ENTRY_POINT.at(text.span, problem[0], hint=problem[1]))
 
 
 def _problem(text: Text, facts: Facts) -> tuple[str, str] | None:
+    from idlc.checks.python_files import defines
+
     script, equals, target = text.value.partition("=")
     module, colon, function = (part.strip() for part in target.partition(":"))
     if not equals or not colon or not function:
@@ -84,7 +97,7 @@ def _problem(text: Text, facts: Facts) -> tuple[str, str] | None:
 
 def names(facts: Facts, _: Model, report: Report) -> None:
     """setup.py and setup.cfg call the package what package.xml calls it."""
-    said = read_setup(facts.setup_py).name if facts.setup_py else None
+    said = _said(facts.setup_py).name if facts.setup_py else None
     if said is not None and said.value.replace("-", "_") != facts.name:
         report.add(
             codes.NAME_MISMATCH.at(

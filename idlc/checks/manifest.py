@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import msgspec
 
 from idlc.checks.facts import Facts
-from idlc.checks.python_files import imported_packages
 from idlc.checks.scope import sections
 from idlc.model import catalog, ir
 from idlc.model.link import Model
@@ -97,6 +96,10 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
 
 def declared_imports(facts: Facts, _: Model, report: Report) -> None:
     """ROS packages that the nodes import are declared."""
+    if not facts.modules:
+        return
+    from idlc.checks.python_files import imported_packages
+
     declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
     for source in facts.modules.values():
         for package, span in imported_packages(source):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Severity
@@ -42,7 +43,7 @@ def _means(word: str, code: str) -> bool:
     return word in ("all", category(code), codes.CODES[code].slug)
 
 
-class Selection(NamedTuple):
+class Selection(msgspec.Struct, frozen=True):
     """What is wanted; `select` replaces what is on by default, `ignore` takes away from it.
 
     `per_path` are pairs of a path, in which `*` and `?` stand for any text, and what to ignore

@@ -7,6 +7,7 @@ from importlib import import_module
 import click
 
 from idlc import __version__
+from idlc.cli.ending import PipeClosedError
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {
@@ -21,10 +22,6 @@ COMMANDS = {
     "scaffold": "Write packages, interfaces and nodes.",
     "explain": "Explain a code such as IDL201.",
 }
-
-
-class PipeClosedError(Exception):
-    """Nobody reads what idlc writes any more; click would end the process itself."""
 
 
 class LazyGroup(click.Group):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-
 import click
 
 from idlc.cli import options
@@ -44,23 +42,7 @@ def command(
 
     Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
     """
-    from idlc.cli import reports, terminal
-    from idlc.disk import config, tables
-    from idlc.driver.check import Checked, CheckOptions, check
-    from idlc.text.diagnostics import Report
+    from idlc.cli.checking import Wishes, check_paths
 
-    report = Report()
-    settings = config.load(report)
-    chosen = options.selection(tables.selection(settings, report), select, ignore)
-    checked = Checked(())
-    if not report.had_errors:
-        wanted = CheckOptions(
-            paths=paths or settings.paths or (".",),
-            package=package or settings.package,
-            include=(*include, *settings.include),
-            selection=chosen,
-            fix=fix,
-        )
-        checked = check(wanted, report)
-    reports.write(report, style, checked.files, checked.fixed, sys.stdout)
-    return terminal.status(report) or int(strict and bool(len(report)))
+    options.check_rules(select, ignore)
+    return check_paths(paths, Wishes(select, ignore, fix, strict, package, include, style))

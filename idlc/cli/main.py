@@ -1,5 +1,6 @@
-"""The entry point: the version at once, everything else through click."""
+"""The entry point: what hooks call at once, everything else through click."""
 
+import gc
 import sys
 from collections.abc import Sequence
 
@@ -8,10 +9,24 @@ from idlc import __version__
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is not None:
+        return _run(list(arguments))
+    status = _run(sys.argv[1:])
+    # the program ends: to look for garbage once more takes longer than to check a file
+    gc.freeze()
+    return status
+
+
+def _run(words: list[str]) -> int:
     if words in (["--version"], ["-V"]):
         sys.stdout.write(f"idlc {__version__}\n")
         return 0
+    if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
+        # hooks call this for each commit, and to import click takes longer than to check a file
+        from idlc.cli.checking import check_paths
+        from idlc.cli.ending import ended
+
+        return ended(lambda: check_paths(tuple(words[1:])))
     from idlc.cli.run import run
 
     return run(words)

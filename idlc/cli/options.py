@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import click
 
 FORMATS = ("text", "json")
 REPORT_FORMATS = (*FORMATS, "github", "sarif", "junit", "gitlab")
-
-if TYPE_CHECKING:
-    from idlc.checks.select import Selection
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -62,16 +59,11 @@ def report_style(command: Command) -> Command:
     )(command)
 
 
-def selection(configured: Selection, select: str | None, ignore: str | None) -> Selection:
-    """Return which warnings are wanted: what pyproject.toml says, and what was typed."""
+def check_rules(*lists: str | None) -> None:
+    """Refuse lists of rules that name one that there is not."""
     from idlc.checks.select import is_selector
 
-    for words in (select, ignore):
+    for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
                 raise click.UsageError(f"{word!r} means no rule; see `idlc explain` for codes")
-    if select:
-        configured = configured._replace(select=tuple(select.split(",")))
-    if ignore:
-        configured = configured._replace(ignore=(*configured.ignore, *ignore.split(",")))
-    return configured

@@ -1,78 +1,31 @@
-"""Running a command: how it ends, whatever happens."""
+"""Running a command with its options, which click reads."""
 
 from __future__ import annotations
 
-import contextlib
-import os
 import sys
 from pathlib import Path
 
 import click
 
-from idlc.cli.app import PipeClosedError, app
-
-#: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
-INTERRUPTED = 130
-PIPE_CLOSED = 141
-INTERNAL = 3
+from idlc.cli.app import app
+from idlc.cli.ending import ended
 
 
 def run(words: list[str]) -> int:
-    """Run a command and return the exit status; only a debugged run shows a traceback."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, ValueError):
-            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    """Run a command and return the exit status."""
+    return ended(lambda: _through_click(words))
+
+
+def _through_click(words: list[str]) -> object:
     try:
-        Path.cwd()
-    except OSError:
-        sys.stderr.write("Error: the working folder is gone\n")
-        return 2
-    try:
-        status = app.main(words, prog_name=_called_as(), standalone_mode=False)
-        sys.stdout.flush()
+        return app.main(words, prog_name=_called_as(), standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return 2
-    except (KeyboardInterrupt, click.Abort):
-        sys.stderr.write("interrupted\n")
-        return INTERRUPTED
-    except (BrokenPipeError, PipeClosedError):
-        # what is still buffered would fail again when Python closes the stream
-        with contextlib.suppress(OSError, ValueError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return PIPE_CLOSED
-    except Exception as error:
-        return _internal(error)
-    return status if isinstance(status, int) else 0
+    except click.Abort as error:
+        raise KeyboardInterrupt from error
 
 
 def _called_as() -> str:
     name = Path(sys.argv[0]).stem
     return name if name == "rosidlc" else "idlc"
-
-
-def _internal(error: Exception) -> int:
-    """Show what must not happen as IDL901."""
-    from idlc.cli import terminal
-    from idlc.driver.stages import InternalError
-    from idlc.text import codes
-    from idlc.text.diagnostics import Report
-
-    cause, where, subject = error, "", ""
-    if isinstance(error, InternalError):
-        where, subject = f" in stage `{error.stage}`", error.subject
-        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
-    if os.environ.get("IDLC_DEBUG") == "1":
-        import traceback
-
-        traceback.print_exception(type(error), error, error.__traceback__)
-    report = Report()
-    report.add(
-        codes.INTERNAL.of(
-            subject,
-            f"idlc failed{where}: {type(cause).__name__}: {cause}",
-            hint="this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened",
-        )
-    )
-    terminal.show(report, "text", sys.stderr)
-    return INTERNAL

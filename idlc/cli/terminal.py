@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from typing import TextIO
 
@@ -31,6 +30,8 @@ def _spaced(report: Report, stream: TextIO) -> list[str]:
 
 def fact(stream: TextIO, kind: str, **facts: object) -> None:
     """Write a JSON line that is not a problem."""
+    import json
+
     stream.write(json.dumps({"type": kind, **facts}) + "\n")
 
 

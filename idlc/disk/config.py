@@ -11,7 +11,9 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from idlc.disk.read import decode, is_file, read_bytes, shown
 from idlc.text import codes
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 FILE = "pyproject.toml"
 
 
-class Config(NamedTuple):
+class Config(msgspec.Struct, frozen=True):
     """The settings found; what is absent is empty or `None`. Paths are as one would type them.
 
     `tables` holds the tables of single commands, which are checked by `idlc.disk.tables`;

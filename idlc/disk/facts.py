@@ -54,7 +54,7 @@ def facts(given: Inputs, known: Callable[[], Iterable[str]]) -> Facts | None:
         name=given.package,
         manifest=source,
         statements=said,
-        inputs=given.digests,
+        inputs=given.digests if locks else {},
         modules=modules,
         setup_py=_optional(folder / "setup.py"),
         setup_cfg=_optional(folder / "setup.cfg"),

@@ -6,7 +6,9 @@ import os
 import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+import msgspec
 
 from idlc.disk.package import manifest
 from idlc.disk.read import absolute, kind_of, unreadable
@@ -25,7 +27,7 @@ SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 
 
-class InterfaceFile(NamedTuple):
+class InterfaceFile(msgspec.Struct, frozen=True):
     """An interface file.
 
     `given` is the path on the command line that led to it, `root` the folder that holds the

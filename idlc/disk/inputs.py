@@ -6,7 +6,8 @@ import keyword
 from collections.abc import Iterable, Mapping
 from importlib.machinery import BuiltinImporter, FrozenImporter
 from pathlib import Path
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.disk.find import InterfaceFile
 from idlc.disk.lock import digest
@@ -23,7 +24,7 @@ _LOADED = frozenset(
 )
 
 
-class Input(NamedTuple):
+class Input(msgspec.Struct, frozen=True):
     """An input file and its bytes."""
 
     file: InterfaceFile
@@ -34,7 +35,7 @@ class Input(NamedTuple):
         return decode(self.data, self.file.shown, report)
 
 
-class Inputs(NamedTuple):
+class Inputs(msgspec.Struct, frozen=True):
     """The files of one package, in order, and the folders that they lie in."""
 
     package: str

@@ -6,7 +6,6 @@ The file is JSON, sorted and indented, and names nothing of the machine that it 
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from pathlib import Path, PurePosixPath
 
 import msgspec
@@ -51,6 +50,8 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
 
 def digest(data: bytes) -> str:
     """Return the SHA-256 of bytes."""
+    import hashlib  # loads OpenSSL, which a check does without
+
     return hashlib.sha256(data).hexdigest()
 
 

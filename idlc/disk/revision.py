@@ -9,6 +9,8 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+import msgspec
+
 from idlc.disk.find import CLOSING, KINDS, InterfaceFile, find
 from idlc.disk.package import MANIFEST
 from idlc.disk.read import absolute
@@ -35,7 +37,7 @@ class Revision(NamedTuple):
         there = [place for path in paths if (place := self.counterpart(path))]
         found = find([place for place in there if Path(place).exists()], unheard := Report())
         report.extend(one for one in unheard if one.code != codes.NO_INTERFACES.id)
-        return tuple(file._replace(shown=self._shown(file.path)) for file in found)
+        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
 
     def _shown(self, path: Path) -> str:
         """Return how a file of the revision is called in messages."""

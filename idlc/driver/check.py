@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+import msgspec
 
 from idlc.disk import inputs
 from idlc.disk.facts import facts
 from idlc.disk.find import find
 from idlc.disk.library import Library
-from idlc.disk.rewrite import mend
 from idlc.driver.stages import compile_package, sources_of, stage
 from idlc.text.diagnostics import Diagnostic, Report
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from idlc.text.source import Source
 
 
-class CheckOptions(NamedTuple):
+class CheckOptions(msgspec.Struct, frozen=True):
     """What `idlc check` was asked to do."""
 
     paths: tuple[str, ...]
@@ -29,7 +30,7 @@ class CheckOptions(NamedTuple):
     fix: bool = False
 
 
-class Checked(NamedTuple):
+class Checked(msgspec.Struct, frozen=True):
     """The files that were looked at, and how many edits were made."""
 
     files: tuple[str, ...]
@@ -43,6 +44,8 @@ def check(options: CheckOptions, report: Report) -> Checked:
     """
     fixed = 0
     if options.fix:
+        from idlc.disk.rewrite import mend
+
         found = list(_once(options, report)[1])
         if not report.had_errors:
             fixed = mend((edit for one in found for edit in one.edits), report)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -17,12 +18,9 @@ from idlc.text.source import Source
 
 
 @lru_cache(maxsize=1)
-def _entries() -> dict[str, list[dict[str, list[list[Any]]]]]:
-    from pkgutil import get_data
-
-    data = get_data("idlc.model", "catalog.json")
-    assert data is not None, "the package is not whole"
-    return msgspec.json.decode(data, type=dict[str, list[dict[str, list[list[Any]]]]])
+def _entries() -> dict[str, msgspec.Raw]:
+    data = Path(__file__).with_name("catalog.json").read_bytes()
+    return msgspec.json.decode(data, type=dict[str, msgspec.Raw])
 
 
 @lru_cache(maxsize=1)
@@ -43,9 +41,10 @@ def interfaces() -> tuple[ir.TypeName, ...]:
 
 def source(name: ir.TypeName) -> Source | None:
     """Return the text of an interface, or `None` if the catalogue does not have it."""
-    sections = _entries().get(str(name))
-    if sections is None:
+    entry = _entries().get(str(name))
+    if entry is None:
         return None
+    sections = msgspec.json.decode(entry, type=list[dict[str, list[list[Any]]]])
     text = "---\n".join(_section(section) for section in sections)
     return Source(f"<catalogue>/{name}.{name.kind}", text)
 

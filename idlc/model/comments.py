@@ -6,7 +6,8 @@ import re
 import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.syntax.escapes import EscapeError, through_idl
 from idlc.text import codes
@@ -15,7 +16,7 @@ from idlc.text import codes
 _UNIT_END = re.compile(r"[,\]]")
 
 
-class Comment(NamedTuple):
+class Comment(msgspec.Struct, frozen=True):
     """A condensed comment: its lines, and the unit that stood in brackets, if one did."""
 
     lines: tuple[str, ...] = ()
@@ -55,7 +56,7 @@ def brackets(text: str) -> Iterator[tuple[str, str]]:
         at = text.find("[", end.end())
 
 
-class Problem(NamedTuple):
+class Problem(msgspec.Struct, frozen=True):
     """A comment that breaks ROS 2's pipeline; `text` is the guilty piece of it."""
 
     code: codes.Code

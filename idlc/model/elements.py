@@ -10,7 +10,6 @@ from idlc.text import codes
 QUOTES = ('"', "'")
 #: Elements that a default may have; each takes about a kilobyte on its way.
 MAX_ELEMENTS = 200_000
-_NO_BLANK = re.compile("[^ ]")
 
 
 def elements(inside: str) -> list[tuple[str, int]] | Fault:
@@ -63,7 +62,7 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
 
 def _behind_blanks(text: str, at: int) -> int:
     """Return the first place from `at` on where no blank stands."""
-    found = _NO_BLANK.search(text, at)
+    found = re.compile("[^ ]").search(text, at)  # compiled once, by re
     return found.start() if found else len(text)
 
 

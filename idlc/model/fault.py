@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import msgspec
 
 from idlc.text import codes
 
 
-class Fault(NamedTuple):
+class Fault(msgspec.Struct, frozen=True):
     """What is wrong with a value; `start` and `end` count from the beginning of its text."""
 
     code: codes.Code
@@ -18,4 +18,4 @@ class Fault(NamedTuple):
 
     def moved(self, offset: int) -> Fault:
         """Return the same fault in a longer text that has `offset` characters before."""
-        return self._replace(start=self.start + offset, end=self.end + offset)
+        return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from idlc.model import derive, ir
-from idlc.model.describe import Describer
 from idlc.model.lower import lower
 from idlc.model.types import STRINGS
 from idlc.syntax.parse import parse
@@ -15,6 +14,9 @@ from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report, Severity
 from idlc.text.source import Source, Span
 from idlc.text.suggest import did_you_mean
+
+if TYPE_CHECKING:
+    from idlc.model.describe import Describer
 
 #: Problems after which nearest names are no longer looked for; people see fewer than these.
 SUGGESTIONS = 200
@@ -65,6 +67,8 @@ class Model:
     @cached_property
     def describer(self) -> Describer:
         """Type descriptions and hashes of everything in the model."""
+        from idlc.model.describe import Describer
+
         return Describer(self.interfaces)
 
 

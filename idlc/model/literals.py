@@ -5,18 +5,18 @@ Lives in the model, not in the syntax, because only the type says what a literal
 
 from __future__ import annotations
 
-import ast
 import math
 import re
-import warnings
 from functools import cache
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
+
+import msgspec
 
 from idlc.model import ir
 from idlc.model.elements import MAX_ELEMENTS, QUOTES, elements, string_elements
 from idlc.model.fault import Fault
 from idlc.syntax.escapes import EscapeError, read_back, through_idl
-from idlc.syntax.grammar import terminal
+from idlc.syntax.grammar import terminals
 from idlc.text import codes
 
 FLOAT32_MAX = 3.402823466e38
@@ -24,7 +24,7 @@ FLOAT32_MAX = 3.402823466e38
 LONG = 1000
 
 
-class Text(NamedTuple):
+class Text(msgspec.Struct, frozen=True):
     """A string value: as rosidl's adapter takes it from the file, and after the pipeline."""
 
     raw: str
@@ -64,7 +64,7 @@ def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
 
 @cache
 def _shape(name: str) -> re.Pattern[str]:
-    return re.compile(terminal(name))
+    return re.compile(terminals()[name])
 
 
 def _fault(code: codes.Code, text: str, message: str, hint: str) -> Fault:
@@ -194,6 +194,9 @@ def _element(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault
 
 def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fault:
     """Take the values through the pipeline, where they travel as the text of a Python tuple."""
+    import ast
+    import warnings
+
     literal = repr(values).replace("\\", "\\\\").replace('"', '\\"')
     try:
         annotation = read_back(literal, text)

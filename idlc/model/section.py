@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from itertools import takewhile
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.model import ir, names
 from idlc.model.comments import Comment, condense, problem
@@ -34,7 +35,7 @@ def lower_section(
     return _Section(file, section, name, report).lower()
 
 
-class _Element(NamedTuple):
+class _Element(msgspec.Struct, frozen=True):
     """A definition with the lines whose comments belong to it."""
 
     line: tree.Line
@@ -58,7 +59,8 @@ class _Section:
         comment = self._condense([_head_text(line) for line in head], head, has_unit=False)
         fields: list[ir.Field] = []
         constants: list[ir.Constant] = []
-        for line, body, lines in self._elements(len(head)):
+        for element in self._elements(len(head)):
+            line, body, lines = element.line, element.body, element.comments
             texts = [_comment_text(commented) for commented in lines]
             if isinstance(body, tree.Field):
                 about = self._condense(texts, lines, has_unit=True)
@@ -107,7 +109,7 @@ class _Section:
     def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
         """Return an element's comment; `has_unit` is whether rosidl writes its unit anywhere."""
         comment = condense(texts)
-        found = problem(comment if has_unit else comment._replace(unit=None))
+        found = problem(comment if has_unit else msgspec.structs.replace(comment, unit=None))
         if found is not None:
             span = self._find(found.text, lines)
             self.report.add(found.code.at(span, found.message, hint=found.hint))

@@ -11,16 +11,15 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_WRITTEN = re.compile(
-    r"""\\(?:
+# compiled when a backslash is met, which few files have
+_WRITTEN = r"""(?xs)
+    \\(?:
         (?P<simple>[\\'"abfnrtv\n]) | (?P<octal>[0-7]{1,3})
         | x(?P<x>[0-9a-fA-F]{2}) | u(?P<u>[0-9a-fA-F]{4}) | U(?P<U>[0-9a-fA-F]{8})
         | N\{(?P<N>[^}]+)\} | (?P<truncated>[xuUN]|$) | (?P<unknown>.)
-    )""",
-    re.VERBOSE | re.DOTALL,
-)
-_READ = re.compile(r"""\\(?:([ntvbrfa\\'"])|(\?)|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))""")
-_CLOSING_QUOTE = re.compile(r'(?<!\\)(?:\\\\)*"')
+    )"""
+_READ = r"""\\(?:([ntvbrfa\\'"])|(\?)|([0-7]{1,3})|x([0-9a-fA-F]{1,2}))"""
+_CLOSING_QUOTE = r'(?<!\\)(?:\\\\)*"'
 _SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v": "\v", "\n": ""}
 
 
@@ -41,7 +40,7 @@ def through_idl(text: str) -> str:
     if "\\" not in text and "\n" not in text:
         return text
     # B: the escapes are interpreted over the UTF-8 bytes
-    written = _WRITTEN.sub(_interpret, text.encode().decode("latin-1"))
+    written = re.sub(_WRITTEN, _interpret, text.encode().decode("latin-1"))
     return read_back(written.replace('"', '\\"'), text)
 
 
@@ -61,7 +60,7 @@ def read_back(literal: str, text: str) -> str:
     if _end_of_literal(literal) != len(literal):
         raise EscapeError("a backslash that swallows the closing quote", *_place(text, r"\\+"))
     try:
-        once = _READ.sub(_reread, literal)
+        once = re.sub(_READ, _reread, literal)
     except ValueError:
         raise EscapeError(r"an incomplete `\x` escape", *_place(text, r"\\+x")) from None
     return re.sub(r'\\(["\\])', r"\1", once)
@@ -69,7 +68,7 @@ def read_back(literal: str, text: str) -> str:
 
 def plain_meaning(text: str) -> str:
     """Return what a reader would take `text` to mean: each escape interpreted once."""
-    return _READ.sub(_reread, text)
+    return re.sub(_READ, _reread, text)
 
 
 def _interpret(match: re.Match[str]) -> str:
@@ -120,7 +119,7 @@ def _reread(match: re.Match[str]) -> str:
 
 
 def _end_of_literal(literal: str) -> int:
-    found = _CLOSING_QUOTE.search(literal + '"')
+    found = re.search(_CLOSING_QUOTE, literal + '"')
     return found.end() - 1 if found else -1
 
 

@@ -121,9 +121,10 @@ def _with_code(block: Iterable[_Row]) -> Iterator[_Row]:
 
 
 def _code(row: _Row) -> str:
-    if isinstance(row.body, tree.Field):
-        type_, name, default = row.body
-        return " ".join([type_.whole.text, name.text, *([default.text] if default else ())])
+    body = row.body
+    if isinstance(body, tree.Field):
+        default = [body.default.text] if body.default else ()
+        return " ".join([body.type.whole.text, body.name.text, *default])
     return row.code
 
 

@@ -10,26 +10,27 @@ import re
 from functools import lru_cache
 
 from idlc.syntax import tree
-from idlc.syntax.grammar import LINE_ENDS, terminal
+from idlc.syntax.grammar import LINE_ENDS, terminals
 
-_UNUSUAL_END = re.compile(f"[{LINE_ENDS[1:]}]")
+_UNUSUAL_ENDS = frozenset(LINE_ENDS[1:])
 _SEPARATOR = "---"
 
 
 @lru_cache(maxsize=1)
 def _definition() -> re.Pattern[str]:
-    size = terminal("SIZE")
+    known = terminals()
+    size = known["SIZE"]
     return re.compile(
-        rf"(?P<type>(?P<base>{terminal('TYPE_NAME')})(?:<=(?P<bound>{size}))?"
+        rf"(?P<type>(?P<base>{known['TYPE_NAME']})(?:<=(?P<bound>{size}))?"
         rf"(?P<array>\[(?:(?P<most><=)?(?P<size>{size}))?\])?) \s*"
-        rf"(?:(?P<field>{terminal('NAME')})(?: \s*(?P<default>{terminal('DEFAULT')}))?"
-        rf"|(?P<constant>{terminal('CONSTANT_NAME')})?(?P<sign>=)(?P<value>{terminal('VALUE')})?)"
+        rf"(?:(?P<field>{known['NAME']})(?: \s*(?P<default>{known['DEFAULT']}))?"
+        rf"|(?P<constant>{known['CONSTANT_NAME']})?(?P<sign>=)(?P<value>{known['VALUE']})?)"
     )
 
 
 def lines(text: str) -> tuple[object, ...] | None:
     """Return what `lalr.lines` returns, or `None` for a text with unusual line ends."""
-    if _UNUSUAL_END.search(text):
+    if not _UNUSUAL_ENDS.isdisjoint(text):
         return None
     parts: list[object] = []
     section: list[tree.Line] = []

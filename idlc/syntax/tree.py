@@ -6,7 +6,9 @@ can be shared; `File.span` turns them into places in the file.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
+
+import msgspec
 
 from idlc.text.source import Source, Span
 
@@ -14,7 +16,7 @@ from idlc.text.source import Source, Span
 BYTE_ORDER_MARK = "\ufeff"
 
 
-class Piece(NamedTuple):
+class Piece(msgspec.Struct, frozen=True):
     """Some text and where it stands in its line; TABs are spaces here."""
 
     text: str
@@ -26,7 +28,7 @@ class Piece(NamedTuple):
         return self.start + len(self.text)
 
 
-class Type(NamedTuple):
+class Type(msgspec.Struct, frozen=True):
     """A type as written. `size` is `None` for `[]`; `brackets` is `None` without an array part."""
 
     whole: Piece
@@ -37,7 +39,7 @@ class Type(NamedTuple):
     size: Piece | None = None
 
 
-class Field(NamedTuple):
+class Field(msgspec.Struct, frozen=True):
     """`TYPE NAME [DEFAULT]`."""
 
     type: Type
@@ -45,7 +47,7 @@ class Field(NamedTuple):
     default: Piece | None
 
 
-class Constant(NamedTuple):
+class Constant(msgspec.Struct, frozen=True):
     """`TYPE NAME=VALUE`; name and value may be empty pieces."""
 
     type: Type
@@ -53,7 +55,7 @@ class Constant(NamedTuple):
     value: Piece
 
 
-class Broken(NamedTuple):
+class Broken(msgspec.Struct, frozen=True):
     """Code that is no definition: the guilty piece, a code's slug and words for the reader."""
 
     slug: str
@@ -65,7 +67,7 @@ class Broken(NamedTuple):
 Body: TypeAlias = Field | Constant | Broken
 
 
-class Line(NamedTuple):
+class Line(msgspec.Struct, frozen=True):
     """One line. `code` is what stands before the comment, `comment` starts with its `#`."""
 
     start: int
@@ -84,14 +86,14 @@ class Line(NamedTuple):
         return self.code.replace("\t", " ").rstrip()
 
 
-class Section(NamedTuple):
+class Section(msgspec.Struct, frozen=True):
     """The lines between two separators; `start` is the offset of the first."""
 
     start: int
     lines: tuple[Line, ...]
 
 
-class File(NamedTuple):
+class File(msgspec.Struct, frozen=True):
     """A file: its sections and the offsets of the separators between them."""
 
     source: Source

@@ -6,7 +6,7 @@ changes, 6xx files and projects, 9xx idlc itself. `explain/<id>.md` holds each o
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import msgspec
 
 from idlc.text.diagnostics import Diagnostic, Label, Severity
 from idlc.text.source import Span
@@ -15,7 +15,7 @@ ERROR = Severity.ERROR
 WARNING = Severity.WARNING
 
 
-class Code(NamedTuple):
+class Code(msgspec.Struct, frozen=True):
     """A kind of problem: its stable id, its short name and how bad it is."""
 
     id: str

@@ -7,9 +7,9 @@ a file reaches the terminal as itself.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+
+import msgspec
 
 from idlc.text.codes import CODES
 from idlc.text.diagnostics import Diagnostic, Label, Severity
@@ -40,7 +40,7 @@ class _Paint:
         return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if self._colour and text else text
 
 
-class _Mark(NamedTuple):
+class _Mark(msgspec.Struct, frozen=True):
     """A stretch of one line to underline; `start` and `end` are characters from its start."""
 
     source: Source
@@ -173,6 +173,8 @@ def counted(number: int, noun: str) -> str:
 
 def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
     """Yield each problem as a JSON object on a line of its own, ASCII only."""
+    import json
+
     for diagnostic in diagnostics:
         yield json.dumps(_facts(diagnostic)) + "\n"
 
