@@ -83,7 +83,9 @@ def interface(
         return None
     needed = set(derive.IMPLICIT_PACKAGES[kind]) | {one.package for one in model.interfaces}
     depends = sorted(needed - {own} - _reached_only(model))
-    edits = manifest_edit(project, depends, [], group=True)
+    added = {path: text, **_test_of_interfaces(project, own)}
+    tests = ["python3-pytest"] if len(added) > 1 else []
+    edits = manifest_edit(project, depends, tests, group=True)
     lists = project.text("CMakeLists.txt")
     if lists is not None:
         edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
@@ -93,7 +95,16 @@ def interface(
     if lists is None:
         keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
         edited |= dict([interface_text.index(own, keys | {path})])
-    return write(project, {path: text}, edited, settings, report)
+    return write(project, added, edited, settings, report)
+
+
+def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:
+    """Return the test that `colcon test` runs, for a package that says what idlc generates."""
+    path = "test/test_interfaces.py"
+    if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
+        return {}
+    plain = package_files.Package(own, "", "", "", package_files.LICENSES[0])
+    return {path: package_files.rendered("scaffold_test_interfaces.py.jinja", plain)}
 
 
 def _reached_only(model: Model) -> set[str]:

@@ -85,9 +85,8 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     said = run(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(site))
     assert ("Drive" if name == "demo" else "RobotCommand") in said
     commands = {path.name for path in (prefix / "lib" / name).iterdir()}
-    assert commands == {path.stem.removeprefix("test_") for path in package.glob("test/test_*")} - {
-        "style"
-    }
+    tests = {path.stem.removeprefix("test_") for path in package.glob("test/test_*")}
+    assert commands == tests - {"interfaces", "style"}
 
 
 def is_interface(path: Path) -> bool:
@@ -143,3 +142,55 @@ def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp
     assert done.returncode != 0
     assert "error[IDL201]: unknown type `flot32`" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def colcon_test(folder: Path, *, path: str) -> tuple[bool, str]:
+    """Return whether the tests of a package's interfaces pass in colcon, and what is said."""
+    colcon = Path(sys.executable).parent / "colcon"
+    words = ["--log-base", "log", "test", "--event-handlers", "console_direct+"]
+    words += ["--pytest-args", "test/test_interfaces.py", "-rs", "-p", "no:cacheprovider"]
+    said = run(colcon, *words, cwd=folder, PYTHONPATH=path)
+    result = [colcon, "--log-base", "log", "test-result", "--verbose"]
+    done = subprocess.run(result, cwd=folder, capture_output=True, text=True, check=False)
+    return done.returncode == 0, said + done.stdout
+
+
+def test_colcon_tests_the_interfaces(scaffolded, tmp_path):
+    package = copied(scaffolded, tmp_path / "src", compiled=False)
+    colcon = Path(sys.executable).parent / "colcon"
+    run(colcon, "--log-base", "log", "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    passed, said = colcon_test(tmp_path, path=str(ROOT))
+    assert passed, said
+    assert "2 passed" in said
+    # not compiled since, and then not valid
+    interface = package / "msg" / "Drive.msg"
+    interface.write_text("float64 speed\n")
+    passed, said = colcon_test(tmp_path, path=str(ROOT))
+    assert not passed
+    assert "1 failed, 1 passed" in said
+    assert "idlc gen --check" in said
+    assert "msg/Drive.msg" in said
+    interface.write_text("flot32 speed\n")
+    passed, said = colcon_test(tmp_path, path=str(ROOT))
+    assert not passed
+    assert "error[IDL201]: unknown type `flot32`" in said
+    assert "Traceback" not in said
+
+
+def test_the_interfaces_are_not_tested_where_idlc_is_not_installed(scaffolded, tmp_path):
+    package = copied(scaffolded, tmp_path / "src", compiled=False)
+    hidden = tmp_path / "hidden" / "idlc"
+    hidden.mkdir(parents=True)
+    (hidden / "__init__.py").write_text("raise ModuleNotFoundError('idlc', name='idlc')\n")
+    command = [sys.executable, "-m", "pytest", "-rs", "-p", "no:cacheprovider"]
+    clean = {"PYTHONPATH": str(hidden.parent), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    done = subprocess.run(
+        [*command, "test/test_interfaces.py"],
+        cwd=package,
+        env={**os.environ, **clean},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "1 skipped" in done.stdout
+    assert "idlc is not installed: the classes are used as they were committed" in done.stdout
