@@ -144,35 +144,39 @@ def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp
     assert "Traceback" not in done.stderr
 
 
-def colcon_test(folder: Path, *, path: str) -> tuple[bool, str]:
-    """Return whether the tests of a package's interfaces pass in colcon, and what is said."""
-    colcon = Path(sys.executable).parent / "colcon"
-    words = ["--log-base", "log", "test", "--event-handlers", "console_direct+"]
-    words += ["--pytest-args", "test/test_interfaces.py", "-rs", "-p", "no:cacheprovider"]
-    said = run(colcon, *words, cwd=folder, PYTHONPATH=path)
-    result = [colcon, "--log-base", "log", "test-result", "--verbose"]
-    done = subprocess.run(result, cwd=folder, capture_output=True, text=True, check=False)
-    return done.returncode == 0, said + done.stdout
+def tested(*command: object, cwd: Path) -> tuple[int, str]:
+    """Return the status of a run of tests, and what it says."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    return done.returncode, done.stdout
 
 
 def test_colcon_tests_the_interfaces(scaffolded, tmp_path):
     package = copied(scaffolded, tmp_path / "src", compiled=False)
-    colcon = Path(sys.executable).parent / "colcon"
-    run(colcon, "--log-base", "log", "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
-    passed, said = colcon_test(tmp_path, path=str(ROOT))
-    assert passed, said
-    assert "2 passed" in said
-    # not compiled since, and then not valid
-    interface = package / "msg" / "Drive.msg"
-    interface.write_text("float64 speed\n")
-    passed, said = colcon_test(tmp_path, path=str(ROOT))
-    assert not passed
-    assert "1 failed, 1 passed" in said
+    colcon = [Path(sys.executable).parent / "colcon", "--log-base", "log"]
+    run(*colcon, "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    test = [*colcon, "test", "--event-handlers", "console_direct+", "--return-code-on-test-failure"]
+    test += ["--pytest-args", "test/test_interfaces.py", "-p", "no:cacheprovider"]
+    status, said = tested(*test, cwd=tmp_path)
+    assert (status, "2 passed" in said) == (0, True), said
+    # neither compiled since nor, then, valid
+    (package / "msg" / "Drive.msg").write_text("float64 speed\n")
+    status, said = tested(*test, cwd=tmp_path)
+    assert (status, "1 failed, 1 passed" in said) == (1, True), said
     assert "idlc gen --check" in said
     assert "msg/Drive.msg" in said
-    interface.write_text("flot32 speed\n")
-    passed, said = colcon_test(tmp_path, path=str(ROOT))
-    assert not passed
+    (package / "msg" / "Drive.msg").write_text("flot32 speed\n")
+    plain = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "test/test_interfaces.py"]
+    status, said = tested(*plain, cwd=package)
+    assert (status, "2 failed" in said) == (1, True), said
     assert "error[IDL201]: unknown type `flot32`" in said
     assert "Traceback" not in said
 
