@@ -13,7 +13,7 @@ try:
 except ImportError:
     import tomli as tomllib
 
-PROGRAMS = {"basedpyright", "build", "mypy", "ruff"}
+PROGRAMS = {"basedpyright", "build", "mypy", "pre-commit", "ruff"}
 
 
 def lowest(requirements):

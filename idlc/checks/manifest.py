@@ -18,6 +18,8 @@ from idlc.text.source import Span
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
 #: What rosidl adds by itself.
 _IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
+#: What a package.xml begins with; dependencies come behind it.
+_HEAD = frozenset(("name", "version", "description", "maintainer", "license", "url", "author"))
 _GROUP = "rosidl_interface_packages"
 _GENERATORS = "rosidl_default_generators"
 _RUNTIME = "rosidl_default_runtime"
@@ -124,7 +126,7 @@ def _addition(facts: Facts, line: str) -> Edit | None:
     tag = line[1 : line.index(">")]
     same = [one for one in facts.statements if one.tag == tag]
     like = same or [one for one in facts.statements if "depend" in one.tag]
-    like = like or list(facts.declared("name").values())
+    like = like or [one for one in facts.statements if one.tag in _HEAD]
     if not like:
         return None
     last = like[-1]
