@@ -1,0 +1,132 @@
+"""One run of a compiler on a folder of packages: compilers.py TASK INPUTS OUT.
+
+Compiles something small before the clock starts, and prints seconds as the last line: CPU time per
+file, and after an edit the wall's time of the whole.
+"""
+
+import json
+import re
+import shutil
+import sys
+import sysconfig
+import tempfile
+import time
+from functools import partial
+from pathlib import Path
+
+from benchmarks.compiling import EDITED, interface_files
+
+SHARE = Path(sysconfig.get_path("data")) / "share"
+ROSIDL_FILES = 30
+
+
+def gen(package: Path, out: Path) -> None:
+    from idlc.cli.main import main
+
+    words = ["gen", package, "-o", out / package.name, "-I", package.parent]
+    status = main([str(word) for word in (*words, "--package", package.name)])
+    assert status == 0, f"idlc gen failed on {package}"
+
+
+def idlc(inputs: Path, out: Path) -> int:
+    for package in sorted(inputs.iterdir()):
+        gen(package, out)
+    return len(interface_files(inputs))
+
+
+def rosbags(inputs: Path, out: Path, *, codecs: bool) -> int:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys.codegen import generate_python_code
+
+    store = get_typestore(Stores.EMPTY)
+    types = {}
+    for path in interface_files(inputs):
+        text = path.read_text(encoding="utf-8")
+        # rosbags knows neither services and actions nor wstring
+        if path.suffix == ".msg" and not re.search("^wstring", text, re.MULTILINE):
+            types.update(get_types_from_msg(text, f"{path.parts[-3]}/msg/{path.stem}"))
+    (out / "types.py").write_text(generate_python_code(types), encoding="utf-8")
+    store.register(types)
+    for name in types:
+        store.hash_rihs01(name)
+        if codecs:
+            store.get_msgdef(name)
+    return len(types)
+
+
+def rosidl(inputs: Path, out: Path, *, most: int) -> int:
+    from rosidl_adapter import convert_to_idl
+    from rosidl_generator_py import generate_py
+    from rosidl_generator_type_description import generate_type_hash
+
+    files = interface_files(inputs)
+    chosen = files[:: max(1, len(files) // most)]
+    packages: dict[str, list[Path]] = {}
+    for path in chosen:
+        packages.setdefault(path.parts[-3], []).append(path)
+    include = [f"{path.parent.name}:{path.parent}" for path in SHARE.glob("*/msg")]
+    for package, paths in packages.items():
+        # what rosidl expects of packages that are installed already
+        for description in (SHARE / package).glob("*/*.json"):
+            target = out / package / description.parent.name / description.name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(description, target)
+        tuples = []
+        for path in paths:
+            relative = path.relative_to(path.parents[1])
+            convert_to_idl(path.parents[1], package, relative, out / "idl" / package)
+            tuples.append(f"{out / 'idl' / package}:{relative.with_suffix('.idl')}")
+        arguments = out / "arguments.json"
+        content = {
+            "package_name": package,
+            "output_dir": str(out / package),
+            "idl_tuples": tuples,
+            "include_paths": include,
+            "template_dir": str(SHARE / "rosidl_generator_py" / "resource"),
+            "target_dependencies": [__file__],
+        }
+        arguments.write_text(json.dumps(content), encoding="utf-8")
+        generate_type_hash(str(arguments))
+        generate_py(str(arguments), [])
+    return len(chosen)
+
+
+TASKS = {
+    "idlc": idlc,
+    "rosbags": partial(rosbags, codecs=False),
+    "rosbags_codecs": partial(rosbags, codecs=True),
+    "rosidl": partial(rosidl, most=ROSIDL_FILES),
+    "rosidl_quick": partial(rosidl, most=1),
+}
+
+
+def rebuild(inputs: Path, out: Path, package: str) -> float:
+    """Edit an interface of EDITED; return the seconds that compiling a package, or all, takes."""
+    path = next((inputs / EDITED / "msg").glob("*.msg"))
+    path.write_text(f"{path.read_text(encoding='utf-8')}# {time.time()}\n", encoding="utf-8")
+    begin = time.perf_counter()
+    if package:
+        gen(inputs / package, out)
+    else:
+        idlc(inputs, out)
+    return time.perf_counter() - begin
+
+
+def main(task: str, inputs: Path, out: Path) -> float:
+    kind, _, package = task.partition(":")
+    run = TASKS["idlc" if kind == "edit" else kind]
+    with tempfile.TemporaryDirectory() as folder:
+        small = Path(folder, "in", "warm", "msg", "Warm.msg")
+        small.parent.mkdir(parents=True)
+        small.write_text("int8 warm  # [m]\nstring[] s\n", encoding="utf-8")
+        Path(folder, "out").mkdir()
+        run(Path(folder, "in"), Path(folder, "out"))
+    if kind == "edit":
+        return rebuild(inputs, out, package)
+    begin = time.process_time()
+    count = run(inputs, out)
+    return (time.process_time() - begin) / count
+
+
+if __name__ == "__main__":
+    print(main(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])))
