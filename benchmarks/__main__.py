@@ -12,13 +12,13 @@ from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work
 
 GROUPS = (codec, classes, imports, compiling, starting, topics)
-QUICK_ROUNDS = 1
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("words", nargs="*", metavar="WORD", help="only rows with one in them")
-    parser.add_argument("--quick", action="store_true", help="one tiny round: does it work?")
+    parser.add_argument("--quick", action="store_true", help="fewer rounds, less to compile")
+    parser.add_argument("--rounds", type=int, metavar="N", help="at most so many rounds")
     parser.add_argument("--list", action="store_true", help="only name the rows")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the run here")
     parser.add_argument(
@@ -28,7 +28,9 @@ def arguments(words: Sequence[str] | None) -> argparse.Namespace:
         "--documents", action="store_true", help="only write README.md and docs from the kept run"
     )
     found = parser.parse_args(words)
-    if found.keep and (found.words or found.quick):
+    if found.quick:
+        found.rounds = found.rounds or 5
+    if found.keep and (found.words or found.rounds):
         parser.error("only a whole run is kept")
     return found
 
@@ -58,7 +60,7 @@ def main(words: Sequence[str] | None = None) -> None:
             print("not installed, so left out:", ", ".join(missing))
         print("median (quartiles), against the fastest peer; > 1x: idlc is faster", flush=True)
         for row in rows:
-            run.results.append(measure(row, QUICK_ROUNDS if given.quick else None))
+            run.results.append(measure(row, given.rounds))
             print(report.line(run.results[-1]), flush=True)
     print(report.summary(run))
     if given.json:

@@ -81,7 +81,7 @@ class Repeated:
         return taken
 
 
-def measure(row: Row, rounds: int | None = None) -> Result:
+def measure(row: Row, rounds: int | None) -> Result:
     """Return what each candidate takes, in at most `rounds` rounds."""
     candidates = row.prepare()
     found: dict[str, list[float]] = {name: [] for name in candidates}
