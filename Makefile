@@ -2,31 +2,40 @@
 #
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
-#   ARGS='-k name'      more words for pytest
+#   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
+#   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
 
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
+LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13
 ARGS ?=
 FUZZ ?= 5000
 SEED ?= 2
 
 TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
-TEST_ENV := .venv/test-$(TAG)$(if $(filter no,$(ROS)),-without-ros)
-KILTED_ENV := .venv/kilted-$(TAG)
+KIND := $(TAG)$(if $(filter yes,$(LOCKED)),-locked)
+TEST_ENV := .venv/test-$(KIND)$(if $(filter no,$(ROS)),-without-ros)
+KILTED_ENV := .venv/kilted-$(KIND)
+BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 DEMO_ENV := .venv/demo-$(TAG)
+LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 SELECTION := $(if $(filter no,$(ROS)),--ignore=tests/ros)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
+# One file of versions and hashes per environment, and first the one that builds packages.
+LOCKS := build test-ros test-kilted
+UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
+    --generate-hashes --no-annotate --custom-compile-command 'make lock'
 # Nothing that we run leaves this machine.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench lock clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -78,8 +87,16 @@ lint: $(TEST_ENV)/installed ## check style and types
 example: $(TEST_ENV)/installed ## compile the committed example again
 	cd examples/my_robot_controller && $(CURDIR)/$(TEST_ENV)/bin/python -m idlc gen
 
-bench: $(TEST_ENV)/installed ## measure against rosbags, rclpy and rosidl
-	@for script in benchmarks/[a-z]*.py; do $(TEST_ENV)/bin/python $$script || exit 1; done
+bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says what else it can do
+	@$(BENCH_ENV)/bin/python -m benchmarks --json build/benchmarks.json $(ARGS)
+
+lock: ## choose the newest versions for CI again, and write down their hashes
+	@$(PYTHON) -m venv $(LOCK_ENV)
+	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
+	$(UV_COMPILE) pyproject.toml --extra test-ros --output-file requirements/test-ros.txt
+	$(UV_COMPILE) pyproject.toml --extra test-kilted --output-file requirements/test-kilted.txt
+	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints requirements/test-ros.txt \
+	    --output-file requirements/build.txt
 
 clean: ## remove environments and everything that was built
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
@@ -87,18 +104,26 @@ clean: ## remove environments and everything that was built
 
 $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
+$(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
 $(DEMO_ENV)/installed: EXTRA := ros
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
 # there already is brought up to date.
-.venv/%/installed: pyproject.toml
+.venv/%/installed: pyproject.toml $(LOCKS:%=requirements/%.txt)
 	@echo 'preparing .venv/$* ...'
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "idlc needs Python 3.10 or newer, $(PYTHON) is " + sys.version)'
 	@$(PYTHON) -m venv .venv/$*
+ifeq ($(LOCKED),yes)
+	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --requirement requirements/build.txt
+	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --no-build-isolation \
+	    --requirement requirements/$(EXTRA).txt
+	@.venv/$*/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
+else
 	@.venv/$*/bin/python $(PIP_INSTALL) --editable '.[$(EXTRA)]' || { \
 	    echo >&2; \
 	    echo 'The environment could not be made. If pip found no ros-jazzy-* build for this' >&2; \
 	    echo 'interpreter ($(PYTHON), $(TAG)), name another one with PYTHON=..., or say ROS=no' >&2; \
 	    echo 'to run the tests that need no ROS.' >&2; \
 	    exit 1; }
+endif
 	@touch $@
