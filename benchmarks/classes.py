@@ -23,11 +23,12 @@ NOT_COPIED = "mcap-ros2"
 
 
 def rows(work: Work) -> Iterator[Row]:
+    ahead = Goal(times=1)
     for name in NAMES:
         yield Row("construct", name, partial(constructors, work, name), Goal(times=2))
-        yield Row("copy.copy", name, partial(copies, work, name, copy.copy))
-        yield Row("copy.deepcopy", name, partial(copies, work, name, copy.deepcopy))
-        yield Row("compare", name, partial(comparisons, work, name))
+        yield Row("copy.copy", name, partial(copies, work, name, copy.copy), ahead)
+        yield Row("copy.deepcopy", name, partial(copies, work, name, copy.deepcopy), ahead)
+        yield Row("compare", name, partial(comparisons, work, name), ahead)
 
 
 def constructors(work: Work, name: str):

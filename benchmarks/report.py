@@ -95,12 +95,12 @@ def full_table(run: Run) -> str:
 
 #: A document, and what stands in it between `<!-- benchmarks -->` and `<!-- end -->`.
 PARTS = {ROOT / "README.md": readme_part, ROOT / "docs" / "performance.md": full_table}
-PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=\n<!-- end -->)", re.DOTALL)
+PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 
 def written(path: Path, run: Run) -> str:
     """Return the text of a document with its generated part made anew."""
-    text, count = PART.subn(lambda _: PARTS[path](run), path.read_text(encoding="utf-8"))
+    text, count = PART.subn(lambda _: PARTS[path](run) + "\n", path.read_text(encoding="utf-8"))
     assert count == 1, path
     return text
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measure import IDLC, Repeated, Row
+from benchmarks.measure import IDLC, Goal, Repeated, Row
 from benchmarks.peers import installed, run_idlc
 from benchmarks.work import Work
 
@@ -69,12 +69,12 @@ MESSAGES = (
 def rows(work: Work) -> Iterator[Row]:
     if not installed("rclpy"):
         return
-    node = Node(work)
+    node, ahead = Node(work), Goal(times=1)
     for package, name, fill in MESSAGES:
         for group in ("publish", "publish + take"):
             prepare = partial(publishing, node, package, name, fill, group)
-            yield Row(group, name, prepare, rounds=15)
-    yield Row("call + answer", "SetBool", partial(calling, node), rounds=15)
+            yield Row(group, name, prepare, ahead, rounds=15)
+    yield Row("call + answer", "SetBool", partial(calling, node), ahead, rounds=15)
 
 
 class Node:
