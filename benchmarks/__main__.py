@@ -6,12 +6,22 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks import classes, codec, compiling, imports, report, results, starting, topics
+from benchmarks import (
+    batches,
+    classes,
+    codec,
+    compiling,
+    imports,
+    report,
+    results,
+    starting,
+    topics,
+)
 from benchmarks.measure import Row, measure
 from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work
 
-GROUPS = (codec, classes, imports, compiling, starting, topics)
+GROUPS = (codec, batches, classes, imports, compiling, starting, topics)
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:
