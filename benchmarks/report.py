@@ -90,7 +90,7 @@ def full_table(run: Run) -> str:
         spread = f"{amount(mine.low)} to {amount(mine.high)}"
         words = [f"{one.group} {one.name}", amount(mine.median), spread, *cells]
         lines.append("| " + " | ".join([*words, found.said, found.verdict]) + " |")
-    return "\n".join(lines)
+    return "\n".join([*lines, "", head(run) + "."])
 
 
 #: A document, and what stands in it between `<!-- benchmarks -->` and `<!-- end -->`.
