@@ -76,8 +76,9 @@ def judge(result: Result, mine: float, ratio: float | None) -> tuple[str, str]:
     if goal is None:
         return "", ""
     if goal.times is not None:
-        good = ratio is None or ratio >= goal.times
-        return ("ok" if good else "MISS"), f"at least {goal.times:g}x"
+        if ratio is None:
+            return "", "no peer is here"
+        return ("ok" if ratio >= goal.times else "MISS"), f"at least {goal.times:g}x"
     if goal.than is None:
         return ("ok" if mine <= goal.at_most else "MISS"), f"at most {goal.at_most * 1e3:g} ms"
     reached = mine / result.times[goal.than].median

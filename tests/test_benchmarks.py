@@ -52,6 +52,7 @@ def result(goal: Goal | None, **microseconds: float) -> Result:
         (Goal(at_most=2, than="memcpy"), {"idlc": 3, "memcpy": 1, "rclpy": 3}, "rclpy", 1, "MISS"),
         (Goal(at_most=2), {"idlc": 3}, None, None, "MISS"),
         (Goal(at_most=3), {"idlc": 3}, None, None, "ok"),
+        (Goal(times=3), {"idlc": 3}, None, None, ""),
         (None, {"idlc": 3, "empty_module": 1}, None, None, ""),
     ],
 )
