@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from idlc.emit import literals, pynames
-from idlc.emit.pretty import Group, Node, assign, call
+from idlc.emit.pretty import WIDTH, Group, Node, assign, call
 from idlc.emit.references import References
 from idlc.emit.tables import numpy_name
 from idlc.model import ir
@@ -207,6 +207,23 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
     return FieldView(
         declaration, f"{name}: {values} | None = None", tuple(_store(slot, name, fresh, given))
     )
+
+
+def comparison(field: ir.Field, receiver: str, references: References) -> str | Group:
+    """Return the expression that tells whether a field is equal in `receiver` and `other`.
+
+    It is a call for what may be an array, what has no type, and what is too long for a line.
+    """
+    slot = pynames.slot(field.name)
+    plain = f"{receiver}.{slot} == other.{slot}"
+    values = isinstance(field.type, (ir.Array, ir.Sequence)) and isinstance(
+        field.type.element, ir.Primitive
+    )
+    element = ir.element_of(field.type)
+    untyped = isinstance(element, ir.Ref) and element.target in references.implied
+    if values or untyped or len(plain) > WIDTH - 16:
+        return call("_idlc.same", f"{receiver}.{slot}", f"other.{slot}")
+    return plain
 
 
 def default_constant(field: ir.Field) -> list[str]:

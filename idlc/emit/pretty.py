@@ -76,6 +76,19 @@ def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[st
     return result
 
 
+def all_of(conditions: list[str], indent: int) -> list[str]:
+    """Return lines that return whether all conditions are true."""
+    margin = " " * indent
+    text = " and ".join(conditions) or "True"
+    if len(margin) + len(text) + 7 <= WIDTH:
+        return [f"{margin}return {text}"]
+    if len(margin) + len(text) + 4 <= WIDTH:
+        inner = [text]
+    else:
+        inner = [conditions[0], *(f"and {one}" for one in conditions[1:])]
+    return [f"{margin}return (", *(f"{margin}    {one}" for one in inner), f"{margin})"]
+
+
 def assign(target: Node, value: Node, indent: int) -> list[str]:
     """Return an assignment as lines; a tuple of targets is a Group without `before`."""
     margin = " " * indent

@@ -11,7 +11,7 @@ import msgspec
 from idlc.emit import code, documentation, fields, groups, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
-from idlc.emit.pretty import WIDTH, Group, assign, call, lines
+from idlc.emit.pretty import WIDTH, Group, all_of, assign, call, lines
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -24,6 +24,7 @@ class MessageView(msgspec.Struct, frozen=True):
     name: str
     body: tuple[str, ...]
     init: tuple[str, ...]
+    equality: tuple[str, ...]
     codec: tuple[str, ...]
     tables: tuple[str, ...]
     encode: tuple[str, ...]
@@ -128,6 +129,7 @@ def _message(
         name=references.name(structure.name),
         body=tuple(_body(structure, views)),
         init=tuple(_init(structure, views)),
+        equality=tuple(_equality(structure, references)),
         codec=_codec_head(structure.name),
         tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
@@ -213,6 +215,24 @@ def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         "    ) -> None:",
         *(line for view in views for line in view.stores),
     ]
+
+
+def _equality(structure: ir.Message, references: References) -> list[str]:
+    """Return the method that compares field by field, as rosidl's does."""
+    receiver = _receiver(structure)
+    boolean = "_builtins.bool" if fields.shadows(structure) else "bool"
+    head = [
+        f"    def __eq__({receiver}, other: _idlc.Any) -> {boolean}:",
+        f"        if not isinstance(other, {references.name(structure.name)}):",
+        "            return NotImplemented",
+    ]
+    parts = [fields.comparison(field, receiver, references) for field in structure.fields]
+    calls = [part for part in parts if isinstance(part, Group)]
+    plain = [part for part in parts if isinstance(part, str)]
+    last = all_of(plain, 8) if plain or not calls else lines(calls.pop(), 8, "return ")
+    for part in calls:
+        head += [*lines(part, 8, "if not ", ":"), "            return False"]
+    return [*head, *last]
 
 
 def _tuple(target: str, items: tuple[str, ...]) -> list[str]:

@@ -35,6 +35,7 @@ from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
 from .message import Fresh, FreshList, Message, dataclass, frozen
+from .objects import same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -105,6 +106,7 @@ __all__ = [
     "read_flags",
     "read_octets",
     "read_wide_text",
+    "same",
     "sequence_reader",
     "sequence_writer",
     "several",

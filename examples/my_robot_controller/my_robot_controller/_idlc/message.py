@@ -249,13 +249,6 @@ class Message(metaclass=MessageMeta):
 
             return replace(self, **changes)
 
-    def __eq__(self, other: object) -> bool:
-        from .objects import equality
-
-        kind: Any = next(base for base in type(self).__mro__ if "_codec_" in vars(base))
-        kind.__eq__ = equality(kind)
-        return bool(kind.__eq__(self, other))
-
     def __copy__(self) -> typing_extensions.Self:
         from .objects import copied
 

@@ -1,60 +1,20 @@
-"""Comparing and copying messages, by functions that are made for a class on first use."""
+"""What messages need to be compared and copied."""
 
 from __future__ import annotations
 
 from array import array
-from copy import deepcopy
-from operator import attrgetter, eq
-
-from .names import public_name, slot_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from .message import Message
-
 #: Values that a copy may share.
 ATOMIC = frozenset({bool, bytes, float, int, str})
 
 
-def equality(kind: type[Message]) -> Callable[[Any, object], Any]:
-    """Return `__eq__` for the class that declares the fields."""
-    members = vars(kind)
-    numeric: list[str] = []
-    plain: list[str] = []
-    for field in kind._fields_and_field_types:
-        converted = isinstance(members[public_name(field)], property)
-        (numeric if converted else plain).append(slot_name(field))
-    values = _getter(plain)
-    numbers = _getter(numeric)
-    everything = _getter([*plain, *numeric])
-
-    def equal(self: Any, other: object) -> Any:
-        if not isinstance(other, kind):
-            return NotImplemented
-        try:
-            # not the tuples as such: they would find the same nan equal to itself
-            if not all(map(eq, values(self), values(other))):
-                return False
-        except ValueError:  # a list field holds a numpy array
-            return all(map(_same, everything(self), everything(other)))
-        return all(map(_same, numbers(self), numbers(other)))
-
-    return equal
-
-
-def _getter(slots: list[str]) -> Callable[[Any], tuple[Any, ...]]:
-    """Return a function that returns the values of slots."""
-    if not slots:
-        return lambda _: ()
-    get = attrgetter(*slots)
-    return get if len(slots) > 1 else lambda message: (get(message),)
-
-
-def _same(mine: Any, other: Any) -> bool:
-    """Return whether two values are equal, arrays as a whole."""
+def same(mine: Any, other: Any) -> bool:
+    """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     if type(mine) is array and type(other) is array:
         if mine.typecode == other.typecode and mine.typecode not in "fd":
             return mine.tobytes() == other.tobytes()
@@ -78,6 +38,8 @@ def copied(message: Any) -> Any:
 
 def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
     """Return a copy that shares nothing that can change."""
+    from copy import deepcopy
+
     kind = type(message)
     if "_codec_" not in kind.__dict__:
         return _reconstructed(message, lambda value: deepcopy(value, memo), memo)

@@ -33,6 +33,11 @@ class Countdown_Goal(_idlc.Message):
     ) -> None:
         self._target_count = target_count
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_Goal):
+            return NotImplemented
+        return self._target_count == other._target_count
+
 
 @_idlc.codec_for(Countdown_Goal)
 def _countdown__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -79,6 +84,13 @@ class Countdown_Result(_idlc.Message):
         self._final_count = final_count
         self._success = success
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_Result):
+            return NotImplemented
+        return (
+            self._final_count == other._final_count and self._success == other._success
+        )
+
 
 @_idlc.codec_for(Countdown_Result)
 def _countdown__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -117,6 +129,11 @@ class Countdown_Feedback(_idlc.Message):
         current_count: int = 0,
     ) -> None:
         self._current_count = current_count
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_Feedback):
+            return NotImplemented
+        return self._current_count == other._current_count
 
 
 @_idlc.codec_for(Countdown_Feedback)
@@ -168,6 +185,13 @@ class Countdown_SendGoal_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._goal = Countdown_Goal() if goal is None else goal
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_SendGoal_Request):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._goal == other._goal
 
 
 @_idlc.codec_for(Countdown_SendGoal_Request)
@@ -237,6 +261,13 @@ class Countdown_SendGoal_Response(_idlc.Message):
         else:
             self._stamp = stamp
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_SendGoal_Response):
+            return NotImplemented
+        if not _idlc.same(self._stamp, other._stamp):
+            return False
+        return self._accepted == other._accepted
+
 
 @_idlc.codec_for(Countdown_SendGoal_Response)
 def _countdown__send_goal__response_codec(
@@ -301,6 +332,13 @@ class Countdown_SendGoal_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_SendGoal_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(Countdown_SendGoal_Event)
@@ -440,6 +478,11 @@ class Countdown_GetResult_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_GetResult_Request):
+            return NotImplemented
+        return _idlc.same(self._goal_id, other._goal_id)
+
 
 @_idlc.codec_for(Countdown_GetResult_Request)
 def _countdown__get_result__request_codec(
@@ -498,6 +541,11 @@ class Countdown_GetResult_Response(_idlc.Message):
     ) -> None:
         self._status = status
         self._result = Countdown_Result() if result is None else result
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_GetResult_Response):
+            return NotImplemented
+        return self._status == other._status and self._result == other._result
 
 
 @_idlc.codec_for(Countdown_GetResult_Response)
@@ -567,6 +615,13 @@ class Countdown_GetResult_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_GetResult_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(Countdown_GetResult_Event)
@@ -720,6 +775,13 @@ class Countdown_FeedbackMessage(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._feedback = Countdown_Feedback() if feedback is None else feedback
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Countdown_FeedbackMessage):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._feedback == other._feedback
 
 
 @_idlc.codec_for(Countdown_FeedbackMessage)

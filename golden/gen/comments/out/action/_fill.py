@@ -33,6 +33,11 @@ class Fill_Goal(_idlc.Message):
     ) -> None:
         self._level = level
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_Goal):
+            return NotImplemented
+        return self._level == other._level
+
 
 @_idlc.codec_for(Fill_Goal)
 def _fill__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -72,6 +77,11 @@ class Fill_Result(_idlc.Message):
     ) -> None:
         self._reached = reached
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_Result):
+            return NotImplemented
+        return self._reached == other._reached
+
 
 @_idlc.codec_for(Fill_Result)
 def _fill__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -110,6 +120,11 @@ class Fill_Feedback(_idlc.Message):
         level: float = 0.0,
     ) -> None:
         self._level = level
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_Feedback):
+            return NotImplemented
+        return self._level == other._level
 
 
 @_idlc.codec_for(Fill_Feedback)
@@ -158,6 +173,13 @@ class Fill_SendGoal_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._goal = Fill_Goal() if goal is None else goal
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_SendGoal_Request):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._goal == other._goal
 
 
 @_idlc.codec_for(Fill_SendGoal_Request)
@@ -223,6 +245,13 @@ class Fill_SendGoal_Response(_idlc.Message):
         else:
             self._stamp = stamp
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_SendGoal_Response):
+            return NotImplemented
+        if not _idlc.same(self._stamp, other._stamp):
+            return False
+        return self._accepted == other._accepted
+
 
 @_idlc.codec_for(Fill_SendGoal_Response)
 def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -285,6 +314,13 @@ class Fill_SendGoal_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_SendGoal_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(Fill_SendGoal_Event)
@@ -422,6 +458,11 @@ class Fill_GetResult_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_GetResult_Request):
+            return NotImplemented
+        return _idlc.same(self._goal_id, other._goal_id)
+
 
 @_idlc.codec_for(Fill_GetResult_Request)
 def _fill__get_result__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -478,6 +519,11 @@ class Fill_GetResult_Response(_idlc.Message):
     ) -> None:
         self._status = status
         self._result = Fill_Result() if result is None else result
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_GetResult_Response):
+            return NotImplemented
+        return self._status == other._status and self._result == other._result
 
 
 @_idlc.codec_for(Fill_GetResult_Response)
@@ -540,6 +586,13 @@ class Fill_GetResult_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_GetResult_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(Fill_GetResult_Event)
@@ -678,6 +731,13 @@ class Fill_FeedbackMessage(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._feedback = Fill_Feedback() if feedback is None else feedback
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Fill_FeedbackMessage):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._feedback == other._feedback
 
 
 @_idlc.codec_for(Fill_FeedbackMessage)

@@ -92,6 +92,21 @@ class Gauge(_idlc.Message):
             self._covariance = _arrays.to_ndarray(_arrays.FLOAT64, 9, covariance)
         self._flags = flags
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Gauge):
+            return NotImplemented
+        if not _idlc.same(self._samples, other._samples):
+            return False
+        if not _idlc.same(self._covariance, other._covariance):
+            return False
+        return (
+            self._rate == other._rate
+            and self._level == other._level
+            and self._label == other._label
+            and self._notes == other._notes
+            and self._flags == other._flags
+        )
+
 
 @_idlc.codec_for(Gauge)
 def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -31,6 +31,11 @@ class Reset_Request(_idlc.Message):
     ) -> None:
         self._reason = reason
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Reset_Request):
+            return NotImplemented
+        return self._reason == other._reason
+
 
 @_idlc.codec_for(Reset_Request)
 def _reset__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -76,6 +81,11 @@ class Reset_Response(_idlc.Message):
         ok: bool = False,
     ) -> None:
         self._ok = ok
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Reset_Response):
+            return NotImplemented
+        return self._ok == other._ok
 
 
 @_idlc.codec_for(Reset_Response)
@@ -132,6 +142,13 @@ class Reset_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Reset_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(Reset_Event)

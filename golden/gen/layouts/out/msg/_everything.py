@@ -135,6 +135,33 @@ class Everything(_idlc.Message):
             self._weights = _arrays.to_ndarray(_arrays.FLOAT32, 4, weights)
         self._last = last
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Everything):
+            return NotImplemented
+        if not _idlc.same(self._doubles, other._doubles):
+            return False
+        if not _idlc.same(self._shorts, other._shorts):
+            return False
+        if not _idlc.same(self._flags, other._flags):
+            return False
+        if not _idlc.same(self._octets, other._octets):
+            return False
+        if not _idlc.same(self._weights, other._weights):
+            return False
+        return (
+            self._flag == other._flag
+            and self._inner == other._inner
+            and self._inners == other._inners
+            and self._rows == other._rows
+            and self._pair == other._pair
+            and self._nothing == other._nothing
+            and self._nothings == other._nothings
+            and self._texts == other._texts
+            and self._wides == other._wides
+            and self._stamps == other._stamps
+            and self._last == other._last
+        )
+
 
 @_idlc.codec_for(Everything)
 def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

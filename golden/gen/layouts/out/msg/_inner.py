@@ -39,6 +39,16 @@ class Inner(_idlc.Message):
         self._c = c
         self._d = d
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Inner):
+            return NotImplemented
+        return (
+            self._a == other._a
+            and self._b == other._b
+            and self._c == other._c
+            and self._d == other._d
+        )
+
 
 @_idlc.codec_for(Inner)
 def _inner_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -16,6 +16,11 @@ class Nothing(_idlc.Message):
     def __init__(self) -> None:
         pass
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Nothing):
+            return NotImplemented
+        return True
+
 
 @_idlc.codec_for(Nothing)
 def _nothing_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -39,6 +39,13 @@ class Row(_idlc.Message):
         else:
             self._c = _arrays.to_ndarray(_arrays.UINT8, 3, c)
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Row):
+            return NotImplemented
+        if not _idlc.same(self._c, other._c):
+            return False
+        return self._a == other._a and self._b == other._b
+
 
 @_idlc.codec_for(Row)
 def _row_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -30,6 +30,11 @@ class Any(_idlc.Message):
     ) -> None:
         self._pose = Pose() if pose is None else pose
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Any):
+            return NotImplemented
+        return self._pose == other._pose
+
 
 @_idlc.codec_for(Any)
 def _any_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

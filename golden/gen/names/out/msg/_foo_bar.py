@@ -26,6 +26,11 @@ class FOOBar(_idlc.Message):
     ) -> None:
         self._inner = FooBar() if inner is None else inner
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, FOOBar):
+            return NotImplemented
+        return self._inner == other._inner
+
 
 @_idlc.codec_for(FOOBar)
 def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

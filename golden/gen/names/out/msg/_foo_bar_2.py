@@ -25,6 +25,11 @@ class FooBar(_idlc.Message):
     ) -> None:
         self._a = a
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, FooBar):
+            return NotImplemented
+        return self._a == other._a
+
 
 @_idlc.codec_for(FooBar)
 def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

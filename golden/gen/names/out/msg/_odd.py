@@ -133,6 +133,29 @@ class Odd(_idlc.Message):
         else:
             _self._order = _arrays.to_ndarray(_arrays.INT32, 3, order)
 
+    def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
+        if not isinstance(other, Odd):
+            return NotImplemented
+        if not _idlc.same(_self._order, other._order):
+            return False
+        return (
+            _self._class == other._class
+            and _self._serialize == other._serialize
+            and _self._self == other._self
+            and _self._fields_and_field_types_ == other._fields_and_field_types_
+            and _self._int == other._int
+            and _self._list == other._list
+            and _self._bytes == other._bytes
+            and _self._bool == other._bool
+            and _self._float == other._float
+            and _self._str == other._str
+            and _self._message == other._message
+            and _self._data == other._data
+            and _self._at == other._at
+            and _self._item == other._item
+            and _self._array == other._array
+        )
+
 
 @_idlc.codec_for(Odd)
 def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -29,6 +29,11 @@ class Point(_idlc.Message):
         self._x = x
         self._y = y
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Point):
+            return NotImplemented
+        return self._x == other._x and self._y == other._y
+
 
 @_idlc.codec_for(Point)
 def _point_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

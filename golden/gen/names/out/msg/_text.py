@@ -46,6 +46,15 @@ class Text(_idlc.Message):
         self._own = names_msgs_Point() if own is None else own
         self._any = [] if any is None else any
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, Text):
+            return NotImplemented
+        return (
+            self._other == other._other
+            and self._own == other._own
+            and self._any == other._any
+        )
+
 
 @_idlc.codec_for(Text)
 def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

@@ -22,6 +22,11 @@ class None_Request(_idlc.Message):
     def __init__(self) -> None:
         pass
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, None_Request):
+            return NotImplemented
+        return True
+
 
 @_idlc.codec_for(None_Request)
 def _none__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -51,6 +56,11 @@ class None_Response(_idlc.Message):
 
     def __init__(self) -> None:
         pass
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, None_Response):
+            return NotImplemented
+        return True
 
 
 @_idlc.codec_for(None_Response)
@@ -107,6 +117,13 @@ class None_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, None_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(None_Event)

@@ -33,6 +33,11 @@ class ExecuteTask_Goal(_idlc.Message):
     ) -> None:
         self._task_name = task_name
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_Goal):
+            return NotImplemented
+        return self._task_name == other._task_name
+
 
 @_idlc.codec_for(ExecuteTask_Goal)
 def _execute_task__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -79,6 +84,11 @@ class ExecuteTask_Result(_idlc.Message):
     ) -> None:
         self._success = success
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_Result):
+            return NotImplemented
+        return self._success == other._success
+
 
 @_idlc.codec_for(ExecuteTask_Result)
 def _execute_task__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -117,6 +127,11 @@ class ExecuteTask_Feedback(_idlc.Message):
         current_status: str = "",
     ) -> None:
         self._current_status = current_status
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_Feedback):
+            return NotImplemented
+        return self._current_status == other._current_status
 
 
 @_idlc.codec_for(ExecuteTask_Feedback)
@@ -181,6 +196,13 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._goal = ExecuteTask_Goal() if goal is None else goal
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_SendGoal_Request):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._goal == other._goal
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Request)
@@ -262,6 +284,13 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
         else:
             self._stamp = stamp
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_SendGoal_Response):
+            return NotImplemented
+        if not _idlc.same(self._stamp, other._stamp):
+            return False
+        return self._accepted == other._accepted
+
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Response)
 def _execute_task__send_goal__response_codec(
@@ -326,6 +355,13 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_SendGoal_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Event)
@@ -482,6 +518,11 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
         else:
             self._goal_id = goal_id
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_GetResult_Request):
+            return NotImplemented
+        return _idlc.same(self._goal_id, other._goal_id)
+
 
 @_idlc.codec_for(ExecuteTask_GetResult_Request)
 def _execute_task__get_result__request_codec(
@@ -540,6 +581,11 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
     ) -> None:
         self._status = status
         self._result = ExecuteTask_Result() if result is None else result
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_GetResult_Response):
+            return NotImplemented
+        return self._status == other._status and self._result == other._result
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Response)
@@ -602,6 +648,13 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_GetResult_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Event)
@@ -743,6 +796,13 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
         else:
             self._goal_id = goal_id
         self._feedback = ExecuteTask_Feedback() if feedback is None else feedback
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, ExecuteTask_FeedbackMessage):
+            return NotImplemented
+        if not _idlc.same(self._goal_id, other._goal_id):
+            return False
+        return self._feedback == other._feedback
 
 
 @_idlc.codec_for(ExecuteTask_FeedbackMessage)

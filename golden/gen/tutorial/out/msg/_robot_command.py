@@ -56,6 +56,16 @@ class RobotCommand(_idlc.Message):
         self._angular_velocity_z = angular_velocity_z
         self._frame_id = frame_id
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, RobotCommand):
+            return NotImplemented
+        return (
+            self._command_type == other._command_type
+            and self._linear_velocity_x == other._linear_velocity_x
+            and self._angular_velocity_z == other._angular_velocity_z
+            and self._frame_id == other._frame_id
+        )
+
 
 @_idlc.codec_for(RobotCommand)
 def _robot_command_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:

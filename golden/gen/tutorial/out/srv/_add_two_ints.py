@@ -35,6 +35,11 @@ class AddTwoInts_Request(_idlc.Message):
         self._a = a
         self._b = b
 
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, AddTwoInts_Request):
+            return NotImplemented
+        return self._a == other._a and self._b == other._b
+
 
 @_idlc.codec_for(AddTwoInts_Request)
 def _add_two_ints__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
@@ -73,6 +78,11 @@ class AddTwoInts_Response(_idlc.Message):
         sum: int = 0,
     ) -> None:
         self._sum = sum
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, AddTwoInts_Response):
+            return NotImplemented
+        return self._sum == other._sum
 
 
 @_idlc.codec_for(AddTwoInts_Response)
@@ -129,6 +139,13 @@ class AddTwoInts_Event(_idlc.Message):
             self._info = info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
+
+    def __eq__(self, other: _idlc.Any) -> bool:
+        if not isinstance(other, AddTwoInts_Event):
+            return NotImplemented
+        if not _idlc.same(self._info, other._info):
+            return False
+        return self._request == other._request and self._response == other._response
 
 
 @_idlc.codec_for(AddTwoInts_Event)
