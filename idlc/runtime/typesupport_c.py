@@ -3,28 +3,22 @@
 Everything given to C must live as long as the process, so it is handed to `keep`. An
 exception that leaves a ctypes callback leaves the result *uninitialised*, so callbacks
 whose result is a pointer are built from C callables only (`constant`, `resolver`): no
-bytecode runs in them, hence no signal handler either.
+bytecode runs in them, hence no signal handler either. All others are made by
+`typesupport_callbacks`.
 """
 
 from __future__ import annotations
 
-import _thread
 import ctypes
 import itertools
-import logging
-import opcode
 import operator
 import struct
 import sys
 from collections.abc import Callable
-from ctypes import c_char_p, c_size_t, c_uint8, c_uint64, c_void_p, py_object
-from types import FunctionType
+from ctypes import c_char, c_char_p, c_size_t, c_uint8, c_uint64, c_void_p, py_object
 from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
-
-#: Arguments of the interpreter's RESUME instruction.
-_AT_START, _IN_YIELD_FROM = 0, 2
 
 _FOREVER: list[object] = []
 # The module is torn down before the last C callback may come, so the list outlives its
@@ -193,9 +187,11 @@ if sys.maxsize < 1 << 62:
     raise ImportError("idlc's type support needs a 64-bit Python")
 
 #: All memory of the process, by address, as bytes and as words: `MEMORY[start:stop]`,
-#: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C.
+#: `WORDS[address >> 3]`. Slicing it is three times faster than calling into C. A slice of
+#: CHARACTERS is a copy.
 MEMORY = memoryview((c_uint8 * (1 << 62)).from_address(0)).cast("B")
 WORDS = MEMORY.cast("Q")
+CHARACTERS = (c_char * (1 << 62)).from_address(0)
 #: Where the content of a `bytes` object begins, from its `id`; a terminating zero
 #: follows it.
 BYTES_OFFSET = bytes.__basicsize__ - 1
@@ -243,45 +239,3 @@ class MessageSupport(NamedTuple):
 
     handle: int
     memory: Callable[[], object]
-
-
-def callback(prototype: Any, function: Callable[..., object]) -> int:
-    """Return the C function that calls `function`, a `try` that catches everything.
-
-    Signal handlers run on entry of a Python function, before its first `try`, and what
-    they raise would be lost with the result. The interpreter does not look for signals
-    where a function resumes inside a `yield from`, so the function is told that it does.
-    (Python 3.10 has no such instruction; it does not look before a leading `try` either.)
-    """
-    assert isinstance(function, FunctionType)
-    code = function.__code__
-    raw = bytearray(code.co_code)
-    resume = opcode.opmap.get("RESUME")
-    at = next((at for at in range(0, len(raw), 2) if raw[at] == resume), None)
-    if at is not None and raw[at + 1] == _AT_START:
-        raw[at + 1] = _IN_YIELD_FROM
-    deaf = FunctionType(
-        code.replace(co_code=bytes(raw)),
-        function.__globals__,
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
-    return address(prototype(deaf))
-
-
-def interrupted(error: BaseException) -> bool:
-    """Return whether a callback should try again because only a signal came in between.
-
-    The signal is sent once more, by another thread: soon, but not before C code is
-    left.
-    """
-    if isinstance(error, Exception):
-        return False
-    _thread.start_new_thread(_thread.interrupt_main, ())
-    return True
-
-
-def report(what: str, error: BaseException) -> None:
-    """Log an error that cannot be raised because C called."""
-    logging.getLogger(__package__).warning("%s: %s", what, error)

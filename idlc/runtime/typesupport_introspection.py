@@ -13,6 +13,7 @@ from functools import cache
 from typing import Any, NamedTuple
 
 from . import typesupport_c as c
+from . import typesupport_callbacks as callbacks
 from .typesupport_descriptions import (
     ARRAY,
     BOUNDED_SEQUENCE,
@@ -199,9 +200,9 @@ def _get(fixed: bool, size: int) -> int:
             return 0
 
     if fixed:
-        return c.callback(PYFUNCTYPE(c_void_p, c_size_t, c_size_t), in_array)
+        return callbacks.callback(PYFUNCTYPE(c_void_p, c_size_t, c_size_t), in_array)
     prototype = PYFUNCTYPE(c_void_p, ctypes.POINTER(c.Sequence), c_size_t)
-    return c.callback(prototype, in_sequence)
+    return callbacks.callback(prototype, in_sequence)
 
 
 @cache
@@ -220,14 +221,14 @@ def _resize(name: str, size: int) -> int:
         except BaseException as error:
             failure = error
         try:
-            if c.interrupted(failure):
+            if callbacks.interrupted(failure):
                 return resize(field, count)
-            c.report("a received message was dropped", failure)
+            callbacks.report("a received message was dropped", failure)
         except BaseException:  # noqa: S110
             pass
         return False
 
-    return c.callback(PYFUNCTYPE(c_bool, c_void_p, c_size_t), resize)
+    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, c_size_t), resize)
 
 
 def members(name: str, shift: int = 0) -> Members:

@@ -22,6 +22,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from . import typesupport_c as c
+from . import typesupport_callbacks as callbacks
 from . import typesupport_introspection as introspection
 from .typesupport_descriptions import about
 
@@ -75,9 +76,9 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
         except BaseException as error:
             failure = error
         try:
-            if c.interrupted(failure):
+            if callbacks.interrupted(failure):
                 return create(info, _, request, response)
-            c.report("a service event was not sent", failure)
+            callbacks.report("a service event was not sent", failure)
         except BaseException:  # noqa: S110
             pass
         return 0
@@ -90,7 +91,7 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
         else:
             return True
         try:  # noqa: SIM105 (a context manager would be called outside of it)
-            c.interrupted(failure)
+            callbacks.interrupted(failure)
         except BaseException:  # noqa: S110
             pass
         return True
@@ -98,8 +99,10 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
     info = ctypes.POINTER(_EventInfo)
     return Event(
         handle,
-        c.callback(PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create),
-        c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), destroy),
+        callbacks.callback(
+            PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create
+        ),
+        callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), destroy),
     )
 
 

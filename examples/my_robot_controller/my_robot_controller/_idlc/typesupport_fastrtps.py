@@ -1,21 +1,24 @@
 """The opaque road: rmw_fastrtps_cpp and others that use its type support.
 
-The middleware never looks into message memory here, so it is a `Memory`: the codec's
-bytes on the way out, the decoded object on the way in. Convert and destroy are
-functions of Python's own C interface, hence an exception reaches the caller of
-`publish` untouched.
+The middleware never looks into message memory here, so it is a `Memory` that holds the
+encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
+calls the two functions that copy the bytes while it holds the mutex of a writer or a
+reader, and another thread may wait for that mutex while it holds the interpreter's lock.
+Whoever gave that lock away in there would never get it back.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from _thread import get_ident
 from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from typing import Any
 
 from . import typesupport_c as c
+from . import typesupport_callbacks as callbacks
 from . import typesupport_introspection as introspection
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, install
@@ -26,75 +29,88 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
 #: The encapsulation header, which the middleware reads and writes itself.
 _HEADER = 4
-#: Received messages up to this size are copied into `bytes`, which decode faster than
-#: views.
+#: Received messages up to this size decode faster as `bytes` than as views.
 _SMALL = 4096
-#: Arrays with this many elements are not copied on their way to the middleware.
-_LARGE = 16384
 
 
 class Memory:
     """Message memory: `message @ memory` encodes into it, `+memory` is the message.
 
     `__len__` is the encoded size. It is a slot that holds a function, so that no
-    bytecode runs where C asks for the size: an interrupt there could not be told.
+    bytecode runs where C asks for the size.
     """
 
-    __slots__ = ("body", "length", "message", "parts")
+    __slots__ = ("body", "length", "message", "received", "size")
 
-    #: The encoded message without header; large ones are in several parts instead.
-    body: bytes | None
-    parts: list[memoryview]
+    #: The encoded message without header, and its size.
+    body: bytes
+    size: int
     length: Callable[[], int]
+    #: The message that `body` was made from.
     message: Any
-
-    def __pos__(self) -> Any:
-        """Return the message that was encoded or decoded last."""
-        return self.message
+    #: What was received, with header; no attribute in a memory that is sent.
+    received: bytes
 
 
 _memory: Any = Memory
 _memory.__len__ = _memory.length
 
 
-def _joined(parts: list[Any]) -> list[memoryview]:
-    """Return few parts: large arrays as they are, what lies between them joined."""
-    joined = []
-    small: list[Any] = []
-    for part in parts:
-        if len(part) < _LARGE:
-            small.append(part)
-        else:
-            joined += [memoryview(b"".join(small)), memoryview(part).cast("B")]
-            small = []
-    return [*joined, memoryview(b"".join(small))]
-
-
-def _memory_type(cls: Any) -> type[Memory]:
-    """Return the memory of a message class, which encodes with the class's codec."""
+def _memory_type(name: str, cls: Any) -> type[Memory]:
+    """Return the memory of a message class, which works with the class's codec."""
     encode = cls._codec_(NATIVE).encode
     true = c.TRUE
 
     def store(memory: Any, message: Any) -> object:
         try:
             parts = encode(message)
-            body = parts[0][_HEADER:]
-            if len(parts) > 1:
-                parts[0] = body
-                if sum(map(len, parts)) < _LARGE:
-                    body = b"".join(parts)
-                else:
-                    body = None
-                    memory.parts = parts = _joined(parts)
+            parts[0] = parts[0][_HEADER:]
+            body = parts[0] if len(parts) == 1 else b"".join(parts)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
         memory.body = body
-        size = sum(map(len, parts)) if body is None else len(body)
+        memory.size = size = len(body)
         memory.length = size.__index__
         memory.message = message
         return true
 
-    return type("Memory", (Memory,), {"__slots__": (), "__rmatmul__": store})
+    namespace = {"__slots__": (), "__rmatmul__": store, "__pos__": _taker(name, cls)}
+    return type("Memory", (Memory,), namespace)
+
+
+def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
+    """Return the function that gives the message in a memory, or `None` for garbage."""
+    install(cls)
+    decode, bulk = cls._codec_(NATIVE).decode, cls._codec_(NATIVE).bulk
+    decode_any = cls.deserialize
+    native = HEADERS[NATIVE][1]
+
+    def taken(memory: Any) -> Any:
+        try:
+            try:
+                data = memory.received
+            except AttributeError:
+                return memory.message
+            if bulk and len(data) > _SMALL:
+                return decode_any(memoryview(data))
+            if data[1] == native and not data[0]:
+                try:
+                    return decode(data)
+                except Exception:  # noqa: S110 (told exactly by what follows)
+                    pass
+            return decode_any(data)
+        except BaseException as error:
+            failure = error
+        try:
+            if callbacks.interrupted(failure):
+                return taken(memory)
+            callbacks.report(f"a received {name} was dropped", failure)
+            nothing, thread = callbacks.nothing_taken(name), get_ident()
+            return nothing[thread]
+        except BaseException:
+            return None
+
+    return callbacks.deaf(taken)
 
 
 class _Callbacks(ctypes.Structure):
@@ -124,7 +140,10 @@ class _ServiceCallbacks(ctypes.Structure):
 
 @cache
 def _serializer() -> int:
-    """Return `cdr_serialize(memory, cdr)`."""
+    """Return `cdr_serialize(memory, cdr)`, which never lets another thread run.
+
+    The interpreter may do so after a call and where it jumps, so there is neither.
+    """
     position, end = fast_cdr()
     everything, words = c.MEMORY, c.WORDS
 
@@ -132,67 +151,35 @@ def _serializer() -> int:
         try:
             here = cdr >> 3
             start = words[here + position]
-            body = memory.body
-            stop = start + (memory.length() if body is None else len(body))
-            if words[here + end] < stop:
-                return False
-            if body is not None:
-                everything[start:stop] = body
-            else:
-                for part in memory.parts:
-                    everything[start : start + len(part)] = part
-                    start += len(part)
-            words[here + position] = stop
-            return True
-        except BaseException as error:
-            failure = error
-        try:
-            if c.interrupted(failure):
-                return serialize(memory, cdr)
-            c.report("a message was not sent", failure)
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                everything[start:stop] = memory.body
+                words[here + position] = stop
+                return True
         except BaseException:  # noqa: S110
             pass
         return False
 
-    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
 
 
-def _deserializer(name: str, cls: Any) -> int:
-    """Return `cdr_deserialize(cdr, memory)` for one class."""
+@cache
+def _deserializer() -> int:
+    """Return `cdr_deserialize(cdr, memory)`, which never lets another thread run either."""
     position, end = fast_cdr()
-    everything, words = c.MEMORY, c.WORDS
-    install(cls)
-    decode, bulk = cls._codec_(NATIVE).decode, cls._codec_(NATIVE).bulk
-    decode_any = cls.deserialize
-    native = HEADERS[NATIVE][1]
+    characters, words = c.CHARACTERS, c.WORDS
 
     def deserialize(cdr: int, memory: Any) -> bool:
         try:
             here = cdr >> 3
-            view = everything[words[here + position] - _HEADER : words[here + end]]
-            if bulk and len(view) > _SMALL:
-                memory.message = decode_any(view)
-                return True
-            data = view.tobytes()
-            if data[1] == native and not data[0]:
-                try:
-                    memory.message = decode(data)
-                    return True
-                except Exception:  # noqa: S110 (told exactly by what follows)
-                    pass
-            memory.message = decode_any(data)
+            memory.received = characters[
+                words[here + position] - _HEADER : words[here + end]
+            ]
             return True
-        except BaseException as error:
-            failure = error
-        try:
-            if c.interrupted(failure):
-                return deserialize(cdr, memory)
-            c.report(f"a received {name} was dropped", failure)
-        except BaseException:  # noqa: S110
-            pass
-        return False
+        except BaseException:
+            return False
 
-    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
+    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
 
 
 @cache
@@ -206,7 +193,7 @@ def _unbounded() -> int:
             pass
         return 0
 
-    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
+    return callbacks.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
 
 
 @cache
@@ -218,28 +205,28 @@ def _identifier() -> int:
 def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     package, kind, short = name.split("/")
-    callbacks = _Callbacks(
+    functions = _Callbacks(
         f"{package}::{kind}".encode(),
         short.encode(),
         _serializer(),
-        _deserializer(name, cls),
+        _deserializer(),
         c.c_function("PyObject_Size"),
         _unbounded(),
     )
-    support = c.keep(c.MessageTypeSupport(_identifier(), c.pointer(callbacks)))
+    support = c.keep(c.MessageTypeSupport(_identifier(), c.pointer(functions)))
     answers = {
         IDENTIFIER.encode(): ctypes.addressof(support),
         introspection.IDENTIFIER.encode(): introspection.handle(name),
     }
     support.func = c.resolver(answers)
     support.about = about(name)
-    return c.MessageSupport(ctypes.addressof(support), _memory_type(cls))
+    return c.MessageSupport(ctypes.addressof(support), _memory_type(name, cls))
 
 
 def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
     """Return identifier and data of a service's type support; handles of its messages given."""
     package, kind, short = name.split("/")
-    callbacks = _ServiceCallbacks(
+    functions = _ServiceCallbacks(
         f"{package}::{kind}".encode(), short.encode(), request, response
     )
-    return _identifier(), c.pointer(callbacks)
+    return _identifier(), c.pointer(functions)
