@@ -10,6 +10,7 @@ tell of, whichever function makes them: opening for writing, moving, making and 
     {"point": N, "remove": "out"}    remove a folder before write number N
     {"size": N}                      let no file become larger than N bytes
     {"user": N}                      run as another user
+    {"cwd": "pkg"}                   run in a folder below
 
 It answers with {"status": …, "points": …, "said": …}; status -9 is a killed process.
 """
@@ -20,10 +21,13 @@ import importlib
 import io
 import json
 import os
+import pkgutil
 import resource
 import shutil
 import sys
 
+import idlc
+import idlc.emit.render
 from idlc.disk.read import absolute
 
 WRITES = {"os.mkdir", "os.rmdir", "os.remove", "os.rename", "os.utime", "os.chmod", "os.truncate"}
@@ -77,7 +81,7 @@ class Fault:
 
 
 def run(folder, order, answer):
-    os.chdir(folder)
+    os.chdir(f"{folder}/{order.get('cwd', '')}")
     fault = Fault(os.path.realpath(folder), order)
     if "size" in order:
         resource.setrlimit(resource.RLIMIT_FSIZE, (order["size"], order["size"]))
@@ -99,15 +103,10 @@ def run(folder, order, answer):
 def main():
     folder = sys.argv[1]
     # everything that a run imports; another user may not be allowed to read it
-    import idlc.cli.fmt
-    import idlc.cli.gen
-    import idlc.cli.generate
-    import idlc.cli.run
-    import idlc.driver.fmt
-    import idlc.driver.gen
-    import idlc.emit.render
-
-    for name in ("difflib", "encodings.idna", "fcntl", "tempfile"):
+    for found in pkgutil.walk_packages(idlc.__path__, "idlc."):
+        if not found.name.startswith(("idlc.runtime.", "idlc.__main__", "idlc.cli.pytest_plugin")):
+            importlib.import_module(found.name)
+    for name in ("difflib", "encodings.idna", "fcntl", "html", "tempfile", "xml.parsers.expat"):
         importlib.import_module(name)
     idlc.emit.render.environment()
     for line in sys.stdin:

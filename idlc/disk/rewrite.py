@@ -18,17 +18,22 @@ if TYPE_CHECKING:
     from idlc.text.diagnostics import Edit, Report
 
 
-def replace(path: Path, name: str, data: bytes, report: Report) -> bool:
+def replace(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     """Give a file new content; report IDL612 and return `False` if that fails.
 
-    A link stays one, and the file that it leads to is replaced.
+    A link stays one, and the file that it leads to is replaced. What somebody else made of the
+    file since it was read stays.
     """
     target = path.resolve()
     try:
+        if target.read_bytes() != old.encode("utf-8"):
+            message = f"`{name}` was changed while idlc was running"
+            report.add(codes.CANNOT_WRITE.of(name, message, hint="run it again"))
+            return False
         handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(data)
+                file.write(new.encode("utf-8"))
             shutil.copymode(target, draft)
             Path(draft).replace(target)
         except BaseException:
@@ -48,7 +53,8 @@ def mend(edits: Iterable[Edit], report: Report) -> int:
         by_path.setdefault(edit.span.source.path, []).append(edit)
     done = 0
     for name, own in by_path.items():
-        text, number = apply(own[0].span.source.text, own)
-        if replace(Path(name), name, text.encode("utf-8"), report):
+        old = own[0].span.source.text
+        text, number = apply(old, own)
+        if replace(Path(name), name, old, text, report):
             done += number
     return done

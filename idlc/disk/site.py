@@ -1,52 +1,75 @@
-"""Writing a site: only files that an earlier run wrote are replaced or removed."""
+"""Writing a site: all of it or nothing, and only files that an earlier run wrote are touched."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
-from idlc.disk.read import reason
+from idlc.disk.lock import digest
+from idlc.disk.plan import Change, Plan
+from idlc.disk.read import absolute
+from idlc.disk.tree import Obstacle, Tree
+from idlc.disk.write import apply_changes, journals, sweep
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Diagnostic, Report
 
+#: The pages that a run wrote, each with its SHA-256.
 LISTING = "idlc-docs.json"
 
 
 def write(out: str, files: Mapping[str, str], report: Report) -> bool:
-    """Write files below `out`; report IDL612 or IDL614 and return `False` if that must not be."""
-    folder = Path(out)
-    before = _listed(folder)
-    foreign = [path for path in files if path not in before and (folder / path).exists()]
-    for path in foreign:
-        shown = f"{out}/{path}"
-        report.add(
-            codes.FOREIGN_FILE.of(
-                shown, f"`{shown}` was not written by idlc", hint="choose another folder with -o"
-            )
+    """Write files below `out`; report IDL612 to IDL614 and return `False` if that must not be."""
+    folder = absolute(out)
+    tree = Tree(folder)
+    mine = _listed(folder, tree)
+    pages = {path: text.encode("utf-8") for path, text in files.items()}
+    listed = {path: digest(data) for path, data in sorted(pages.items())}
+    listing = json.dumps(listed, indent=1).encode() + b"\n"
+    changes: list[Change] = []
+    for path in (*pages, *sorted({path for path, _ in mine} - pages.keys())):
+        old, new = tree.read(path), pages.get(path)
+        foreign = isinstance(old, Obstacle) or (
+            old is not None and old != new and (path, digest(old)) not in mine
         )
-    if foreign:
+        if foreign and new is not None:
+            report.add(_in_the_way(f"{out}/{path}", old))
+        elif not foreign and not isinstance(old, Obstacle) and old != new:
+            changes.append(Change(path, old, new))
+    record = tree.read(LISTING)
+    if isinstance(record, Obstacle):
+        report.add(_in_the_way(f"{out}/{LISTING}", record))
+    elif record != listing:
+        changes.append(Change(LISTING, record, listing))
+    if report.had_errors:
         return False
-    try:
-        for path, text in {**files, LISTING: json.dumps(sorted(files), indent=1) + "\n"}.items():
-            target = folder / path
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(text, encoding="utf-8", newline="\n")
-        for path in before - files.keys():
-            (folder / path).unlink(missing_ok=True)
-            with contextlib.suppress(OSError):
-                (folder / path).parent.rmdir()
-    except OSError as error:
-        report.add(codes.CANNOT_WRITE.of(out, f"cannot write to `{out}`: {reason(error)}"))
-        return False
-    return True
+    if not changes:
+        sweep(folder)
+    return apply_changes(Plan(folder, tuple(changes), {}), out, report, listing)
 
 
-def _listed(folder: Path) -> set[str]:
-    try:
-        listed = json.loads((folder / LISTING).read_bytes())
-    except (OSError, ValueError):
-        return set()
-    paths = [path for path in listed if isinstance(path, str)] if isinstance(listed, list) else []
-    return {path for path in paths if ".." not in PurePosixPath(path).parts and path[:1] != "/"}
+def _in_the_way(shown: str, found: Obstacle | bytes | None) -> Diagnostic:
+    what = f"`{shown}` was not written by idlc, or edited since"
+    if isinstance(found, Obstacle):
+        what = f"cannot write `{shown}`: {found.what}"
+    return codes.FOREIGN_FILE.of(shown, what, hint="move it away, or choose another folder with -o")
+
+
+def _listed(folder: Path, tree: Tree) -> set[tuple[str, str]]:
+    """Return the pages that earlier runs wrote and what they wrote, as far as that may be."""
+    record = tree.read(LISTING)
+    found: set[tuple[str, str]] = set()
+    for data in (record if isinstance(record, bytes) else b"", *journals(folder)):
+        try:
+            listed = json.loads(data)
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(listed, dict):
+            found |= {(path, one) for path, one in listed.items() if _is_page(path, one)}
+    return found
+
+
+def _is_page(path: str, one: object) -> bool:
+    parts = PurePosixPath(path).parts
+    plain = path.isascii() and path.isprintable() and path == "/".join(parts)
+    return plain and bool(parts) and ".." not in parts and isinstance(one, str)

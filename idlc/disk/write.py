@@ -32,11 +32,18 @@ ABANDONED = 3600
 def owned(out: Path, known: lock.Lock | None) -> dict[str, frozenset[str]]:
     """Return the files that idlc wrote below `out`, each with the digests that it may have."""
     found = {path: frozenset((one,)) for path, one in (known.outputs if known else {}).items()}
-    for stage in _abandoned(out):
-        with contextlib.suppress(OSError, ValueError, msgspec.MsgspecError):
-            for path, one in lock.decode((stage / lock.FILE).read_bytes()).outputs.items():
+    for journal in journals(out):
+        with contextlib.suppress(ValueError, msgspec.MsgspecError):
+            for path, one in lock.decode(journal).outputs.items():
                 found[path] = found.get(path, frozenset()) | {one}
     return found
+
+
+def journals(out: Path) -> Iterator[bytes]:
+    """Yield what killed runs wrote down about the files that they were moving into place."""
+    for stage in _abandoned(out):
+        with contextlib.suppress(OSError):
+            yield (stage / lock.FILE).read_bytes()
 
 
 def _abandoned(out: Path) -> list[Path]:
@@ -132,11 +139,11 @@ def _failure(name: str, error: OSError) -> Diagnostic:
     return codes.CANNOT_WRITE.of(name, f"cannot write to `{name}`: {reason(error)}")
 
 
-def apply_changes(plan: Plan, name: str, report: Report) -> bool:
+def apply_changes(plan: Plan, name: str, report: Report, journal: bytes = b"") -> bool:
     """Make changes in a folder that has no lock; report IDL612 and return `False` on a failure."""
     if not plan.changes:
         return True
-    return _carry_out(plan.out, plan.changes, b"", name, report)
+    return _carry_out(plan.out, plan.changes, journal, name, report)
 
 
 def _outcome(torn: list[str], name: str) -> str:

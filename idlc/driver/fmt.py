@@ -41,7 +41,7 @@ def fmt(paths: Sequence[str], report: Report, *, write: bool) -> Iterator[Format
         with stage("format", file.shown):
             found = _format(file, source, report)
         if write and found.changed and found.new is not None:
-            replace(file.path, file.shown, found.new.encode("utf-8"), report)
+            replace(file.path, file.shown, source.text, found.new, report)
         yield found
 
 

@@ -1,0 +1,56 @@
+"""A folder with a package in it, and a process that runs idlc there and commits faults."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+GEN = ["gen", "pkg", "-o", "out/demo"]
+
+
+class Machine:
+    """A folder with a package in it, and a process that runs idlc there and commits faults."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, str(HERE / "faults.py"), str(folder)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONUTF8": "1", "AMENT_PREFIX_PATH": ""},
+            text=True,
+        )
+
+    def run(self, words=GEN, **fault):
+        self.process.stdin.write(json.dumps({"words": list(words), **fault}) + "\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def write(self, files):
+        shutil.rmtree(self.folder / "pkg", ignore_errors=True)
+        for path, text in files.items():
+            target = self.folder / "pkg" / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text, encoding="utf-8")
+
+    def reset(self, out):
+        """Make the output what it was; `None` for none."""
+        shutil.rmtree(self.folder / "out", ignore_errors=True)
+        if out is not None:
+            shutil.copytree(out, self.folder / "out")
+
+    @property
+    def tree(self):
+        return tree(self.folder / "out")
+
+
+def tree(out):
+    """Return the files below a folder, without what only an interrupted run leaves there."""
+    return {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in sorted(out.rglob("*"))
+        if path.is_file() and ".idlc-stage-" not in path.as_posix()
+    }
