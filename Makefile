@@ -71,7 +71,7 @@ fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or
 	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/test_fuzz.py tests/test_limits.py \
 	    tests/test_emit_hostile.py $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
 	@if $(TEST_ENV)/bin/python $(PIP_INSTALL) atheris; then \
-	    for target in msg srv action lock pyproject package_xml; do \
+	    for target in $$(cd tests && ../$(TEST_ENV)/bin/python -c 'import fuzzing; print(*fuzzing.TARGETS)'); do \
 	        PYTHONPATH=tests $(TEST_ENV)/bin/python tests/fuzz_atheris.py $$target 300 || exit 1; \
 	    done; \
 	else echo 'atheris has no build for this Python: its part is left out'; fi

@@ -15,6 +15,8 @@ import random
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import fuzzing_edits as edits
+
 from idlc.cli.main import main
 from idlc.disk.lock import FILE
 
@@ -129,7 +131,11 @@ def package_xml(data: bytes, folder: Path) -> None:
 
 
 TARGETS: dict[str, Callable[[bytes, Path], None]] = {
-    function.__name__: function for function in (msg, srv, action, lock, pyproject, package_xml)
+    function.__name__: function
+    for function in (
+        *(msg, srv, action, lock, pyproject, package_xml),
+        *(edits.manifest, edits.setup_file, edits.setup_cfg, edits.launch_file),
+    )
 }
 
 

@@ -59,7 +59,7 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
     parser.CharacterDataHandler = text
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, ValueError) as error:
+    except (expat.ExpatError, ValueError, LookupError) as error:  # an unknown encoding
         report.add(_broken(data, name, error))
         return None
     declared = "".join(found).strip()
@@ -75,7 +75,9 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
     return declared
 
 
-def _broken(data: bytes, name: str, error: expat.ExpatError | ValueError) -> Diagnostic:
+def _broken(
+    data: bytes, name: str, error: expat.ExpatError | ValueError | LookupError
+) -> Diagnostic:
     message = f"not well-formed XML: {str(error).partition(':')[0]}"
     hint = "mend the file, or give --package NAME"
     if not isinstance(error, expat.ExpatError):

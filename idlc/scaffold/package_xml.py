@@ -57,10 +57,11 @@ def add(
     """
     data = text.encode("utf-8")
     manifest = read(data)
-    if manifest is None:
+    own = manifest.texts(["name"]) if manifest else ()
+    if manifest is None or not own:
         line = " ".join(_depend(name, "depend") for name in depends)
-        return Refused("this is not a well-formed package.xml", line, "within `<package>`")
-    own = manifest.texts(["name"])
+        why = "it has no `<name>`" if manifest else "this is not a well-formed package.xml"
+        return Refused(why, line, "within `<package>`")
     running = manifest.texts(AT_RUN_TIME) | own
     testing = manifest.texts(AT_TEST_TIME) | own
     tag = "run_depend" if manifest.format == "1" else "depend"
@@ -109,7 +110,7 @@ def _line_end(data: bytes, at: int) -> int:
 
 def read(data: bytes) -> Manifest | None:
     """Return what a package.xml says; `None` if it is not well-formed or another document."""
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
     stack: list[str] = []
     found: list[Element] = []
