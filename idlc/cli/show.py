@@ -40,7 +40,7 @@ def command(wanted: str, style: str, package: str | None, include: tuple[str, ..
     report = Report()
     texts = show(wanted, style, package, include, report)
     text = "\n".join(texts)
-    if style == "text" and sys.stdout.isatty():
+    if style == "text" or sys.stdout.isatty():  # other formats are for other tools
         text = "\n".join(map(visible, text.split("\n")))
     sys.stdout.write(text)
     terminal.show(report, "text", sys.stderr)
