@@ -134,6 +134,19 @@ def test_laying_out_is_linear(what):
     assert_linear(MANY[what], lambda folder: ["fmt", folder])
 
 
+@pytest.mark.parametrize("what", ["fields", "messages", "constants", "units", "a chain"])
+def test_showing_is_linear(what):
+    path = "msg/M0.msg" if what == "a chain" else A
+    assert_linear(MANY[what], lambda folder: ["show", f"{folder}/{path}", "--package", "p"])
+
+
+@pytest.mark.parametrize("what", ["fields", "messages", "constants", "units", "files", "actions"])
+def test_documenting_is_linear(what):
+    assert_linear(
+        MANY[what], lambda folder: ["docs", folder, "-o", f"site/{Path(folder).parts[0]}"], 50
+    )
+
+
 CHANGES = {
     "kept": (MANY["fields"], MANY["fields"]),
     "removed": (MANY["fields"], lambda _: {A: "int8 x\n"}),
@@ -264,12 +277,15 @@ def test_what_is_very_long_is_judged_soon(here):
 
 
 def test_what_is_very_long_is_generated_and_laid_out_soon(here):
-    chosen = ["long default", "comment", "comment of units", "size", "real"]
+    chosen = ["long default", "comment", "comment of units", "size", "real", "many fields"]
     for number, what in enumerate(chosen):
         make(here / f"p{number}", {A: LONG[what][0] + "\n"})
     numbers = range(len(chosen))
-    commands = [["gen", f"p{number}", "-o", f"out/p{number}"] for number in numbers]
+    commands = [["gen", f"p{number}", "-o", f"out/p{number}"] for number in numbers[:-1]]
     commands += [["breaking", f"p{number}", "--against", f"p{number}"] for number in numbers]
+    commands += [["show", f"p{number}/{A}"] for number in numbers]
+    commands += [["docs", f"p{number}", "-o", f"site/p{number}"] for number in numbers]
+    commands += [["fmt", f"p{number}"] for number in numbers]
     for words, (status, out) in limited(commands).items():
         assert status == 0, f"{words}: {out[:300]}"
 
@@ -279,7 +295,7 @@ LARGE = {
     "lines": ("\n" * 600_000, "IDL604", "more than 500,000 lines"),
     "elements": (f"int8[] a [{'1,' * 300_000}1]\n", "IDL604", "more than 200,000 elements"),
     "text elements": (f"string[] a [{'1,' * 300_000}1]\n", "IDL604", "more than 200,000 elements"),
-    "fields": (numbered("int32 f@", 20_001), "IDL619", "20,001 fields"),
+    "fields": (numbered("int32 f@", 100_000), "IDL619", "100,000 fields"),
 }
 
 
@@ -290,11 +306,24 @@ def test_what_is_too_large_is_refused_in_plain_words(what, here):
     if text is None:
         with (here / "pkg" / A).open("r+b") as file:
             file.truncate(100 << 20)
-    status, out = limited([["gen", "pkg", "-o", "out/pkg"]])["gen pkg -o out/pkg"]
-    assert status in (1, 2)
-    assert f"error[{code}]" in out
-    assert words in out
+    commands = [["gen", "pkg", "-o", "out/pkg"]]
+    if code == "IDL604":  # the others are too large for generated code only
+        commands += [["check", "pkg"], ["fmt", "pkg"], ["docs", "pkg", "-o", "site"]]
+        commands += [["breaking", "pkg", "--against", "pkg"], ["show", f"pkg/{A}"]]
+    for command, (status, out) in limited(commands).items():
+        assert status in (1, 2), command
+        assert f"error[{code}]" in out, command
+        assert words in out, command
     assert not (here / "out").exists()
+    assert not (here / "site").exists()
+
+
+def test_ten_thousand_files(here):
+    make(here / "pkg", numbered_files(10_000))
+    commands = [["check", "pkg"], ["fmt", "--check", "pkg"], ["hash", "pkg"]]
+    said = limited([*commands, ["breaking", "pkg", "--against", "pkg"]])
+    assert [status for status, _ in said.values()] == [0, 0, 0, 0]
+    assert said["hash pkg"][1].count("RIHS01_") == 10_000
 
 
 def test_a_chain_of_a_thousand_dependencies(here):

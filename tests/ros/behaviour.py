@@ -195,6 +195,36 @@ def memory_stays_flat(count):
     assert resident() - before < 3, (before, resident())
 
 
+def memory_stays_flat_in_services(count):
+    """Also with what an action sends: an action consists of services and topics."""
+    from std_srvs.srv import SetBool
+
+    node, _ = node_and_string()
+    service = node.create_service(SetBool, "service", print)
+    client = node.create_client(SetBool, "service")
+    assert client.wait_for_service(PATIENCE)
+
+    def taken(take, kind, place):
+        found = [None, None]
+        while found[place] is None:
+            found = take(kind)
+        return found
+
+    def work():
+        for i in range(int(count) // 4):
+            client.handle.send_request(SetBool.Request(data=bool(i % 2)))
+            request, header = taken(service.handle.service_take_request, SetBool.Request, 1)
+            service.send_response(SetBool.Response(message=f"{i} {request.data}"), header)
+            _, response = taken(client.handle.take_response, SetBool.Response, 0)
+            assert response.message == f"{i} {bool(i % 2)}", response
+
+    work()
+    before = resident()
+    for _ in range(3):
+        work()
+    assert resident() - before < 3, (before, resident())
+
+
 def many_threads():
     rclpy.init()
     node = rclpy.create_node("behaviour")

@@ -75,6 +75,10 @@ def test_memory_stays_flat(start):
     assert finish(start("memory_stays_flat", "200000")) == ("", "")
 
 
+def test_memory_stays_flat_in_services(start):
+    assert finish(start("memory_stays_flat_in_services", "40000")) == ("", "")
+
+
 def test_one_interrupt_ends_a_busy_node(start):
     process = start("spins_until_interrupted")
     assert process.stdout.readline() == "ready\n"
