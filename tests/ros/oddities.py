@@ -197,7 +197,7 @@ class Oddities:
 
     def _case(self):
         choice = self.random.choice
-        self.odd = choice([0.0, 0.0, 0.01, 0.02, 0.05, 0.2])
+        self.odd = choice([0.0, 0.01, 0.02, 0.05, 0.1, 0.2])
         kind = choice(["msg", "msg", "msg", "srv", "action"])
         end = self._pick(LINE_ENDS, ODD_LINE_ENDS)
         lines = self._lines(kind)

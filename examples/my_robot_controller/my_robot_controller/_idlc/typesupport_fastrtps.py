@@ -102,13 +102,15 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
         except BaseException as error:
             failure = error
         try:
-            if callbacks.interrupted(failure):
-                return taken(memory)
-            callbacks.report(f"a received {name} was dropped", failure)
-            nothing, thread = callbacks.nothing_taken(name), get_ident()
-            return nothing[thread]
-        except BaseException:
+            if not callbacks.interrupted(failure):
+                callbacks.report(f"a received {name} was dropped", failure)
+                nothing, thread = callbacks.nothing_taken(name), get_ident()
+                return nothing[thread]
+        except Exception:
             return None
+        except BaseException:  # noqa: S110 (one more interrupt)
+            pass
+        return taken(memory)
 
     return callbacks.deaf(taken)
 
