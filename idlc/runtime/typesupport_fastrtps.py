@@ -29,8 +29,8 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
 #: The encapsulation header, which the middleware reads and writes itself.
 _HEADER = 4
-#: Received messages up to this size decode faster as `bytes` than as views.
-_SMALL = 4096
+#: An array with this many bytes is not copied on its way to the middleware.
+_LARGE = 16384
 
 
 class Memory:
@@ -40,11 +40,19 @@ class Memory:
     bytecode runs where C asks for the size.
     """
 
-    __slots__ = ("body", "length", "message", "received", "size")
+    __slots__ = (
+        *("body", "first", "head", "length"),
+        *("message", "received", "second", "size", "tail"),
+    )
 
-    #: The encoded message without header, and its size.
-    body: bytes
+    #: The encoded message without header, and its size. Of a large one, the body is only
+    #: its largest array, which stands from `first` to `second`, between head and tail.
+    body: bytes | memoryview
     size: int
+    first: int
+    second: int
+    head: bytes
+    tail: bytes
     length: Callable[[], int]
     #: The message that `body` was made from.
     message: Any
@@ -58,18 +66,26 @@ _memory.__len__ = _memory.length
 
 def _memory_type(name: str, cls: Any) -> type[Memory]:
     """Return the memory of a message class, which works with the class's codec."""
-    encode = cls._codec_(NATIVE).encode
+    encode, bulk = cls._codec_(NATIVE).encode, cls._codec_(NATIVE).bulk
     true = c.TRUE
+    large = False
 
     def store(memory: Any, message: Any) -> object:
+        nonlocal large
         try:
             parts = encode(message)
             parts[0] = parts[0][_HEADER:]
-            body = parts[0] if len(parts) == 1 else b"".join(parts)
+            if large:
+                size = _store_apart(memory, parts)
+            else:
+                memory.body = body = parts[0] if len(parts) == 1 else b"".join(parts)
+                memory.second = size = len(body)
+                memory.first, memory.head, memory.tail = 0, b"", b""
+            # what follows on a topic is as large as what came before
+            large = bulk and size >= _LARGE
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        memory.body = body
-        memory.size = size = len(body)
+        memory.size = size
         memory.length = size.__index__
         memory.message = message
         return true
@@ -78,10 +94,22 @@ def _memory_type(name: str, cls: Any) -> type[Memory]:
     return type("Memory", (Memory,), namespace)
 
 
+def _store_apart(memory: Memory, parts: list[Any]) -> int:
+    """Put the parts of a message into a memory, the largest uncopied; return their size."""
+    views = [memoryview(part).cast("B") for part in parts]
+    sizes = list(map(len, views))
+    at = sizes.index(max(sizes))
+    memory.head, memory.body = b"".join(views[:at]), views[at]
+    memory.tail = b"".join(views[at + 1 :])
+    memory.first = sum(sizes[:at])
+    memory.second = memory.first + sizes[at]
+    return sum(sizes)
+
+
 def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
     """Return the function that gives the message in a memory, or `None` for garbage."""
     install(cls)
-    decode, bulk = cls._codec_(NATIVE).decode, cls._codec_(NATIVE).bulk
+    decode = cls._codec_(NATIVE).decode
     decode_any = cls.deserialize
     native = HEADERS[NATIVE][1]
 
@@ -91,8 +119,6 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
                 data = memory.received
             except AttributeError:
                 return memory.message
-            if bulk and len(data) > _SMALL:
-                return decode_any(memoryview(data))
             if data[1] == native and not data[0]:
                 try:
                     return decode(data)
@@ -141,7 +167,7 @@ class _ServiceCallbacks(ctypes.Structure):
 
 
 @cache
-def _serializer() -> int:
+def _serializer(bulk: bool) -> int:
     """Return `cdr_serialize(memory, cdr)`, which never lets another thread run.
 
     The interpreter may do so after a call and where it jumps, so there is neither.
@@ -162,7 +188,24 @@ def _serializer() -> int:
             pass
         return False
 
-    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+    def serialize_bulk(memory: Any, cdr: int) -> bool:
+        try:
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                first, second = start + memory.first, start + memory.second
+                everything[start:first] = memory.head
+                everything[first:second] = memory.body
+                everything[second:stop] = memory.tail
+                words[here + position] = stop
+                return True
+        except BaseException:  # noqa: S110
+            pass
+        return False
+
+    function = serialize_bulk if bulk else serialize
+    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), function)
 
 
 @cache
@@ -210,7 +253,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     functions = _Callbacks(
         f"{package}::{kind}".encode(),
         short.encode(),
-        _serializer(),
+        _serializer(cls._codec_(NATIVE).bulk),
         _deserializer(),
         c.c_function("PyObject_Size"),
         _unbounded(),
