@@ -27,9 +27,10 @@ def compiled(tmp_path) -> Path:
     return tmp_path
 
 
-def test_the_first_example_runs(compiled):
-    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    done = run("-c", code, cwd=compiled)
+def test_the_examples_run_one_after_the_other(compiled):
+    codes = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(codes) == 2
+    done = run("-c", "".join(codes), cwd=compiled)
     assert done.returncode == 0, done.stderr
 
 

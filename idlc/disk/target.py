@@ -108,17 +108,20 @@ class Target:
     def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
         path = f"{self.name}/{change.path}"
         wrote = old.outputs.get(change.path)
+        hint = "run idlc gen without --check"
         if change.new is None:
             message = f"`{path}` is no longer generated: {why}"
         elif change.old is None:
             message = f"`{path}` is missing" + ("" if wrote else f": {why}")
         elif wrote is not None and digest(change.old) != wrote:
             message = f"`{path}` was edited since idlc wrote it"
+            hint = "idlc gen --force replaces it"
         elif wrote is None:
             message = f"`{path}` was not written by idlc"
+            hint = "idlc gen --force replaces it"
         else:
             message = f"`{path}` is out of date: {why}"
-        return codes.DRIFT.of(path, message, hint="run idlc gen without --check")
+        return codes.DRIFT.of(path, message, hint=hint)
 
 
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
