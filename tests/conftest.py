@@ -1,6 +1,16 @@
+import signal
+
 import generated
 import pytest
 from hypothesis import HealthCheck, settings
+
+# Who starts tests in the background may ignore these, and what tests start would, too.
+for number, handler in (
+    (signal.SIGINT, signal.default_int_handler),
+    (signal.SIGHUP, signal.SIG_DFL),
+):
+    if signal.getsignal(number) == signal.SIG_IGN:
+        signal.signal(number, handler)
 
 # The same examples in every run, and no verdict that depends on how busy the machine is.
 settings.register_profile(

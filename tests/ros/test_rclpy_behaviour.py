@@ -84,7 +84,7 @@ def test_one_interrupt_ends_a_busy_node(start):
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
-    assert finish(process)[0] == "interrupted\n"
+    assert finish(process)[0] == "ended\n"
 
 
 def test_a_flood_of_interrupts_is_survived_and_seen(start):

@@ -144,7 +144,7 @@ def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp
     assert "Traceback" not in done.stderr
 
 
-def tested(*command: object, cwd: Path) -> tuple[int, str]:
+def colcon_tested(*command: object, cwd: Path) -> tuple[int, str]:
     """Return the status of a run of tests, and what it says."""
     done = subprocess.run(
         [str(word) for word in command],
@@ -165,17 +165,17 @@ def test_colcon_tests_the_interfaces(scaffolded, tmp_path):
     run(*colcon, "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
     test = [*colcon, "test", "--event-handlers", "console_direct+", "--return-code-on-test-failure"]
     test += ["--pytest-args", "test/test_interfaces.py", "-p", "no:cacheprovider"]
-    status, said = tested(*test, cwd=tmp_path)
+    status, said = colcon_tested(*test, cwd=tmp_path)
     assert (status, "2 passed" in said) == (0, True), said
     # neither compiled since nor, then, valid
     (package / "msg" / "Drive.msg").write_text("float64 speed\n")
-    status, said = tested(*test, cwd=tmp_path)
+    status, said = colcon_tested(*test, cwd=tmp_path)
     assert (status, "1 failed, 1 passed" in said) == (1, True), said
     assert "idlc gen --check" in said
     assert "msg/Drive.msg" in said
     (package / "msg" / "Drive.msg").write_text("flot32 speed\n")
     plain = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "test/test_interfaces.py"]
-    status, said = tested(*plain, cwd=package)
+    status, said = colcon_tested(*plain, cwd=package)
     assert (status, "2 failed" in said) == (1, True), said
     assert "error[IDL201]: unknown type `flot32`" in said
     assert "Traceback" not in said
