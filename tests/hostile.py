@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import pty
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import NamedTuple
 
@@ -93,6 +96,25 @@ def run(words, folder: Path) -> Said:
         os.chdir(before)
     assert status in (0, 1, 2), err.getvalue()
     return Said(status, out.getvalue(), err.getvalue())
+
+
+def on_a_terminal(words, folder: Path) -> str:
+    """Run idlc in a folder and return all that a terminal was sent."""
+    parent, child = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "idlc", *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": str(Path(__file__).parents[1])},
+        stdout=child,
+        stderr=child,
+    ):
+        os.close(child)
+        said = b""
+        with contextlib.suppress(OSError):  # raised when the other side is closed
+            while data := os.read(parent, 1 << 16):
+                said += data
+    os.close(parent)
+    return said.decode().replace("\r\n", "\n")
 
 
 def assert_harmless(text: str) -> None:

@@ -3,7 +3,6 @@
 import ast
 import json
 import os
-import pty
 import shutil
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from hostile import (
     PAYLOADS,
     assert_harmless,
     assert_untouched,
+    on_a_terminal,
     run,
 )
 
@@ -298,20 +298,9 @@ def commands(position):
 @pytest.mark.parametrize("payload", ["terminal colour", "terminal, 8 bit", "right to left", "nul"])
 def test_a_difference_on_a_terminal_is_harmless(payload, tmp_path):
     (tmp_path / "A.msg").write_text(f"int8   a # {PAYLOADS[payload]}\n", encoding="utf-8")
-    parent, child = pty.openpty()
-    subprocess.run(
-        [sys.executable, "-m", "idlc", "fmt", "--diff", "A.msg"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONUTF8": "1"},
-        stdout=child,
-        stderr=child,
-        check=False,
-    )
-    os.close(child)
-    said = os.read(parent, 1 << 16).decode()
-    os.close(parent)
+    said = on_a_terminal(["fmt", "--diff", "A.msg"], tmp_path)
     assert "int8 a" in said
-    assert_harmless(said.replace("\r\n", "\n"))
+    assert_harmless(said)
 
 
 XML = "<?xml version='1.0'?>\n{}<package><name>{}</name></package>\n"

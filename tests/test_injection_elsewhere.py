@@ -2,7 +2,6 @@
 
 import json
 import os
-import pty
 import re
 import shutil
 import subprocess
@@ -10,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hostile import PAYLOADS, assert_harmless, assert_untouched, run
+from hostile import PAYLOADS, assert_harmless, assert_untouched, on_a_terminal, run
 from test_docs import Page
 from test_injection import FILE_NAMES, PLACES, colourful
 
@@ -65,25 +64,9 @@ def test_what_is_shown(style, accepted):
 def test_what_is_shown_on_a_terminal(style, tmp_path):
     text = "".join(f"# {attack}\nint8 a{n}\n" for n, attack in enumerate(PAYLOADS.values()))
     (tmp_path / "A.msg").write_text(text.replace("\\", "/"), encoding="utf-8")
-    parent, child = pty.openpty()
-    words = ["show", "A.msg", "--package", "demo", "--format", style]
-    with subprocess.Popen(
-        [sys.executable, "-m", "idlc", *words],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": str(ROOT)},
-        stdout=child,
-        stderr=child,
-    ):
-        os.close(child)
-        said = b""
-        try:
-            while data := os.read(parent, 1 << 16):
-                said += data
-        except OSError:  # the other side is closed
-            pass
-    os.close(parent)
-    assert b"forged" in said
-    assert_harmless(said.decode().replace("\r\n", "\n"))
+    said = on_a_terminal(["show", "A.msg", "--package", "demo", "--format", style], tmp_path)
+    assert "forged" in said
+    assert_harmless(said)
 
 
 @pytest.mark.parametrize("against", ["old", "new"])

@@ -11,6 +11,9 @@ from pathlib import Path
 
 from idlc.disk.read import is_folder
 
+if sys.platform != "win32":
+    import fcntl
+
 #: What this process has locked, so that it does not wait for itself.
 _held: set[Path] = set()
 
@@ -21,25 +24,58 @@ def alone(folder: Path) -> Iterator[None]:
 
     The lock is the operating system's, on the folder itself, or the nearest above as long as
     there is none: it leaves no file behind and ends with the process. Where folders cannot be
-    locked, nothing is.
+    locked, nothing is. A run that holds one folder may only ask for others below it.
     """
-    place = next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+    place = _nearest(folder)
     if sys.platform == "win32" or place in _held:
         yield
         return
-    import fcntl
-
-    handle = None
-    with contextlib.suppress(OSError):
-        handle = os.open(place, os.O_RDONLY)
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        _held.add(place)
+    handle = _lock(place)
+    while (now := _nearest(folder)) != place or not _is(handle, place):
+        _unlock(handle)
+        handle = _lock(place := now)
+    _held.add(place)
     try:
         yield
     finally:
         _held.discard(place)
-        if handle is not None:
-            os.close(handle)
+        _unlock(handle)
+
+
+def _nearest(folder: Path) -> Path:
+    return next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+
+
+def _lock(place: Path) -> int | None:
+    """Lock a folder, after those who locked one above it because this one was not there yet."""
+    for above in reversed(place.parents):
+        if above not in _held:
+            _unlock(_opened(above, fcntl.LOCK_SH))
+    return _opened(place, fcntl.LOCK_EX)
+
+
+def _opened(place: Path, how: int) -> int | None:
+    """Return a handle that locks a folder, `None` if it cannot be opened."""
+    try:
+        handle = os.open(place, os.O_RDONLY)
+    except OSError:
+        return None
+    with contextlib.suppress(OSError):
+        fcntl.flock(handle, how)
+    return handle
+
+
+def _unlock(handle: int | None) -> None:
+    if handle is not None:
+        os.close(handle)
+
+
+def _is(handle: int | None, place: Path) -> bool:
+    """Whether a handle is still that of the folder of this name, or there is none."""
+    try:
+        return handle is None or os.path.samestat(os.fstat(handle), place.stat())
+    except OSError:
+        return False
 
 
 @contextlib.contextmanager

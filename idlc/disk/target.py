@@ -28,9 +28,9 @@ class Target:
         self.report = report
         self._force = force
 
-    def alone(self) -> AbstractContextManager[None]:
-        """Keep other runs of idlc from writing here meanwhile."""
-        return alone(self._path)
+    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
+        return alone(self._path.parent if beside else self._path)
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""

@@ -62,7 +62,7 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     target = Target(options.out, given.package, report, force=options.force)
     if not target.usable():
         return ()
-    with target.alone():
+    with target.alone(beside=options.vendor_deps):
         return _made(target, given, options, report)
 
 
