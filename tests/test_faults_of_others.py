@@ -254,8 +254,9 @@ def test_two_runs_at_once(scene):
     ]
     for run in runs:
         said, _ = run.communicate()
-        changed = "was changed while idlc was running" in said
-        assert run.returncode == scene.status or (run.returncode == 2 and changed), said
+        # what a user edits is read before idlc knows where it will write, so it may have changed
+        edited = scene.command.words[0] != "docs" and "was changed while idlc was running" in said
+        assert run.returncode == scene.status or (run.returncode == 2 and edited), said
     assert scene.now == scene.new
     left = [path for path in scene.work.rglob(".*") if path.name.startswith((".idlc", ".A", ".B"))]
     assert left == []

@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
+from idlc.disk.alone import alone
 from idlc.disk.lock import digest
 from idlc.disk.plan import Change, Plan
 from idlc.disk.read import absolute
@@ -21,6 +22,11 @@ LISTING = "idlc-docs.json"
 def write(out: str, files: Mapping[str, str], report: Report) -> bool:
     """Write files below `out`; report IDL612 to IDL614 and return `False` if that must not be."""
     folder = absolute(out)
+    with alone(folder):
+        return _write(folder, out, files, report)
+
+
+def _write(folder: Path, out: str, files: Mapping[str, str], report: Report) -> bool:
     tree = Tree(folder)
     mine = _listed(folder, tree)
     pages = {path: text.encode("utf-8") for path, text in files.items()}

@@ -87,12 +87,12 @@ def _carry_out(
     out: Path, changes: tuple[Change, ...], journal: bytes, name: str, report: Report
 ) -> bool:
     """Make all changes or none; report IDL612 and return `False` on a failure."""
-    try:
-        transaction = _Transaction(out)
-    except OSError as error:
-        report.add(_failure(name, error))
-        return False
     with alone(out):
+        try:
+            transaction = _Transaction(out)
+        except OSError as error:
+            report.add(_failure(name, error))
+            return False
         left, changed = _left(out, changes)
         if changed is not None:
             transaction.undo()
