@@ -34,8 +34,8 @@ def each(function, count: int = COUNT) -> Candidate:
     return lambda: whole() / count
 
 
-def one_by_one(function) -> Candidate:
-    return each(lambda: [function() for _ in range(COUNT)])
+def one_by_one(functions) -> Candidate:
+    return each(lambda: [function() for function in functions])
 
 
 def writing(work: Work, name: str):
@@ -44,7 +44,8 @@ def writing(work: Work, name: str):
     found = {IDLC: each(lambda: kind.serialize_many(messages))}
     for who, implementation in work.implementations.items():
         message = work.message(who, name)
-        found[label(who, "serialize")] = one_by_one(implementation.encoder(name, message))
+        encoders = [implementation.encoder(name, message)] * COUNT
+        found[label(who, "serialize")] = one_by_one(encoders)
     return found
 
 
@@ -52,7 +53,7 @@ def reading(work: Work, name: str):
     kind = work.implementations[IDLC].class_of(*MESSAGES[name].parts)
     buffers = copies(work, name)
     assert kind.deserialize_many(buffers) == [work.message(IDLC, name)] * COUNT
-    return {IDLC: each(lambda: kind.deserialize_many(buffers))} | decoders(work, name)
+    return {IDLC: each(lambda: kind.deserialize_many(buffers))} | decoders(work, name, buffers)
 
 
 def columns(work: Work, name: str):
@@ -60,7 +61,8 @@ def columns(work: Work, name: str):
     count = COUNT if work.quick else ROWS
     buffers = copies(work, name, count)
     assert len(kind.to_columns(buffers)) == count
-    found = {IDLC: each(lambda: kind.to_columns(buffers), count)} | decoders(work, name)
+    found = {IDLC: each(lambda: kind.to_columns(buffers), count)}
+    found |= decoders(work, name, buffers[:COUNT])
     return found | {"join of the buffers": each(lambda: bytearray().join(buffers), count)}
 
 
@@ -81,9 +83,9 @@ def copies(work: Work, name: str, count: int = COUNT) -> list[bytes]:
     return [bytes(bytearray(work.raw(name))) for _ in range(count)]
 
 
-def decoders(work: Work, name: str) -> dict[str, Candidate]:
+def decoders(work: Work, name: str, buffers: list[bytes]) -> dict[str, Candidate]:
     return {
-        label(who, "deserialize"): one_by_one(implementation.decoder(name, work.raw(name)))
+        label(who, "deserialize"): one_by_one([implementation.decoder(name, b) for b in buffers])
         for who, implementation in work.implementations.items()
     }
 

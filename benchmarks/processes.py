@@ -12,11 +12,12 @@ ROOT = Path(__file__).resolve().parents[1]
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 
 
-def run(words: Sequence[object], folder: Path) -> str:
-    """Run a program and return what it prints."""
+def run(words: Sequence[object], folder: Path, **variables: str) -> str:
+    """Run a program, with more environment variables, and return what it prints."""
     command = list(map(str, words))
+    environment = ENVIRONMENT | variables
     done = subprocess.run(
-        command, cwd=folder, capture_output=True, text=True, check=False, env=ENVIRONMENT
+        command, cwd=folder, capture_output=True, text=True, check=False, env=environment
     )
     assert done.returncode == 0, (command, done.stdout[-1000:], done.stderr[-3000:])
     return done.stdout

@@ -31,6 +31,7 @@ FILES = {
     "msg/Any.msg": "Point point\n",
     "msg/Text.msg": "Any any\nMessage[] messages\n",
     "msg/Message.msg": "float64[2] numbers\nstring text\n",
+    "msg/Many.msg": "float64[100] numbers\nbool[100] flags\n",
     "srv/Go.srv": "int32 a\n---\nPoint b\n",
     "action/Walk.action": "int32 steps\n---\nint32 done\n---\nPoint now\n",
 }
@@ -157,12 +158,28 @@ def test_equality_looks_at_every_element():
     assert robot(pose=[1, 2, 3]) == robot(pose=[1, 2, 3])
     assert robot(pose=[1, 2, 3]) != robot(pose=[1, 2, 4])
     assert robot(ids=[1, 2]) != robot(ids=[1, 3])
+    assert robot(ids=[1]) != robot(ids=[1, 0])
+    assert robot(image=b"ab") == robot(image=b"ab")
+    assert robot(flags=[True, False]) != robot(flags=[True, True])
     assert robot() != get("msg/Point")()
     assert robot() != 3
     assert robot(speed=math.nan) != robot(speed=math.nan)
     assert robot(goal=get("msg/Point")(3.0)) != robot()
     with pytest.raises(TypeError, match="unhashable"):
         hash(robot())
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "size"), [("Robot", "pose", 3), ("Many", "numbers", 100)]
+)
+def test_equality_of_floats_in_arrays_is_that_of_floats(kind, field, size):
+    kind = get(f"msg/{kind}")
+    zeros = [0.0] * size
+    assert kind(**{field: zeros}) == kind(**{field: [-0.0, *zeros[1:]]})
+    assert kind(**{field: zeros}) != kind(**{field: [*zeros[1:], 1e-300]})
+    assert kind(**{field: [*zeros[1:], math.nan]}) != kind(**{field: [*zeros[1:], math.nan]})
+    every_second = np.zeros(2 * size)[::2]
+    assert kind(**{field: every_second}) == kind(**{field: zeros})
 
 
 def test_copies_and_pickles_are_equal():
@@ -363,7 +380,7 @@ def test_packages_import_lazily_and_list_what_they_have():
     with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
         robot_msgs.msg.Nothing  # noqa: B018
     assert set(robot_msgs.msg.__all__) == {
-        "Any", "Empty", "Message", "Odd", "Point", "Robot", "Text",
+        "Any", "Empty", "Many", "Message", "Odd", "Point", "Robot", "Text",
     }  # fmt: skip
 
 

@@ -11,14 +11,18 @@ if TYPE_CHECKING:
 
 #: Values that a copy may share.
 ATOMIC = frozenset({bool, bytes, float, int, str})
+#: Elements up to which Python compares two arrays of numbers before numpy has begun.
+SMALL = 64
 
 
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     if type(mine) is array and type(other) is array:
         if mine.typecode == other.typecode and mine.typecode not in "fd":
-            return mine.tobytes() == other.tobytes()
+            return bytearray(mine) == memoryview(other)
     elif type(mine).__module__ == "numpy" or type(other).__module__ == "numpy":
+        if type(mine) is type(other) and len(mine) <= SMALL:
+            return memoryview(mine) == memoryview(other)
         import numpy as np
 
         return np.array_equal(mine, other)

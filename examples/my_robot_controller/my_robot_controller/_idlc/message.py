@@ -12,6 +12,7 @@ from array import array
 from . import codec
 from .generics import Generic, TypeVar
 from .names import public_name, slot_name
+from .objects import copied, deeply_copied
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -249,17 +250,8 @@ class Message(metaclass=MessageMeta):
 
             return replace(self, **changes)
 
-    def __copy__(self) -> typing_extensions.Self:
-        from .objects import copied
-
-        copy: typing_extensions.Self = copied(self)
-        return copy
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> typing_extensions.Self:
-        from .objects import deeply_copied
-
-        copy: typing_extensions.Self = deeply_copied(self, memo)
-        return copy
+    __copy__ = copied
+    __deepcopy__ = deeply_copied
 
     def __repr__(self) -> str:
         kind = type(self)
