@@ -18,16 +18,18 @@ TAG := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 KIND := $(TAG)$(if $(filter yes,$(LOCKED)),-locked)
 TEST_ENV := .venv/test-$(KIND)$(if $(filter no,$(ROS)),-without-ros)
 KILTED_ENV := .venv/kilted-$(KIND)
+LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 DEMO_ENV := .venv/demo-$(TAG)
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
-SELECTION := $(if $(filter no,$(ROS)),--ignore=tests/ros)
+WITHOUT_ROS := --ignore=tests/ros -m 'not ros'
+SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS))
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
-LOCKS := build test-ros test-kilted
+LOCKS := build test-ros test-kilted test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
 # Nothing that we run leaves this machine.
@@ -59,12 +61,9 @@ test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels o
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/every_python.sh $(INTERPRETERS)
 
-test-lowest: ## run the tests that need no ROS with the lowest versions that idlc allows
-	@rm -rf .venv/lowest-$(TAG)
-	@$(PYTHON) -m venv .venv/lowest-$(TAG)
-	@$(PYTHON) tests/lowest.py test > .venv/lowest-$(TAG)/versions.txt
-	@.venv/lowest-$(TAG)/bin/python $(PIP_INSTALL) --editable '.[test]' --constraint .venv/lowest-$(TAG)/versions.txt
-	.venv/lowest-$(TAG)/bin/python -m pytest -n 2 --dist worksteal --ignore=tests/ros $(ARGS)
+test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
+	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
+	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
@@ -90,11 +89,13 @@ example: $(TEST_ENV)/installed ## compile the committed example again
 bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says what else it can do
 	@$(BENCH_ENV)/bin/python -m benchmarks --json build/benchmarks.json $(ARGS)
 
-lock: ## choose the newest versions for CI again, and write down their hashes
+lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
 	$(UV_COMPILE) pyproject.toml --extra test-ros --output-file requirements/test-ros.txt
 	$(UV_COMPILE) pyproject.toml --extra test-kilted --output-file requirements/test-kilted.txt
+	$(UV_COMPILE) pyproject.toml --extra test --resolution lowest-direct \
+	    --output-file requirements/test-lowest.txt
 	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints requirements/test-ros.txt \
 	    --output-file requirements/build.txt
 

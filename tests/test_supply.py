@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+from packaging.version import Version
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -15,7 +16,8 @@ else:
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
-LOCKED = ("test-ros", "test-kilted")
+#: Lock files, and the extra that each is for.
+LOCKED = {"test-ros": "test-ros", "test-kilted": "test-kilted", "test-lowest": "test"}
 #: Where CI runs, on each interpreter.
 MACHINES = [
     {
@@ -54,6 +56,15 @@ def locked(name: str) -> list[tuple[Requirement, str]]:
     return [(Requirement(words[0]), words[1] if words[1:] else "") for words in parts]
 
 
+def entries_for(name: str, machine: dict[str, str]) -> dict[str, str]:
+    """Return the version of each package that a lock file installs on a machine."""
+    return {
+        normal(requirement.name): next(iter(requirement.specifier)).version
+        for requirement, _ in locked(name)
+        if applies(requirement, machine)
+    }
+
+
 def applies(requirement: Requirement, machine: dict[str, str]) -> bool:
     return requirement.marker is None or requirement.marker.evaluate(machine)
 
@@ -73,14 +84,22 @@ def test_each_entry_is_one_version_with_hashes_from_anywhere(name):
 
 
 @pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: machine["python_version"])
-@pytest.mark.parametrize("extra", LOCKED)
-def test_the_lock_is_within_the_bounds(extra, machine):
-    entries = {normal(r.name): r for r, _ in locked(extra) if applies(r, machine)}
-    for requirement in wanted([*PROJECT["project"]["dependencies"], *EXTRAS[extra]]):
+@pytest.mark.parametrize("name", LOCKED)
+def test_the_lock_is_within_the_bounds(name, machine):
+    entries = entries_for(name, machine)
+    for requirement in wanted([*PROJECT["project"]["dependencies"], *EXTRAS[LOCKED[name]]]):
         if applies(requirement, machine):
-            entry = entries[normal(requirement.name)]
-            (specifier,) = entry.specifier
-            assert requirement.specifier.contains(specifier.version), (requirement, entry)
+            version = entries[normal(requirement.name)]
+            assert requirement.specifier.contains(version), (requirement, version)
+
+
+@pytest.mark.parametrize("machine", MACHINES, ids=lambda machine: machine["python_version"])
+def test_the_lowest_versions_that_are_tested_are_the_lowest_that_are_allowed(machine):
+    entries = entries_for("test-lowest", machine)
+    for requirement in wanted(PROJECT["project"]["dependencies"]):
+        if applies(requirement, machine):
+            (lowest,) = (one.version for one in requirement.specifier if one.operator == ">=")
+            assert Version(entries[normal(requirement.name)]) == Version(lowest), requirement
 
 
 def test_packages_are_built_with_what_pyproject_asks_for():
