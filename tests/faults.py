@@ -106,7 +106,8 @@ def main():
     for found in pkgutil.walk_packages(idlc.__path__, "idlc."):
         if not found.name.startswith(("idlc.runtime.", "idlc.__main__", "idlc.cli.pytest_plugin")):
             importlib.import_module(found.name)
-    for name in ("difflib", "encodings.idna", "fcntl", "html", "tempfile", "xml.parsers.expat"):
+    names = ("difflib", "encodings.idna", "encodings.unicode_escape", "fcntl", "html", "tempfile")
+    for name in (*names, "xml.parsers.expat"):
         importlib.import_module(name)
     idlc.emit.render.environment()
     for line in sys.stdin:

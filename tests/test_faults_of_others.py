@@ -27,12 +27,16 @@ PACKAGE = {
 
 
 class Command(NamedTuple):
-    """Words for idlc, the files that they work on, and whether it is all of them or none."""
+    """Words for idlc, the files that they work on, and whether it is all of them or none.
+
+    `after` are words that make `work` first.
+    """
 
     words: tuple[str, ...]
     at_once: bool
     cwd: str = ""
     files: dict[str, str] = PACKAGE
+    after: tuple[str, ...] = ()
 
 
 COMMANDS = {
@@ -48,8 +52,16 @@ COMMANDS = {
         cwd="work",
     ),
     "scaffold package": Command(("scaffold", "package", "work"), at_once=True, files={}),
+    "scaffold node": Command(
+        ("scaffold", "node", "talker", "--publisher", "geometry_msgs/Point:at"),
+        at_once=True,
+        cwd="work",
+        after=("scaffold", "package", "work"),
+    ),
     "docs": Command(("docs", "pages", "-o", "work"), at_once=True, files={}),
-    "docs again": Command(("docs", "pages", "-o", "work"), at_once=True),
+    "docs again": Command(
+        ("docs", "pages", "-o", "work"), at_once=True, after=("docs", "pages", "-o", "work")
+    ),
 }
 PAGES = {"pages/msg/A.msg": "int8 a\n", "pages/msg/C.msg": "A a\n"}
 EARLIER = {"pages/msg/A.msg": "int16 a  # x\n", "pages/msg/B.msg": "A a\n"}
@@ -70,10 +82,10 @@ class Scene:
         self.start = machine.folder / "start"
         shutil.rmtree(self.start, ignore_errors=True)
         self.start.mkdir()
-        if name == "docs again":
+        if self.command.after:
             self.pages(EARLIER)
             shutil.rmtree(self.work, ignore_errors=True)
-            assert self.run()["status"] == 0
+            assert self.machine.run(self.command.after)["status"] == 0
             shutil.copytree(self.work, self.start, dirs_exist_ok=True)
         else:
             lay(self.start, self.command.files)

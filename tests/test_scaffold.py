@@ -7,10 +7,8 @@ match, and fails, so that the changes are looked at.
 import os
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -194,35 +192,6 @@ def test_outside_of_a_package(tmp_path, monkeypatch, capsys):
     (tmp_path / ".git").mkdir()
     assert main(NODE) == 2
     assert "idlc scaffold package NAME" in capsys.readouterr().err
-
-
-def test_killed_at_any_moment_every_file_is_old_or_new(package):
-    """The moments are spread over the run; the package is put back after each."""
-    spare = package.parent / "spare"
-    shutil.copytree(package, spare)
-    old = tree(package)
-    command = [sys.executable, "-m", "idlc", *NODE]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "AMENT_PREFIX_PATH": ""}
-    started = time.monotonic()
-    subprocess.run(command, env=environment, check=True, capture_output=True)
-    length = time.monotonic() - started
-    new = tree(package)
-    for part in range(12):
-        shutil.rmtree(package)
-        shutil.copytree(spare, package)
-        process = subprocess.Popen(
-            command,
-            env=environment,
-            cwd=package,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        time.sleep(length * (0.6 + 0.4 * part / 11))
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        for path, text in tree(package).items():
-            if not path.startswith(".idlc-stage-"):
-                assert text in (old.get(path), new.get(path)), path
 
 
 def test_the_wizard_asks_for_the_same(package, monkeypatch):
