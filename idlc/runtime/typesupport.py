@@ -15,7 +15,7 @@ from typing import Any
 from . import typesupport_c as c
 from . import typesupport_services as services
 from .typesupport_descriptions import load
-from .typesupport_extension import extension
+from .typesupport_extension import OF_RCL, extension
 
 #: Middlewares that take encoded messages through Fast DDS's type support.
 _OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
@@ -79,7 +79,13 @@ def _give(cls: Any, capsules: dict[str, object]) -> None:
 
 @cache
 def _message(cls: Any) -> c.MessageSupport:
-    return _road().message(cls, _name(cls))  # type: ignore[no-any-return]
+    name = _name(cls)
+    if name.partition("/")[0] in OF_RCL:
+        raise ImportError(
+            f"ROS reads the memory of {name} itself, and what it was built with is not "
+            "here: install that package with your ROS 2, in the version that idlc compiled"
+        )
+    return _road().message(cls, name)  # type: ignore[no-any-return]
 
 
 @cache
@@ -103,32 +109,33 @@ def import_message(cls: Any) -> None:
 
 
 def import_service(cls: Any) -> None:
-    """Give `type(cls)` the capsule that rclpy reads from a service class."""
+    """Give `type(cls)`, and those of its messages, the capsules that rclpy reads."""
+    request, response, happened = map(_handle, (cls.Request, cls.Response, cls.Event))
     built = extension(cls, _name(cls))
     if built:
         _give(cls, {_SUPPORT: built.service()})
         return
-    event = services.event(cls.Event, _handle(cls.Event), _message(cls.Event).memory)
-    support = services.service(
-        _name(cls), _handle(cls.Request), _handle(cls.Response), event, _road()
-    )
+    event = services.event(cls.Event, happened, _message(cls.Event).memory)
+    support = services.service(_name(cls), request, response, event, _road())
     _give(cls, {_SUPPORT: c.capsule(support)})
 
 
 def import_action(cls: Any) -> None:
-    """Give `type(cls)` the capsule that rclpy reads from an action class."""
+    """Give `type(cls)`, and those of what it consists of, the capsules that rclpy reads.
+
+    Goals are told by GoalInfo, which rclpy converts without asking for its type support.
+    """
+    parts = cls.Impl
+    _handle(import_module("action_msgs.msg").GoalInfo)
+    its_services = (
+        _handle(parts.SendGoalService),
+        _handle(parts.GetResultService),
+        _handle(parts.CancelGoalService),
+    )
+    messages = (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage))
     built = extension(cls, _name(cls))
     if built:
         _give(cls, {_SUPPORT: built.action()})
         return
-    parts = cls.Impl
-    support = services.action(
-        _name(cls),
-        (
-            _handle(parts.SendGoalService),
-            _handle(parts.GetResultService),
-            _handle(parts.CancelGoalService),
-        ),
-        (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage)),
-    )
+    support = services.action(_name(cls), its_services, messages)
     _give(cls, {_SUPPORT: c.capsule(support)})

@@ -387,6 +387,64 @@ def says_what_to_do(case):
     print(raises(ImportError, serialize_message, String("text")))
 
 
+def acts_without_a_class_of_rosidls():
+    """Act, describe a type and change a managed node's state, all packages being idlc's."""
+    action_msgs, lifecycle_msgs = map(importlib.import_module, ("action_msgs", "lifecycle_msgs"))
+    from rclpy.action import ActionClient, ActionServer, CancelResponse
+    from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+    from trip.action import Go
+
+    assert all(hasattr(package, "_idlc") for package in (action_msgs, lifecycle_msgs))
+
+    def execute(goal):
+        goal.publish_feedback(Go.Feedback(at=7))
+        end = time.monotonic() + PATIENCE
+        while goal.request.far and not goal.is_cancel_requested and time.monotonic() < end:
+            time.sleep(0.01)
+        (goal.canceled if goal.is_cancel_requested else goal.succeed)()
+        return Go.Result(done=not goal.request.far)
+
+    rclpy.init()
+    node = rclpy.create_node("traveller")
+    seen = []
+    server = ActionServer(node, Go, "go", execute, cancel_callback=lambda _: CancelResponse.ACCEPT)
+    client = ActionClient(node, Go, "go")
+    managed = LifecycleNode("managed")
+    managed.on_configure = lambda _: TransitionCallbackReturn.SUCCESS
+    executor = MultiThreadedExecutor(4)
+    for one in (node, managed):
+        executor.add_node(one)
+
+    def result(future):
+        executor.spin_until_future_complete(future, PATIENCE)
+        return future.result()
+
+    assert client.wait_for_server(PATIENCE)
+    for far in (False, True):
+        goal = result(client.send_goal_async(Go.Goal(far=far), lambda m: seen.append(m.feedback)))
+        assert goal.accepted
+        if far:
+            assert len(result(goal.cancel_goal_async()).goals_canceling) == 1
+        answer = result(goal.get_result_async())
+        assert (answer.result, answer.status) == (Go.Result(done=not far), 5 if far else 4)
+    assert seen == [Go.Feedback(at=7)] * 2
+    change = node.create_client(lifecycle_msgs.srv.ChangeState, "managed/change_state")
+    events = []
+    node.create_subscription(
+        lifecycle_msgs.msg.TransitionEvent, "managed/transition_event", events.append, 5
+    )
+    assert change.wait_for_service(PATIENCE)
+    request = change.srv_type.Request()
+    request.transition.id = lifecycle_msgs.msg.Transition.TRANSITION_CONFIGURE
+    assert result(change.call_async(request)).success
+    wait = time.monotonic() + PATIENCE
+    while not events and time.monotonic() < wait:
+        executor.spin_once(0.1)
+    assert events[-1].goal_state.label
+    executor.shutdown()
+    server.destroy()
+
+
 def uses_the_extension():
     """Print whether the package's own extension module converts."""
     package = importlib.import_module("std_msgs.std_msgs_s__rosidl_typesupport_c")

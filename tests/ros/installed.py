@@ -49,9 +49,9 @@ def names_in(packages: Iterable[str], found: Interfaces) -> list[str]:
     ]
 
 
-def generate(files: Path, out: Path) -> None:
+def generate(files: Path, out: Path, *options: str) -> None:
     """Let idlc compile a folder of interface files."""
-    command = [sys.executable, "-m", "idlc", "gen", files, "-o", out]
+    command = [sys.executable, "-m", "idlc", "gen", files, "-o", out, *options]
     done = subprocess.run(
         [str(word) for word in command], capture_output=True, text=True, check=False
     )
