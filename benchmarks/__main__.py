@@ -77,7 +77,7 @@ def main(words: Sequence[str] | None = None) -> None:
         results.save(run, given.json)
     if given.keep:
         results.save(run, results.KEPT)
-        report.write_documents(run)
+        report.write_documents(results.load())  # rounded as the file is
 
 
 if __name__ == "__main__":
