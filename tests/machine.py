@@ -1,11 +1,13 @@
 """A folder with a package in it, and a process that runs idlc there and commits faults."""
 
+import contextlib
 import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 HERE = Path(__file__).parent
 GEN = ["gen", "pkg", "-o", "out/demo"]
@@ -45,6 +47,19 @@ class Machine:
     @property
     def tree(self):
         return tree(self.folder / "out")
+
+
+@contextlib.contextmanager
+def running():
+    """Start a machine in a folder of its own, and end it."""
+    with TemporaryDirectory() as name:  # pytest's own folders are closed to other users
+        folder = Path(name).resolve()
+        (folder / ".git").mkdir()
+        folder.chmod(0o755)
+        found = Machine(folder)
+        yield found
+        found.process.stdin.close()
+        found.process.wait()
 
 
 def tree(out):

@@ -12,11 +12,9 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
-from machine import GEN, Machine, tree
+from machine import GEN, running, tree
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n", "msg/B.msg": "int8 b\n"}
 NEW = {"msg/A.msg": "int16 a\n", "action/Come.action": "---\n---\n", "msg/B.msg": "int8 b\n"}
@@ -24,14 +22,8 @@ NEW = {"msg/A.msg": "int16 a\n", "action/Come.action": "---\n---\n", "msg/B.msg"
 
 @pytest.fixture(scope="module")
 def machine():
-    with TemporaryDirectory() as name:  # pytest's own folders are closed to other users
-        folder = Path(name).resolve()
-        (folder / ".git").mkdir()
-        folder.chmod(0o755)
-        found = Machine(folder)
+    with running() as found:
         yield found
-        found.process.stdin.close()
-        found.process.wait()
 
 
 @pytest.fixture(scope="module")

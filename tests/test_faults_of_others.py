@@ -11,12 +11,10 @@ import shutil
 import signal
 import subprocess
 import sys
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import pytest
-from machine import Machine, tree
+from machine import running, tree
 
 PACKAGE = {
     "package.xml": "<?xml version='1.0'?>\n<package format='3'>\n  <name>pkg</name>\n</package>\n",
@@ -128,14 +126,8 @@ def whole(folder):
 
 @pytest.fixture(scope="module")
 def machine():
-    with TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        (folder / ".git").mkdir()
-        folder.chmod(0o755)
-        found = Machine(folder)
+    with running() as found:
         yield found
-        found.process.stdin.close()
-        found.process.wait()
 
 
 @pytest.fixture(params=COMMANDS)

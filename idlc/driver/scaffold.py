@@ -83,9 +83,9 @@ def interface(
         return None
     needed = set(derive.IMPLICIT_PACKAGES[kind]) | {one.package for one in model.interfaces}
     depends = sorted(needed - {own} - _reached_only(model))
-    added = {path: text, **_test_of_interfaces(project, own)}
-    tests = ["python3-pytest"] if len(added) > 1 else []
-    edits = manifest_edit(project, depends, tests, group=True)
+    tests = _test_of_interfaces(project, own)
+    runner = ["python3-pytest"] if tests else []
+    edits = manifest_edit(project, depends, runner, group=True)
     lists = project.text("CMakeLists.txt")
     if lists is not None:
         edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
@@ -95,7 +95,7 @@ def interface(
     if lists is None:
         keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
         edited |= dict([interface_text.index(own, keys | {path})])
-    return write(project, added, edited, settings, report)
+    return write(project, {path: text, **tests}, edited, settings, report)
 
 
 def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:

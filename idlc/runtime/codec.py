@@ -115,7 +115,8 @@ def install(kind: type[Message]) -> None:
     """Replace `serialize` and `deserialize` of the class that owns the codec by direct ones."""
     owner: Any = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
     codecs = owner._codec_
-    encode, decode = codecs("<").encode, codecs("<").decode
+    little = codecs("<")
+    encode, decode = little.encode, little.decode
     join = b"".join
 
     def serialize(self: Any, byteorder: str = "little") -> bytes:

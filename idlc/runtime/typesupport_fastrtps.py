@@ -66,7 +66,8 @@ _memory.__len__ = _memory.length
 
 def _memory_type(name: str, cls: Any) -> type[Memory]:
     """Return the memory of a message class, which works with the class's codec."""
-    encode, bulk = cls._codec_(NATIVE).encode, cls._codec_(NATIVE).bulk
+    codec = cls._codec_(NATIVE)
+    encode, bulk = codec.encode, codec.bulk
     true = c.TRUE
     large = False
 

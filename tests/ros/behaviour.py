@@ -398,9 +398,8 @@ def acts_without_a_class_of_rosidls():
 
     def execute(goal):
         goal.publish_feedback(Go.Feedback(at=7))
-        end = time.monotonic() + PATIENCE
-        while goal.request.far and not goal.is_cancel_requested and time.monotonic() < end:
-            time.sleep(0.01)
+        if goal.request.far:
+            eventually(lambda: goal.is_cancel_requested)
         (goal.canceled if goal.is_cancel_requested else goal.succeed)()
         return Go.Result(done=not goal.request.far)
 
@@ -437,9 +436,7 @@ def acts_without_a_class_of_rosidls():
     request = change.srv_type.Request()
     request.transition.id = lifecycle_msgs.msg.Transition.TRANSITION_CONFIGURE
     assert result(change.call_async(request)).success
-    wait = time.monotonic() + PATIENCE
-    while not events and time.monotonic() < wait:
-        executor.spin_once(0.1)
+    eventually(lambda: executor.spin_once(0.1) or events)
     assert events[-1].goal_state.label
     executor.shutdown()
     server.destroy()
