@@ -317,12 +317,12 @@ def test_a_signal_during_the_moves_waits_until_they_are_made(number, tmp_path):
     (tmp_path / "pkg/msg").mkdir(parents=True)
     (tmp_path / "pkg/msg/A.msg").write_text("int8 a\n", encoding="utf-8")
     code = (
-        "import os, sys\nfrom pathlib import Path\nfrom idlc.cli.main import main\n"
-        "real = Path.replace\n"
+        "import os, sys\nfrom idlc.cli.main import main\n"
+        "real = os.replace\n"
         "def replace(path, target):\n"
         f"    os.kill(os.getpid(), {int(number)})\n"
         "    return real(path, target)\n"
-        "Path.replace = replace\n"
+        "os.replace = replace\n"
         "sys.exit(main(['gen', 'pkg', '-o', 'out/demo']))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=False)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable, Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.disk.package import manifest
-from idlc.disk.read import absolute, kind_of, unreadable
+from idlc.disk.read import kind_of, unreadable
 from idlc.text import codes
 from idlc.text.suggest import closest
 
@@ -58,14 +59,15 @@ def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
     A folder means every interface file below it. Reports IDL601, IDL602, IDL605 and IDL606.
     """
     manifest.cache_clear()
-    found: dict[Path, InterfaceFile] = {}
+    found: dict[str, InterfaceFile] = {}
     for given in paths:
         empty = True
         for path in _under(given, report):
             empty = False
             if path is not None:
-                whole = absolute(path)
-                found.setdefault(whole, _interface(path, whole, given))
+                whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
+                if whole not in found:
+                    found[whole] = _interface(path, whole, given)
         if empty:
             report.add(
                 codes.NO_INTERFACES.of(
@@ -100,10 +102,17 @@ def _under(given: str, report: Report) -> Iterator[Path | None]:
         yield path
 
 
-def _interface(path: Path, whole: Path, given: str) -> InterfaceFile:
-    folder = whole.parent
-    root = folder.parent if folder.name in KIND_FOLDERS else folder
-    return InterfaceFile(path, path.as_posix(), KINDS[path.suffix], path.stem, given, root)
+def _interface(path: Path, whole: str, given: str) -> InterfaceFile:
+    kind = KINDS[path.suffix]
+    root = _root(os.path.dirname(whole))  # noqa: PTH120 - a Path for each file takes as long again
+    return InterfaceFile(path, path.as_posix(), kind, path.stem, given, root)
+
+
+@lru_cache(maxsize=1024)
+def _root(folder: str) -> Path:
+    """Return the folder above `folder` if that is for one kind of interface, or itself."""
+    here = Path(folder)
+    return here.parent if here.name in KIND_FOLDERS else here
 
 
 def _similar(path: Path) -> str | None:
@@ -141,8 +150,12 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
             if _is_folder(entry):
                 if not entry.name.startswith(".") and entry.name not in SKIPPED:
                     waiting.append(here / entry.name)
-            elif not entry.name.startswith(".") and Path(entry.name).suffix in KINDS:
+            elif not entry.name.startswith(".") and _suffix(entry.name) in KINDS:
                 yield here / entry.name
+
+
+def _suffix(name: str) -> str:
+    return os.path.splitext(name)[1]  # noqa: PTH122 - for every file of a source tree
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:

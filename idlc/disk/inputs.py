@@ -53,16 +53,12 @@ class Inputs(msgspec.Struct, frozen=True):
         return {self.package: self.folders}
 
 
-def _home(file: InterfaceFile) -> Path:
-    """Return the folder that stands for a file's package."""
-    declared = manifest(file.root)
-    return declared.parent if declared else file.root
-
-
 def _by_home(files: Iterable[InterfaceFile]) -> dict[Path, list[InterfaceFile]]:
+    """Return files by the folder that stands for their package."""
     found: dict[Path, list[InterfaceFile]] = {}
     for file in files:
-        found.setdefault(_home(file), []).append(file)
+        declared = manifest(file.root)
+        found.setdefault(declared.parent if declared else file.root, []).append(file)
     return found
 
 

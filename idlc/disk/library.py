@@ -106,6 +106,7 @@ class Library:
         self._own = own or {}
         self._report = report
         self._known: dict[str, list[Path]] = {}
+        self._sources: dict[ir.TypeName, Source | None] = {}
         self._packages: list[str] | None = None
         self._listed: dict[str, list[tuple[ir.Kind, str]]] = {}
 
@@ -123,18 +124,18 @@ class Library:
         if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
             return None
         file = f"{name.name}.{name.kind}"
-        for root in self._roots(name.package):
-            for path in (root / name.kind / file, root / file):
-                if is_file(path):
-                    return path
-        return None
+        places = self._roots(name.package)
+        paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
+        return next((Path(path) for path in paths if is_file(path)), None)
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if there is none of that name."""
-        path = self.path(name)
-        if path is not None:
-            return read_source(path, shown(path), self._report)
-        return catalog.source(name)
+        if name not in self._sources:
+            path = self.path(name)
+            self._sources[name] = (
+                read_source(path, shown(path), self._report) if path else catalog.source(name)
+            )
+        return self._sources[name]
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""

@@ -6,7 +6,7 @@ The file is JSON, sorted and indented, and names nothing of the machine that it 
 from __future__ import annotations
 
 import contextlib
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import msgspec
 
@@ -20,6 +20,10 @@ from idlc.text.visible import one_line
 FILE = "idlc.lock"
 #: Raised when an older idlc could not read what a newer one writes.
 FORMAT = 1
+
+
+#: What no part of a path below a folder is.
+_OUTSIDE = frozenset(("", ".", ".."))
 
 
 class _Header(msgspec.Struct):
@@ -112,8 +116,7 @@ def decode(data: bytes) -> Lock:
         raise ValueError(f"it was written by idlc {header.idlc}, which is newer than this one")
     lock = msgspec.json.decode(data, type=Lock)
     for path in lock.outputs:
-        parts = PurePosixPath(path).parts
-        if not parts or path.startswith("/") or ".." in parts or "\\" in path or ":" in path:
+        if not _OUTSIDE.isdisjoint(path.split("/")) or "\\" in path or ":" in path:
             raise ValueError(f"it lists a file outside of its folder: {path}")
     names = [*lock.types, *(name.replace(".", "/") + "/X" for name in lock.imports)]
     names += [f"{package}/msg/X" for package in lock.vendored]

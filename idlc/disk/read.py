@@ -40,7 +40,7 @@ def absolute(path: str | Path) -> Path:
     return Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
 
 
-def is_file(path: Path) -> bool:
+def is_file(path: str | Path) -> bool:
     """Whether a path leads to a regular file; a path that cannot be looked at does not."""
     return os.path.isfile(path)  # noqa: PTH113 - Path.is_file() raises
 

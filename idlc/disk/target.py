@@ -71,8 +71,10 @@ class Target:
 
     def _finds(self, package: str, kind: str) -> bool:
         """Whether a package can be imported, found without importing, or lies next to this one."""
-        places = [*surroundings.python_folders(package), self._path.parent / package]
-        return any(is_file(place / kind / "__init__.py") for place in places)
+        inside = f"{kind}/__init__.py"
+        return is_file(self._path.parent / package / inside) or any(
+            is_file(place / inside) for place in surroundings.python_folders(package)
+        )
 
     def plan(self, files: Mapping[str, str], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.

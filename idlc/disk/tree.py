@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 from pathlib import Path
 from typing import NamedTuple
@@ -27,10 +28,12 @@ class Tree:
         folder = self._folder(path.rpartition("/")[0])
         if folder is not True:
             return folder or None
-        here = Path(f"{self._root}/{path}")
+        here = f"{self._root}/{path}"
         try:
-            mode = here.lstat().st_mode
-            return here.read_bytes() if stat.S_ISREG(mode) else Obstacle(_is(path, mode))
+            status = os.lstat(here)
+            if stat.S_ISREG(status.st_mode):
+                return _content(here, status.st_size)
+            return Obstacle(_is(path, status.st_mode))
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -53,6 +56,18 @@ class Tree:
         except OSError as error:
             return Obstacle(f"`{path}` cannot be read: {reason(error)}")
         return True if stat.S_ISDIR(mode) else Obstacle(_is(path, mode))
+
+
+def _content(path: str, size: int) -> bytes:
+    """Return a file's content; without the layers above the system, which take half of the time."""
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+    try:
+        data = os.read(handle, size + 1)
+        while len(data) != size and (more := os.read(handle, 1 << 20)):
+            data += more
+        return data
+    finally:
+        os.close(handle)
 
 
 def _is(path: str, mode: int) -> str:

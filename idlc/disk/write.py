@@ -25,6 +25,7 @@ from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 
 STAGE = ".idlc-stage-"
+_WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
 #: Seconds after which a staging folder counts as abandoned where processes cannot be asked.
 ABANDONED = 3600
 
@@ -48,7 +49,8 @@ def journals(out: Path) -> Iterator[bytes]:
 
 def _abandoned(out: Path) -> list[Path]:
     try:
-        return [path for path in sorted(out.glob(f"{STAGE}*")) if not _in_use(path)]
+        names = sorted(name for name in os.listdir(out) if name.startswith(STAGE))  # noqa: PTH208
+        return [out / name for name in names if not _in_use(out / name)]
     except OSError:
         return []
 
@@ -174,6 +176,7 @@ class _Transaction:
         self._stage = out / f"{STAGE}{os.getpid()}"
         self._made: list[Path] = []
         self._done: list[tuple[str, bytes | None]] = []
+        self._there: set[str] = set()
         self.current = ""
         self._make_folder(out)
 
@@ -189,11 +192,11 @@ class _Transaction:
     def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
         """Make all changes, in order; raises what stopped it."""
         self._make_folder(self._stage)
-        (self._stage / lock.FILE).write_bytes(journal)
+        _create(f"{self._stage}/{lock.FILE}", journal)
         for number, change in enumerate(changes):
             if change.new is not None:
                 self.current = change.path
-                (self._stage / str(number)).write_bytes(change.new)
+                _create(f"{self._stage}/{number}", change.new)
         with uninterrupted():
             self._move(changes)
         self.current = ""
@@ -203,25 +206,30 @@ class _Transaction:
     def _move(self, changes: tuple[Change, ...]) -> None:
         for number, change in enumerate(changes):
             self.current = change.path
-            target = self._out / change.path
+            target = f"{self._out}/{change.path}"
             if change.backup and change.old is not None:
                 self._keep(change.path, change.old)
             if change.new is None:
-                target.unlink()
+                Path(target).unlink()
             else:
+                staged = f"{self._stage}/{number}"
                 if change.old is not None:
-                    (self._stage / str(number)).chmod(target.stat().st_mode & 0o7777)
-                self._make_folder(target.parent)
-                (self._stage / str(number)).replace(target)
+                    Path(staged).chmod(Path(target).stat().st_mode & 0o7777)
+                self._make_parent(change.path)
+                os.replace(staged, target)  # noqa: PTH105 - a Path costs as much as moving
             self._done.append((change.path, change.old))
+
+    def _make_parent(self, path: str) -> None:
+        folder = path.rpartition("/")[0]
+        if folder not in self._there:
+            self._make_folder(self._out / folder)
+            self._there.add(folder)
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""
         for suffix in _suffixes():
-            copy = self._out / (path + suffix)
             with contextlib.suppress(FileExistsError):
-                with copy.open("xb") as file:
-                    file.write(content)
+                _create(f"{self._out}/{path}{suffix}", content, os.O_EXCL)
                 self._done.append((path + suffix, None))
                 return
 
@@ -247,7 +255,7 @@ class _Transaction:
                     target.unlink(missing_ok=True)
                 else:
                     spare = self._stage / "old"
-                    spare.write_bytes(old)
+                    _create(f"{spare}", old)
                     target.parent.mkdir(parents=True, exist_ok=True)
                     spare.replace(target)
             except OSError:
@@ -258,6 +266,20 @@ class _Transaction:
             with contextlib.suppress(OSError):
                 folder.rmdir()
         return torn
+
+
+def _create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
+    """Write a whole file or none; past `open`, which takes as long as the operating system."""
+    handle = os.open(path, _WRITING | how, 0o666)
+    try:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[os.write(handle, rest) :]
+    except BaseException:
+        Path(path).unlink()
+        raise
+    finally:
+        os.close(handle)
 
 
 def _suffixes() -> Iterator[str]:
