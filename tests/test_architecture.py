@@ -170,7 +170,7 @@ def template_sins(node: nodes.Node, within_if: bool = False) -> Iterator[str]:
     """Yield what a template does besides laying out: templates place finished strings."""
     match node:
         case nodes.Filter():
-            if node.name != "indent":
+            if node.name not in {"indent", "join"}:
                 yield f"line {node.lineno}: filter {node.name}"
         case nodes.Call():
             if not isinstance(node.node, (nodes.Name, nodes.Getattr)):

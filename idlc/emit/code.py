@@ -61,18 +61,15 @@ def _prune(
                     continue
                 live = live - {target} | reads
             case Put(_, reads):
-                live |= reads
+                live = live | reads if reads else live
             case Block(head, inner):
-                _, before = _prune(inner, live)
+                remaining, before = _prune(inner, live)
                 while not before <= live:
                     live |= before
-                    _, before = _prune(inner, live)
-                remaining = prune(inner, live)
+                    remaining, before = _prune(inner, live)
                 if not remaining:
                     continue
-                statement = Block(head, remaining)
-            case Line():
-                pass
+                statement = Block(head, tuple(reversed(remaining)))
         kept.append(statement)
     return kept, live
 

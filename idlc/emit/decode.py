@@ -26,22 +26,32 @@ TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 def is_bulk(steps: tuple[layout.Step, ...]) -> bool:
     """Whether a structure holds numeric buffers, which are read through a memoryview."""
-    return any(
-        isinstance(step, layout.Numbers)
-        or (isinstance(step, layout.Block) and step.is_large)
-        or (isinstance(step, layout.Items) and is_bulk(step.body))
-        for step in steps
-    )
+    for step in steps:
+        match step:
+            case layout.Numbers():
+                return True
+            case layout.Block() if step.is_large:
+                return True
+            case layout.Items() if is_bulk(step.body):
+                return True
+            case _:
+                pass
+    return False
 
 
 def decode(
-    steps: tuple[layout.Step, ...], tables: Tables, own: str, makers: dict[ir.TypeName, str]
+    steps: tuple[layout.Step, ...],
+    tables: Tables,
+    own: str,
+    makers: dict[ir.TypeName, str],
+    *,
+    bulk: bool,
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
-    `own` and `makers` name the functions that make empty objects.
+    `own` and `makers` name the functions that make empty objects; `bulk` is what `is_bulk` says.
     """
-    decoder = _Decoder(tables, makers, "view" if is_bulk(steps) else "data")
+    decoder = _Decoder(tables, makers, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
         decoder.step(step)

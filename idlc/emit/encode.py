@@ -9,6 +9,8 @@ remainder in `low`) only where somebody reads it.
 
 from __future__ import annotations
 
+import re
+
 from idlc.emit import code, layout
 from idlc.emit.position import Position, aligned_to_8
 from idlc.emit.pretty import Comprehension, Group, Node, call
@@ -16,6 +18,8 @@ from idlc.emit.tables import Tables
 from idlc.model import ir
 
 NONE: frozenset[str] = frozenset()
+#: The variables that hold positions, in an expression.
+POSITIONS = re.compile(r"\b(?:at|low)\b")
 
 
 class Frame:
@@ -88,8 +92,7 @@ class _Encoder:
 
     def put(self, part: Node, reads: str = "") -> None:
         """Emit a part of the message."""
-        names = frozenset(name for name in ("at", "low") if f"[{name} " in reads)
-        self.body.append(code.Put(part, names))
+        self.body.append(code.Put(part, frozenset(POSITIONS.findall(reads)) if reads else NONE))
 
     # Values of fixed size, and one text among them, gather in a frame.
 
@@ -161,8 +164,7 @@ class _Encoder:
         """Note a position; dropped later unless it is read."""
         value = without_parentheses(value)
         if target != value:
-            words = value.replace("(", " ").split()
-            self.body.append(code.Note(target, value, frozenset({"at", "low"} & set(words))))
+            self.body.append(code.Note(target, value, frozenset(POSITIONS.findall(value))))
 
     # Values of variable or large size are parts of their own.
 
@@ -351,10 +353,10 @@ def inlined(step: layout.Items) -> list[layout.Step]:
             case layout.Enter(place):
                 paths[place.local] = f"{paths[place.owner]}.{place.slot}"
             case layout.Number(place, letter, size):
-                moved = layout.Place(paths[place.owner], place.slot, place.local)
+                moved = layout.Place.of(paths[place.owner], place.slot, place.local)
                 found.append(layout.Number(moved, letter, size))
             case layout.Block(place, primitive, count):
-                moved = layout.Place(paths[place.owner], place.slot, place.local)
+                moved = layout.Place.of(paths[place.owner], place.slot, place.local)
                 found.append(layout.Block(moved, primitive, count))
             case _:
                 found.append(part)

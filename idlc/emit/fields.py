@@ -30,11 +30,12 @@ def shadows(structure: ir.Message) -> bool:
 
 def support(type_: ir.FieldType) -> str:
     """Return what a field needs of the runtime: "sequence", "array" or nothing."""
-    if isinstance(ir.element_of(type_), ir.Primitive) and ir.element_of(type_).name not in LISTS:  # type: ignore[union-attr]
-        if isinstance(type_, ir.Sequence):
-            return "sequence"
-        if isinstance(type_, ir.Array):
-            return "array"
+    if (
+        isinstance(type_, (ir.Sequence, ir.Array))
+        and isinstance(type_.element, ir.Primitive)
+        and type_.element.name not in LISTS
+    ):
+        return "sequence" if isinstance(type_, ir.Sequence) else "array"
     return ""
 
 

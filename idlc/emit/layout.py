@@ -18,16 +18,17 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a value lives: a slot of the object in a local variable."""
+    """Where a value lives: a slot of the object in a local variable; `text` is the attribute."""
 
     owner: str
     slot: str
     local: str
+    text: str
 
-    @property
-    def text(self) -> str:
-        """The attribute expression."""
-        return f"{self.owner}.{self.slot}"
+    @classmethod
+    def of(cls, owner: str, slot: str, local: str) -> Place:
+        """Return the place of a slot."""
+        return cls(owner, slot, local, f"{owner}.{slot}")
 
 
 class Number(msgspec.Struct, frozen=True):
@@ -155,7 +156,7 @@ def _steps(
     found: list[Step] = []
     for field in message.fields:
         inner = (*path, field.name)
-        place = Place(owner, pynames.slot(field.name), names.shortest(inner))
+        place = Place.of(owner, pynames.slot(field.name), names.shortest(inner))
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             found.append(Enter(place, field.type.target, not nested.fields))

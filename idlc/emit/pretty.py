@@ -60,8 +60,10 @@ def flat(node: Node) -> str:
 def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
     """Return `before`, the node and `after` as lines, indented by `indent` columns."""
     margin = " " * indent
-    one = f"{margin}{before}{flat(node)}{after}"
-    if isinstance(node, str) or len(one) <= WIDTH:
+    if isinstance(node, str):
+        return [f"{margin}{before}{node}{after}"]
+    one = f"{margin}{before}{node.flat()}{after}"
+    if len(one) <= WIDTH:
         return [one]
     if isinstance(node, Comprehension):
         inner = f"{margin}    {flat(node.element)} {node.loop}"
@@ -92,15 +94,15 @@ def all_of(conditions: list[str], indent: int) -> list[str]:
 def assign(target: Node, value: Node, indent: int) -> list[str]:
     """Return an assignment as lines; a tuple of targets is a Group without `before`."""
     margin = " " * indent
+    source = value if isinstance(value, str) else value.flat()
     if isinstance(target, Group):
         inner = ", ".join(flat(item) for item in target.items)
         inner += "," if len(target.items) == 1 else ""
         bare = f"({inner})" if len(target.items) == 1 else inner
-        source = flat(value)
         if len(margin) + len(bare) + 3 + len(source) <= WIDTH:
             return [f"{margin}{bare} = {source}"]
         return lines(target, indent, "", f" = {source}")
-    one = f"{margin}{target} = {flat(value)}"
+    one = f"{margin}{target} = {source}"
     if len(one) <= WIDTH:
         return [one]
     if not isinstance(value, str):

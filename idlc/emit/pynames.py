@@ -25,6 +25,9 @@ CODEC_NAMES = frozenset(
     | {"parts", "put", "reading", "size", "struct", "view"}
 )
 
+#: Names that a local variable must not have: it would shadow them, or cannot.
+RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
+
 
 def natural(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts numbers in names by their value, as linters do."""
@@ -70,13 +73,13 @@ class Locals:
     """The local variables of one function: each name is given once."""
 
     def __init__(self) -> None:
-        self._taken: set[str] = set(CODEC_NAMES)
+        self._taken: set[str] = set(RESERVED)
 
     def new(self, wanted: str) -> LocalName:
         """Return `wanted`, or a name like it that is free and shadows nothing."""
         name = wanted
         count = 1
-        while not self._free(name):
+        while name in self._taken:
             count += 1
             name = f"{wanted}_{count}"
         self._taken.add(name)
@@ -86,12 +89,9 @@ class Locals:
         """Return the last part of a path, with as many parts before it as make it new."""
         for start in reversed(range(len(path))):
             name = "_".join(path[start:])
-            if self._free(name):
-                return self.new(name)
-        return self.new("_".join(path))
-
-    def _free(self, name: str) -> bool:
-        return not (name in self._taken or keyword.iskeyword(name) or hasattr(builtins, name))
+            if name not in self._taken:
+                break
+        return self.new(name)
 
     def mark(self) -> frozenset[str]:
         """Return what `reset` needs to forget all names given from now on."""

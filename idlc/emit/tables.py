@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Hashable
+from typing import NamedTuple
 
 from idlc.emit import layout, pynames
 from idlc.emit.pretty import Group, Node, call
-from idlc.model import ir
+
+
+class Mark(NamedTuple):
+    """What was named at some point."""
+
+    made: dict[Hashable, tuple[str, Node]]
+    numbers: dict[str, int]
+    names: frozenset[str]
 
 
 class Tables:
@@ -14,7 +23,8 @@ class Tables:
 
     def __init__(self, names: pynames.Locals) -> None:
         self._names = names
-        self._made: dict[str, tuple[str, Node]] = {}
+        self._made: dict[Hashable, tuple[str, Node]] = {}
+        self._numbers: dict[str, int] = {}
 
     @property
     def definitions(self) -> tuple[tuple[str, Node], ...]:
@@ -25,29 +35,31 @@ class Tables:
         """Return a free local variable."""
         return self._names.new(wanted)
 
-    def mark(self) -> tuple[int, frozenset[str]]:
+    def mark(self) -> Mark:
         """Return what `reset` needs."""
-        return len(self._made), self._names.mark()
+        return Mark(self._made.copy(), self._numbers.copy(), self._names.mark())
 
-    def reset(self, mark: tuple[int, frozenset[str]]) -> None:
+    def reset(self, mark: Mark) -> None:
         """Forget everything named since `mark`."""
-        count, names = mark
-        self._made = dict(list(self._made.items())[:count])
-        self._names.reset(names)
+        self._made, self._numbers = mark.made, mark.numbers
+        self._names.reset(mark.names)
 
-    def define(self, wanted: str, key: str, expression: Node) -> str:
+    def define(self, wanted: str, key: Hashable, expression: Node) -> str:
         """Return the name of an expression, making it on first use of `key`."""
-        if key not in self._made:
-            self._made[key] = (self._names.new(wanted), expression)
-        return self._made[key][0]
+        known = self._made.get(key)
+        if known is None:
+            known = self._made[key] = (self._names.new(wanted), expression)
+        return known[0]
 
-    def numbered(self, stem: str, key: str, expression: Node) -> str:
-        """Return the name of an expression, made as `stem` and a number."""
-        if key in self._made:
-            return self._made[key][0]
-        names = (name for name, _ in self._made.values())
-        number = 1 + sum(name.removeprefix(f"{stem}_").isdigit() for name in names)
-        return self.define(f"{stem}_{number}", key, expression)
+    def numbered(self, stem: str, function: str, *arguments: str, after: str = "") -> str:
+        """Return the name of a runtime function's result, made as `stem` and a number."""
+        key = (stem, function, *arguments, after)
+        known = self._made.get(key)
+        if known:
+            return known[0]
+        number = self._numbers[stem] = self._numbers.get(stem, 0) + 1
+        value = Group(f"_idlc.{function}", ("order", *arguments), after)
+        return self.define(f"{stem}_{number}", key, value)
 
     def function(self, name: str, expression: str) -> str:
         """Return the name of a runtime function."""
@@ -56,30 +68,26 @@ class Tables:
     def reader(self, fields: str, start: int | None) -> str:
         """Return what unpacks a run: a function, or without `start` a table by position."""
         if start is None:
-            return self.numbered("read", f"read {fields}", _call("phases", fields))
-        arguments = (fields, f"start={start}") if start else (fields,)
-        expression = _call("layout", *arguments, after=".unpack_from")
-        return self.numbered("read", f"read {start} {fields}", expression)
+            return self.numbered("read", "phases", f'"{fields}"')
+        arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
+        return self.numbered("read", "layout", *arguments, after=".unpack_from")
 
     def rows(self, fields: str) -> str:
         """Return the function that yields the values of one structure after the other."""
-        expression = _call("layout", fields, "start=4", after=".iter_unpack")
-        return self.numbered("rows", f"rows {fields}", expression)
+        return self.numbered("rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
 
     def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
         """Return what packs a frame: a function, or a table by text size or by position."""
-        arguments = [fields]
+        arguments = [f'"{fields}"']
         if start:
             arguments.append(f"start={start}")
         if align > 1:
             arguments.append(f"align={align}")
-        function = ("text_phases" if texts else "phases") if start is None else "Texts"
-        if not texts and start is not None:
-            expression = _call("layout", *arguments, after=".pack")
-        else:
-            expression = _call(function, *arguments)
-        key = f"write {function} {' '.join(arguments)} {texts}"
-        return self.numbered("write", key, expression)
+        if start is None:
+            return self.numbered("write", "text_phases" if texts else "phases", *arguments)
+        if texts:
+            return self.numbered("write", "Texts", *arguments)
+        return self.numbered("write", "layout", *arguments, after=".pack")
 
     def pad(self, align: int) -> str:
         """Return the table of padding to `align`, by position."""
@@ -152,10 +160,3 @@ class Tables:
 def numpy_name(primitive: str) -> str:
     """Return the dtype of a numeric primitive."""
     return {"char": "uint8"}.get(primitive, primitive)
-
-
-def _call(function: str, fields: str, *arguments: str, after: str = "") -> Group:
-    return Group(f"_idlc.{function}", ("order", json.dumps(fields), *arguments), after)
-
-
-__all__ = ["Tables", "ir", "numpy_name"]

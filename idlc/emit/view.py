@@ -119,12 +119,12 @@ def _message(
     tables.define("encapsulation", "encapsulation", "_idlc.HEADERS[order]")
     writing = code.function(encode(steps, tables), 8)
     makers, needed = _makers(structure.name, steps, references, tables)
-    reading = code.text_of(decode(steps, tables, makers[structure.name], makers), 8)
+    bulk = is_bulk(steps)
+    reading = code.text_of(decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8)
     definitions = tuple(
         line for name, value in tables.definitions for line in assign(name, value, 4)
     )
     arrays = any("_arrays." in line for line in definitions) and not _has_arrays(interface)
-    bulk = ", bulk=True" if is_bulk(steps) else ""
     return MessageView(
         name=references.name(structure.name),
         body=tuple(_body(structure, views)),
@@ -134,7 +134,7 @@ def _message(
         tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
         decode=tuple(reading),
-        result=f"_idlc.Codec(encode, decode{bulk})",
+        result=f"_idlc.Codec(encode, decode{', bulk=True' if bulk else ''})",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 _LOWER = re.compile(r"[a-z](_?[a-z0-9])*")
 _UPPER = re.compile(r"[A-Z](_?[A-Z0-9])*")
@@ -44,6 +45,7 @@ def field_name_like(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_").lstrip("0123456789_")
 
 
+@lru_cache(maxsize=4096)
 def snake_case(name: str) -> str:
     """Return the module name that rosidl derives from an interface's name (spec section 7.1)."""
     name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
