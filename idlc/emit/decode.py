@@ -106,6 +106,7 @@ class _Decoder:
         self.run = _Run()
         self.limited = False
         self.unchecked = False
+        self.worded = False
 
     def step(self, step: layout.Step) -> None:
         """Emit one step."""
@@ -163,7 +164,10 @@ class _Decoder:
             self.align(widest)
         fields = "".join(run.fields)
         here = self.here.text()
-        if widest <= self.here.modulus:
+        if self.worded and fields == "I":
+            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
+            self.here = run.skipped(self.here)
+        elif widest <= self.here.modulus:
             reader = self.tables.reader(fields, self.here.residue)
             self.body.append(run.assignment(call(reader, "data", here)))
             self.here = run.skipped(self.here)
@@ -186,8 +190,9 @@ class _Decoder:
             self.line(f"({self.here.text(3)} & -8) + 4", "at")
             self.here = Cursor("at", 0, 8, 4)
         else:
-            self.line(f"{self.here.text(align - 1)} & -{align}", "at")
-            self.here = Cursor("at", 0, align, 4 % align)
+            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
+            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
+            self.here = Cursor("at", -lead, align, 4 % align)
 
     def settle(self, target: Cursor) -> None:
         """Bring the position into the variable of `target`."""
@@ -221,11 +226,20 @@ class _Decoder:
 
         The last byte must be zero; to look at it is to check the bounds.
         """
-        self.number("size")
-        start = self.start()
-        self.line(f"{self.here.text(-1)} + size", "end")
+        size = "size"
+        if self.worded and not self.run.fields:
+            self.align(4)
+            self.here = self.here.skip(4)
+            start = self.start()
+            size = f"words[{start} >> 2]"
+        else:
+            self.number(size)
+            start = self.start()
+        self.line(f"{self.here.text(-1)} + {size}", "end")
         self.body.append(Block("if data[end]:", UNENDED))
         self.here = Cursor("end", 1, 1, 0)
+        if self.worded:
+            return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.text(), f"data{slice_of(start)}")
 
     def wide_text(self) -> Node:
@@ -308,10 +322,17 @@ class _Decoder:
             least = layout.smallest(step.body)
             wanted = count if least == 1 else f"{least} * {count}"
             self.short_if(f"{self.here.text()} + {wanted} > limit")
-        empty = Comprehension(f"{self.makers[step.type]}()", f"for _ in range({count})")
+        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
+        many = layout.is_many(step) and layout.is_text(step.body)
+        outermost = many and not self.worded and self.source == "data"
+        if outermost:
+            strings = call(self.tables.strings(), "data", self.here.text())
+            self.line(strings, Group("", ("words", "chars", "to_str")))
+            self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
+        self.worded &= not outermost
 
     def rows(self, step: layout.Items, repeat: layout.Fixed) -> None:
         """Read structures of constant size: one Struct yields the values of each."""

@@ -242,11 +242,43 @@ class _Encoder:
         if not unless_empty:
             here.align(align)
 
+    def rows(self, step: layout.Items) -> None:
+        """Emit structures of strings: what goes around each is looked up, all is encoded once."""
+        local = step.place.local
+        rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
+        self.flush(4)
+        self.pad(4)
+        sized = self.tables.function("sized", "sizes(order)")
+        ended = self.tables.function("ended", "ENDS")
+        places = [part.place for part in step.body if isinstance(part, layout.Text)]
+        parts = (
+            part
+            for one in places
+            for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
+        )
+        lines = [code.Line(one.text, one.local) for one in places]
+        lines.append(code.Line(Group(f"{rows} += ", tuple(parts))))
+        loop = f"for {step.item} in {local}"
+        given = ", ".join(one.text for one in places) + ("," if len(places) == 1 else "")
+        each = self.tables.local("each")
+        texts = Comprehension(each, (loop, f"for {each} in ({given})"))
+        unsized = call(self.tables.function("unsized", "unsized"), texts)
+        self.line("[]", f"{rows}: list[str]")
+        self.body.append(code.Block("try:", (code.Block(f"{loop}:", tuple(lines)),)))
+        self.body.append(code.Block("except IndexError:", (code.Line(unsized, rows),)))
+        self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
+        self.put(block)
+        self.here.skip(f"len({block})", 1)
+        self.settle()
+
     def items(self, step: layout.Items) -> None:
         """Emit an array or sequence of structures."""
         self.begin(step)
         repeat = layout.fixed(step.body)
-        if repeat is None:
+        only_texts = all(isinstance(part, layout.Text) and not part.wide for part in step.body)
+        if only_texts and layout.is_many(step):
+            self.rows(step)
+        elif repeat is None:
             self.loop(step)
         else:
             self.fused(step, repeat)
@@ -263,7 +295,7 @@ class _Encoder:
         block = self.tables.local(f"{local}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
         loop = f"for {step.item} in {local}"
-        self.line(Group(f'b"{gap}".join', (Comprehension(row, loop),)), block)
+        self.line(Group(f'b"{gap}".join', (Comprehension(row, (loop,)),)), block)
         self.elements(block, local, repeat, maybe_empty=step.size is None)
 
     def elements(self, part: str, local: str, repeat: layout.Fixed, *, maybe_empty: bool) -> None:

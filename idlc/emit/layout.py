@@ -137,6 +137,8 @@ CODES = {"bool": "?", "byte": "c"}
 LIST_PRIMITIVES = {"bool": "flags", "byte": "octets"}
 #: From more than so many bytes on, a fixed-size array is not part of a Struct.
 LARGE = 1024
+#: Up to so many elements, what is done once for all of them costs more than it saves.
+FEW = 4
 
 
 def steps(message: ir.Message, messages: Messages, names: pynames.Locals) -> tuple[Step, ...]:
@@ -222,6 +224,25 @@ def smallest(body: tuple[Step, ...]) -> int:
             case _:
                 total += 4
     return total
+
+
+def is_many(step: Items) -> bool:
+    """Whether there may be so many elements that preparing for them is worth its cost."""
+    most = step.bound if step.size is None else step.size
+    return most is None or most > FEW
+
+
+def is_text(body: tuple[Step, ...]) -> bool:
+    """Whether steps are strings and structures of them, with nothing between but single bytes."""
+    for step in body:
+        match step:
+            case Text(wide=False) | Number(size=1) | Enter():
+                pass
+            case Items() if is_text(step.body):
+                pass
+            case _:
+                return False
+    return any(isinstance(step, (Text, Items)) for step in body)
 
 
 class Fixed(msgspec.Struct, frozen=True):

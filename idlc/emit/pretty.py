@@ -34,14 +34,14 @@ class Group(msgspec.Struct, frozen=True):
 
 
 class Comprehension(msgspec.Struct, frozen=True):
-    """A list comprehension: what is made of each element, and the `for`."""
+    """A list comprehension: what is made of each element, and each `for`."""
 
     element: Node
-    loop: str
+    loops: tuple[str, ...]
 
     def flat(self) -> str:
         """Return the comprehension on one line."""
-        return f"[{flat(self.element)} {self.loop}]"
+        return f"[{flat(self.element)} {' '.join(self.loops)}]"
 
 
 Node: TypeAlias = str | Group | Comprehension
@@ -66,10 +66,10 @@ def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[st
     if len(one) <= WIDTH:
         return [one]
     if isinstance(node, Comprehension):
-        inner = f"{margin}    {flat(node.element)} {node.loop}"
-        body = [inner]
-        if len(inner) > WIDTH:
-            body = [*lines(node.element, indent + 4), f"{margin}    {node.loop}"]
+        body = [f"{margin}    {node.flat()[1:-1]}"]
+        if len(body[0]) > WIDTH:
+            body = lines(node.element, indent + 4)
+            body += [f"{margin}    {loop}" for loop in node.loops]
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
     result = [f"{margin}{before}{node.before}{node.brackets[0]}"]
     for item in node.items:

@@ -21,8 +21,8 @@ Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
-    {"at", "count", "data", "decode", "encode", "end", "limit", "low", "message", "order"}
-    | {"parts", "put", "reading", "size", "struct", "view"}
+    {"at", "chars", "count", "data", "decode", "encode", "end", "limit", "low", "message", "order"}
+    | {"parts", "put", "reading", "size", "struct", "to_str", "view", "words"}
 )
 
 #: Names that a local variable must not have: it would shadow them, or cannot.

@@ -152,6 +152,11 @@ class Tables:
         """Return the name of the function that makes a string of bytes."""
         return self.define("text", "text", "reading.text")
 
+    def strings(self) -> str:
+        """Return the name of the function that prepares reading many strings."""
+        expression = call("_idlc.strings_reader", "order", "reading.text")
+        return self.define("strings", "strings", expression)
+
     def small(self) -> str:
         """Return the name of the size up to which no view is worth its cost."""
         return self.define("small", "small", "reading.small")

@@ -22,13 +22,7 @@ from .cdr import (
     phases,
     read_flags,
     read_octets,
-    read_wide_text,
-    text_block,
     text_phases,
-    texts_reader,
-    wide_block,
-    wide_text,
-    wide_texts_reader,
 )
 from .codec import Codec, Reading, codec_for, maker
 from .errors import DecodeError, ValidationError, importing
@@ -51,6 +45,19 @@ from .sequences import (
     sequence_writer,
     to_array,
 )
+from .texts import (
+    ENDS,
+    read_wide_text,
+    rows_writer,
+    sizes,
+    strings_reader,
+    text_block,
+    texts_reader,
+    unsized,
+    wide_block,
+    wide_text,
+    wide_texts_reader,
+)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -63,6 +70,7 @@ if TYPE_CHECKING:
     Floats: TypeAlias = Iterable[float]
 
 __all__ = [
+    "ENDS",
     "HEADERS",
     "NATIVE",
     "PAD2",
@@ -106,14 +114,18 @@ __all__ = [
     "read_flags",
     "read_octets",
     "read_wide_text",
+    "rows_writer",
     "same",
     "sequence_reader",
     "sequence_writer",
     "several",
+    "sizes",
+    "strings_reader",
     "text_block",
     "text_phases",
     "texts_reader",
     "to_array",
+    "unsized",
     "wide_block",
     "wide_text",
     "wide_texts_reader",

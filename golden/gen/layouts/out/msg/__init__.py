@@ -10,15 +10,21 @@ if TYPE_CHECKING:
     from ._everything import Everything
     from ._inner import Inner
     from ._nothing import Nothing
+    from ._pair import Pair
     from ._row import Row
+    from ._texts import Texts
+    from ._titled import Titled
 
-__all__ = ["Everything", "Inner", "Nothing", "Row"]
+__all__ = ["Everything", "Inner", "Nothing", "Pair", "Row", "Texts", "Titled"]
 
 _MODULES = {
     "Everything": "_everything",
     "Inner": "_inner",
     "Nothing": "_nothing",
+    "Pair": "_pair",
     "Row": "_row",
+    "Texts": "_texts",
+    "Titled": "_titled",
 }
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)
