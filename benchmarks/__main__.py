@@ -19,7 +19,7 @@ from benchmarks import (
 )
 from benchmarks.measure import Row, measure
 from benchmarks.peers import PEERS, installed
-from benchmarks.work import Work
+from benchmarks.work import Work, in_memory
 
 GROUPS = (codec, batches, classes, imports, compiling, starting, topics)
 
@@ -59,7 +59,7 @@ def main(words: Sequence[str] | None = None) -> None:
         report.write_documents(results.load())
         return
     run = results.here()
-    with tempfile.TemporaryDirectory(prefix="idlc-benchmarks-") as folder:
+    with tempfile.TemporaryDirectory(prefix="idlc-benchmarks-", dir=in_memory()) as folder:
         rows = selected(Work(Path(folder), given.quick), given.words)
         if given.list:
             print("\n".join(f"{row.group}: {row.name}" for row in rows))

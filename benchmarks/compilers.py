@@ -5,7 +5,6 @@ file, and of the whole after an edit.
 """
 
 import json
-import re
 import shutil
 import sys
 import sysconfig
@@ -21,30 +20,29 @@ ROSIDL_FILES = 30
 
 
 def gen(package: Path, out: Path) -> None:
-    from idlc.cli.main import main
+    from idlc.driver.gen import GenOptions, gen
+    from idlc.text.diagnostics import Report
 
-    words = ["gen", package, "-o", out / package.name, "-I", package.parent]
-    status = main([str(word) for word in (*words, "--package", package.name)])
-    assert status == 0, f"idlc gen failed on {package}"
+    paths, include = (str(package),), (str(package.parent),)
+    options = GenOptions(paths, str(out / package.name), package.name, include)
+    assert gen(options, Report()), f"idlc gen failed on {package}"
 
 
-def idlc(inputs: Path, out: Path) -> int:
-    for package in sorted(inputs.iterdir()):
+def idlc(files: list[Path], out: Path) -> int:
+    for package in sorted({path.parents[1] for path in files}):
         gen(package, out)
-    return len(interface_files(inputs))
+    return len(files)
 
 
-def rosbags(inputs: Path, out: Path, *, codecs: bool) -> int:
+def rosbags(files: list[Path], out: Path, *, codecs: bool) -> int:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     from rosbags.typesys.codegen import generate_python_code
 
     store = get_typestore(Stores.EMPTY)
     types = {}
-    for path in interface_files(inputs):
+    for path in files:
         text = path.read_text(encoding="utf-8")
-        # rosbags knows neither services and actions nor wstring
-        if path.suffix == ".msg" and not re.search("^wstring", text, re.MULTILINE):
-            types.update(get_types_from_msg(text, f"{path.parts[-3]}/msg/{path.stem}"))
+        types.update(get_types_from_msg(text, f"{path.parts[-3]}/msg/{path.stem}"))
     (out / "types.py").write_text(generate_python_code(types), encoding="utf-8")
     store.register(types)
     for name in types:
@@ -54,12 +52,11 @@ def rosbags(inputs: Path, out: Path, *, codecs: bool) -> int:
     return len(types)
 
 
-def rosidl(inputs: Path, out: Path, *, most: int) -> int:
+def rosidl(files: list[Path], out: Path, *, most: int) -> int:
     from rosidl_adapter import convert_to_idl
     from rosidl_generator_py import generate_py
     from rosidl_generator_type_description import generate_type_hash
 
-    files = interface_files(inputs)
     chosen = files[:: max(1, len(files) // most)]
     packages: dict[str, list[Path]] = {}
     for path in chosen:
@@ -107,7 +104,7 @@ def rebuild(inputs: Path, out: Path, *, everything: bool) -> float:
     path.write_text(f"{path.read_text(encoding='utf-8')}# {time.time()}\n", encoding="utf-8")
     begin = time.process_time()
     if everything:
-        idlc(inputs, out)
+        idlc(interface_files(inputs), out)
     else:
         gen(package, out)
     return time.process_time() - begin
@@ -115,16 +112,17 @@ def rebuild(inputs: Path, out: Path, *, everything: bool) -> float:
 
 def main(task: str, inputs: Path, out: Path) -> float:
     run = TASKS.get(task, idlc)
-    with tempfile.TemporaryDirectory() as folder:
-        small = Path(folder, "in", "warm", "msg", "Warm.msg")
-        small.parent.mkdir(parents=True)
-        small.write_text("int8 warm  # [m]\nstring[] s\n", encoding="utf-8")
-        Path(folder, "out").mkdir()
-        run(Path(folder, "in"), Path(folder, "out"))
+    folder = tempfile.mkdtemp(dir=out.parent)
+    small = Path(folder, "in", "warm", "msg", "Warm.msg")
+    small.parent.mkdir(parents=True)
+    small.write_text("int8 warm  # [m]\nstring[] s\n", encoding="utf-8")
+    Path(folder, "out").mkdir()
+    run([small], Path(folder, "out"))
     if task not in TASKS:
         return rebuild(inputs, out, everything=task == "edit_all")
+    files = interface_files(inputs)
     begin = time.process_time()
-    count = run(inputs, out)
+    count = run(files, out)
     return (time.process_time() - begin) / count
 
 

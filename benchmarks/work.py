@@ -1,10 +1,25 @@
 """What the groups of rows share: generated packages, and each implementation's messages."""
 
+import shutil
 from functools import cached_property, lru_cache
 from pathlib import Path
 
 from benchmarks.measure import IDLC
 from benchmarks.peers import Implementation, generate, implementations
+
+MEMORY = Path("/dev/shm")  # noqa: S108 - folders in it are made by tempfile
+#: Bytes that a whole run writes, with room to spare.
+ROOM = 1 << 30
+
+
+def in_memory() -> Path | None:
+    """Return where files are in memory, `None` if that is nowhere.
+
+    On a disk, how long it takes to make a file depends on what was there: ext4 takes up to thirty
+    times as long for some minutes after others were removed, as it passes over their inodes.
+    """
+    roomy = MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > ROOM
+    return MEMORY if roomy else None
 
 
 class Work:

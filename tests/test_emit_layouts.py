@@ -16,11 +16,17 @@ PER_SEED = 6
 def random_package(rng):
     """Return texts by path and shapes by name of structures that nest in each other."""
     files, shapes = {}, {}
+    texts = []  # structures of hardly anything but strings, which have a way of their own
     for index in range(PER_SEED):
         lines, shape = [], []
+        others = ["string", "string", "char", *texts, *texts]
+        if rng.random() < 0.4:
+            texts.append(f"T{index}")
+        else:
+            others = [*PRIMITIVES, "string", "string", "wstring", *shapes, *shapes]
         for number in range(rng.choice([0, 1, 2, 3, 5, 9])):
             name = f"f{number}"
-            element = rng.choice([*PRIMITIVES, "string", "string", "wstring", *shapes, *shapes])
+            element = rng.choice(others)
             suffix, size = rng.choice([("", 0), ("", 0), ("[]", None), ("[<=5]", None), ("[3]", 3)])
             if element in NUMERIC and rng.random() < 0.05:
                 suffix, size = ("[1040]", 1040)  # larger than what goes through a Struct

@@ -255,7 +255,7 @@ class _Transaction:
                     target.unlink(missing_ok=True)
                 else:
                     spare = self._stage / "old"
-                    _create(f"{spare}", old)
+                    _create(str(spare), old)
                     target.parent.mkdir(parents=True, exist_ok=True)
                     spare.replace(target)
             except OSError:
@@ -276,7 +276,8 @@ def _create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
         while rest:
             rest = rest[os.write(handle, rest) :]
     except BaseException:
-        Path(path).unlink()
+        with contextlib.suppress(OSError):
+            Path(path).unlink()
         raise
     finally:
         os.close(handle)

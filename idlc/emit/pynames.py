@@ -25,7 +25,7 @@ CODEC_NAMES = frozenset(
     | {"parts", "put", "reading", "size", "struct", "to_str", "view", "words"}
 )
 
-#: Names that a local variable must not have: it would shadow them, or cannot.
+#: Names that no local variable can have, or should.
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
 
 

@@ -165,10 +165,10 @@ def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], 
         from .arrays import view_reader
 
         return view_reader(order, code)
-    empty = array(code)
+    new = array(code).__copy__  # half of what `array(code)` takes
 
     def native(raw: Any) -> Any:
-        result = empty[:]
+        result = new()
         result.frombytes(raw)
         return result
 
