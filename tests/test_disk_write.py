@@ -3,6 +3,8 @@
 import contextlib
 import errno
 import os
+import pathlib
+import sys
 from pathlib import Path
 
 import pytest
@@ -72,6 +74,9 @@ class Faulty:
             return real(path, *args, **kwargs)
 
         monkeypatch.setattr(os, operation, replacement)
+        if sys.version_info < (3, 11) and operation in ("replace", "mkdir", "unlink"):
+            # where Path has the system's functions from before
+            monkeypatch.setattr(pathlib._NormalAccessor, operation, staticmethod(replacement))
 
 
 def test_a_second_run_replaces_removes_and_leaves_nothing_behind(out):
