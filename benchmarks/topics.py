@@ -97,6 +97,10 @@ class Node:
         return rclpy.create_node("idlc_benchmarks")
 
 
+def unheard(*_: object) -> None:
+    """Stand in for a callback; rclpy asks what a callback takes, which builtins do not tell."""
+
+
 def publishing(node: Node, package: str, name: str, fill, group: str):
     found = {}
     for who, suffix in PLACES.items():
@@ -106,7 +110,7 @@ def publishing(node: Node, package: str, name: str, fill, group: str):
         fill(message)
         topic = f"{package}{suffix}_{name}_{len(group)}"
         publisher = node_.create_publisher(kind, topic, 1)
-        subscription = node_.create_subscription(kind, topic, print, 1)
+        subscription = node_.create_subscription(kind, topic, unheard, 1)
         while not publisher.get_subscription_count():
             time.sleep(0.01)
         publish = partial(publisher.publish, message)
@@ -126,7 +130,7 @@ def calling(node: Node):
     found = {}
     for who, suffix in PLACES.items():
         kind = import_module(f"std_srvs{suffix}.srv").SetBool
-        service = node.node.create_service(kind, f"call{suffix}", print)
+        service = node.node.create_service(kind, f"call{suffix}", unheard)
         client = node.node.create_client(kind, f"call{suffix}")
         client.wait_for_service()
         trip = partial(round_trip, client, service, kind, kind.Request(data=True))
