@@ -112,7 +112,7 @@ def rebuild(inputs: Path, out: Path, *, everything: bool) -> float:
 
 def main(task: str, inputs: Path, out: Path) -> float:
     run = TASKS.get(task, idlc)
-    folder = tempfile.mkdtemp(dir=out.parent)
+    folder = tempfile.mkdtemp(dir=out.parent)  # it goes with what OUT is in
     small = Path(folder, "in", "warm", "msg", "Warm.msg")
     small.parent.mkdir(parents=True)
     small.write_text("int8 warm  # [m]\nstring[] s\n", encoding="utf-8")

@@ -104,12 +104,12 @@ def _under(given: str, report: Report) -> Iterator[Path | None]:
 
 def _interface(path: Path, whole: str, given: str) -> InterfaceFile:
     kind = KINDS[path.suffix]
-    root = _root(os.path.dirname(whole))  # noqa: PTH120 - a Path for each file takes as long again
+    root = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
     return InterfaceFile(path, path.as_posix(), kind, path.stem, given, root)
 
 
 @lru_cache(maxsize=1024)
-def _root(folder: str) -> Path:
+def root_of(folder: str) -> Path:
     """Return the folder above `folder` if that is for one kind of interface, or itself."""
     here = Path(folder)
     return here.parent if here.name in KIND_FOLDERS else here

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.disk import surroundings
-from idlc.disk.find import KIND_FOLDERS, KINDS, walk
+from idlc.disk.find import KIND_FOLDERS, KINDS, root_of, walk
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
 from idlc.model import catalog, ir
@@ -48,7 +48,7 @@ class Folder:
 
         unheard = Report()
         found: dict[str, list[Path]] = {}
-        for root in sorted({_root(file) for file in walk(self._path, unheard)}):
+        for root in sorted({root_of(str(file.parent)) for file in walk(self._path, unheard)}):
             declared = manifest(root)
             name = declared_name(declared, "", unheard) if declared else None
             found.setdefault(name or root.name, []).append(root)
@@ -71,10 +71,6 @@ class Prefix:
             return [path.name for path in self._share.iterdir() if _has_interfaces(path)]
         except OSError:
             return []
-
-
-def _root(file: Path) -> Path:
-    return file.parent.parent if file.parent.name in KIND_FOLDERS else file.parent
 
 
 def _has_interfaces(root: Path) -> bool:

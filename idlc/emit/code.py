@@ -61,7 +61,7 @@ def _prune(
                     continue
                 live = live - {target} | reads
             case Put(_, reads):
-                live = live | reads if reads else live
+                live |= reads
             case Block(head, inner):
                 remaining, before = _prune(inner, live)
                 while not before <= live:

@@ -26,17 +26,12 @@ TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 def is_bulk(steps: tuple[layout.Step, ...]) -> bool:
     """Whether a structure holds numeric buffers, which are read through a memoryview."""
-    for step in steps:
-        match step:
-            case layout.Numbers():
-                return True
-            case layout.Block() if step.is_large:
-                return True
-            case layout.Items() if is_bulk(step.body):
-                return True
-            case _:
-                pass
-    return False
+    return any(
+        isinstance(step, layout.Numbers)
+        or (isinstance(step, layout.Block) and step.is_large)
+        or (isinstance(step, layout.Items) and is_bulk(step.body))
+        for step in steps
+    )
 
 
 def decode(
@@ -325,14 +320,14 @@ class _Decoder:
         empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
+        worded = self.worded
         many = layout.is_many(step) and layout.is_text(step.body)
-        outermost = many and not self.worded and self.source == "data"
-        if outermost:
+        if many and not worded and self.source == "data":
             strings = call(self.tables.strings(), "data", self.here.text())
             self.line(strings, Group("", ("words", "chars", "to_str")))
             self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
-        self.worded &= not outermost
+        self.worded = worded
 
     def rows(self, step: layout.Items, repeat: layout.Fixed) -> None:
         """Read structures of constant size: one Struct yields the values of each."""

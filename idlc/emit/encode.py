@@ -18,8 +18,7 @@ from idlc.emit.tables import Tables
 from idlc.model import ir
 
 NONE: frozenset[str] = frozenset()
-#: The variables that hold positions, in an expression.
-POSITIONS = re.compile(r"\b(?:at|low)\b")
+_POSITIONS = re.compile(r"\b(?:at|low)\b")
 
 
 class Frame:
@@ -92,7 +91,7 @@ class _Encoder:
 
     def put(self, part: Node, reads: str = "") -> None:
         """Emit a part of the message."""
-        self.body.append(code.Put(part, frozenset(POSITIONS.findall(reads)) if reads else NONE))
+        self.body.append(code.Put(part, positions(reads)))
 
     # Values of fixed size, and one text among them, gather in a frame.
 
@@ -164,7 +163,7 @@ class _Encoder:
         """Note a position; dropped later unless it is read."""
         value = without_parentheses(value)
         if target != value:
-            self.body.append(code.Note(target, value, frozenset(POSITIONS.findall(value))))
+            self.body.append(code.Note(target, value, positions(value)))
 
     # Values of variable or large size are parts of their own.
 
@@ -356,6 +355,11 @@ class _Encoder:
         self.frame = Frame(head)
 
 
+def positions(expression: str) -> frozenset[str]:
+    """Return the variables in an expression that hold positions."""
+    return frozenset(_POSITIONS.findall(expression))
+
+
 def without_parentheses(value: str) -> str:
     """Return an expression without parentheses around all of it."""
     depth = 0
@@ -385,10 +389,10 @@ def inlined(step: layout.Items) -> list[layout.Step]:
             case layout.Enter(place):
                 paths[place.local] = f"{paths[place.owner]}.{place.slot}"
             case layout.Number(place, letter, size):
-                moved = layout.Place.of(paths[place.owner], place.slot, place.local)
+                moved = layout.Place(paths[place.owner], place.slot, place.local)
                 found.append(layout.Number(moved, letter, size))
             case layout.Block(place, primitive, count):
-                moved = layout.Place.of(paths[place.owner], place.slot, place.local)
+                moved = layout.Place(paths[place.owner], place.slot, place.local)
                 found.append(layout.Block(moved, primitive, count))
             case _:
                 found.append(part)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from idlc.emit import literals, pynames
-from idlc.emit.pretty import WIDTH, Group, Node, assign, call
+from idlc.emit.pretty import WIDTH, Group, Node, assign, call, flat
 from idlc.emit.references import References
 from idlc.emit.tables import numpy_name
 from idlc.model import ir
@@ -112,9 +112,7 @@ def _element(element: ir.Element, references: References) -> str:
 
 
 def _store(slot: str, name: str, fresh: Node, given: Node) -> list[str]:
-    fresh_text = fresh if isinstance(fresh, str) else fresh.flat()
-    given_text = given if isinstance(given, str) else given.flat()
-    one = f"        {slot} = {fresh_text} if {name} is None else {given_text}"
+    one = f"        {slot} = {flat(fresh)} if {name} is None else {flat(given)}"
     if len(one) <= 88:
         return [one]
     return [

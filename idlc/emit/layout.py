@@ -18,17 +18,16 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a value lives: a slot of the object in a local variable; `text` is the attribute."""
+    """Where a value lives: a slot of the object in a local variable."""
 
     owner: str
     slot: str
     local: str
-    text: str
 
-    @classmethod
-    def of(cls, owner: str, slot: str, local: str) -> Place:
-        """Return the place of a slot."""
-        return cls(owner, slot, local, f"{owner}.{slot}")
+    @property
+    def text(self) -> str:
+        """The attribute expression."""
+        return f"{self.owner}.{self.slot}"
 
 
 class Number(msgspec.Struct, frozen=True):
@@ -158,7 +157,7 @@ def _steps(
     found: list[Step] = []
     for field in message.fields:
         inner = (*path, field.name)
-        place = Place.of(owner, pynames.slot(field.name), names.shortest(inner))
+        place = Place(owner, pynames.slot(field.name), names.shortest(inner))
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             found.append(Enter(place, field.type.target, not nested.fields))

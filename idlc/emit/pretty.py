@@ -94,7 +94,7 @@ def all_of(conditions: list[str], indent: int) -> list[str]:
 def assign(target: Node, value: Node, indent: int) -> list[str]:
     """Return an assignment as lines; a tuple of targets is a Group without `before`."""
     margin = " " * indent
-    source = value if isinstance(value, str) else value.flat()
+    source = flat(value)
     if isinstance(target, Group):
         inner = ", ".join(flat(item) for item in target.items)
         inner += "," if len(target.items) == 1 else ""

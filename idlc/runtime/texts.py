@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 #: Up to so many bytes, looking whether all are ASCII costs less than it saves.
 MANY = 1 << 16
 #: What follows a short string of each length, so that the next begins at a multiple of four.
-ENDS = [bytes(1 + (-length - 1) % 4).decode() for length in range(127)]
+ENDS = ["\0\0\0\0", "\0\0\0", "\0\0", "\0"] * 32
 
 
 def sizes(order: str) -> list[str]:
