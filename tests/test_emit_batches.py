@@ -260,7 +260,7 @@ def test_views_share_the_buffers_memory(msg, wrap, order):
     read.validate()
     assert read.serialize(byteorder=order) == bytes(raw)
     assert deepcopy(read) == made
-    assert pickle.loads(pickle.dumps(read)) == made  # noqa: S301
+    assert pickle.loads(pickle.dumps(read)) == made
 
 
 def test_a_view_of_nothing(msg):

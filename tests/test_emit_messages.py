@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import pickle
+import re
 import sys
 from array import array
 
@@ -136,22 +137,43 @@ def test_anything_like_a_sequence_becomes_an_array(value):
     assert get("msg/Robot").deserialize(message.serialize()).ids == message.ids
 
 
-def test_arrays_of_the_right_type_are_kept():
+def test_arrays_are_copied_and_converted():
     ids, pose = array("i", [1]), np.zeros(3)
     message = robot(ids=ids, pose=pose)
-    assert message.ids is ids
-    assert message.pose is pose
+    ids[0] = pose[0] = 5
+    assert message.ids == array("i", [1])
+    assert message.pose.tolist() == [0, 0, 0]
     message.pose = [1, 2, 3]
     assert message.pose.dtype == np.float64
     assert message.pose.tolist() == [1, 2, 3]
     message.image = b"abc"
     assert message.image == array("B", b"abc")
-    with pytest.raises(ValueError, match="3 elements"):
-        message.pose = [1, 2]
-    with pytest.raises((TypeError, OverflowError)):
-        message.ids = [2**40]
-    with pytest.raises(TypeError):
-        message.ids = ["a"]
+    message.ids = array("i", [1, 2]).tobytes()
+    assert message.ids == array("i", [1, 2])
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "kind", "words"),
+    [
+        ("pose", [1, 2], ValueError, "pose: has 2 elements, needs 3"),
+        ("pose", np.zeros((3, 3)), ValueError, "pose: needs an array of 3 elements, not of shape"),
+        ("pose", [1, 2, "a"], ValueError, "pose[2]: must be a number (float64), not 'a'"),
+        ("pose", "abc", TypeError, "pose: "),
+        ("ids", [1, 2**40], OverflowError, "ids[1]: must be an integer from -2147483648"),
+        ("ids", ["a"], TypeError, "ids[0]: must be an integer"),
+        ("ids", 5, TypeError, "ids: must be a sequence, not 5"),
+        ("ids", {"a": 1}, TypeError, "ids: "),
+        ("ids", b"abc", ValueError, "ids: has 3 bytes, needs a multiple of 4"),
+        ("ids", np.array([1.5]), TypeError, "ids: "),
+        ("ids", iter(["a"]), TypeError, "ids: "),
+    ],
+)
+def test_a_wrong_array_is_named_when_it_is_assigned(field, value, kind, words):
+    message = robot()
+    with pytest.raises(kind, match=re.escape(words)) as caught:
+        setattr(message, field, value)
+    assert isinstance(caught.value, sys.modules["robot_msgs._idlc"].ValidationError)
+    assert pickle.loads(pickle.dumps(caught.value)).path == caught.value.path
 
 
 def test_equality_looks_at_every_element():
@@ -187,7 +209,7 @@ def test_copies_and_pickles_are_equal():
     for other in (
         copy.copy(message),
         copy.deepcopy(message),
-        *(pickle.loads(pickle.dumps(message, n)) for n in range(2, 6)),  # noqa: S301
+        *(pickle.loads(pickle.dumps(message, n)) for n in range(2, 6)),
     ):
         assert other == message
         assert other is not message
@@ -250,27 +272,37 @@ def test_a_subclass_stays_one():
         ({"goal": 5}, "goal: must be a robot_msgs/msg/Point, not 5"),
         ({"path": [5]}, "path[0]: must be a robot_msgs/msg/Point, not 5"),
         ({"path": 5}, "path: must be a sequence, not 5"),
-        ({"pair": []}, "pair: must be 2 elements, it has 0, not []"),
-        ({"ids": [1] * 5}, "ids: must be at most 4 elements, it has 5"),
+        ({"pair": []}, "pair: has 0 elements, needs 2"),
+        ({"ids": [1] * 5}, "ids: has 5 elements, at most 4 are allowed"),
         ({"tags": ["a", 5]}, "tags[1]: must be a str, not 5"),
-        ({"flags": [True]}, "flags: must be 2 elements, it has 1"),
+        ({"flags": [True]}, "flags: has 1 element, needs 2"),
         ({"octet": b"ab"}, "octet: must be bytes of length 1, not b'ab'"),
         ({"octets": [b"a", b""]}, "octets[1]: must be bytes of length 1, not b''"),
-        ({"octets": b"ab"}, "octets[0]: must be bytes of length 1, not 97"),
     ],
     ids=str,
 )
 def test_a_wrong_value_is_named_when_written_and_when_validated(fields, words):
-    message = robot(**fields)
+    message = robot()
+    for name, value in fields.items():
+        setattr(message, name, value)
     for action in (message.validate, message.serialize):
-        with pytest.raises(ValueError, match="must be") as caught:
+        with pytest.raises(ValueError, match=re.escape(words)) as caught:
             action()
         assert type(caught.value).__name__ == "ValidationError"
-        assert words in str(caught.value)
+
+
+def test_the_first_field_is_checked_at_once():
+    """ROS's tools fill in a nested message after `type(field)({...})` raised TypeError."""
+    for kind, value in (("Robot", {"name": "a"}), ("Point", {"x": 1.0}), ("Point", None)):
+        with pytest.raises(TypeError, match="must be"):
+            get(f"msg/{kind}")(value)
+    assert get("msg/Point")(np.float32(1.5)).x == 1.5
+    assert get("msg/Point")(1).x == 1
 
 
 def test_the_path_of_a_wrong_value_leads_to_it():
-    message = robot(path=[get("msg/Point")(), get("msg/Point")(x="a")])
+    message = robot(path=[get("msg/Point")(), get("msg/Point")()])
+    message.path[1].x = "a"
     with pytest.raises(ValueError, match=r"path\[1\]\.x: must be a number") as caught:
         message.serialize()
     assert (caught.value.path, caught.value.value) == ("path[1].x", "a")
@@ -279,7 +311,7 @@ def test_the_path_of_a_wrong_value_leads_to_it():
 def test_the_bound_of_a_string_is_only_validated():
     message = robot(name="too long")
     assert get("msg/Robot").deserialize(message.serialize()).name == "too long"
-    with pytest.raises(ValueError, match="name: must be at most 5 characters, it has 8"):
+    with pytest.raises(ValueError, match="name: has 8 characters, at most 5 are allowed"):
         message.validate()
 
 
@@ -291,26 +323,25 @@ def test_a_wrong_byte_order_is_refused():
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"nmae": "a"}, "nmae: must be absent: robot_msgs/msg/Robot has no such field (did you"),
-        ({"goal": {"q": 1}}, "goal.q: must be absent"),
+        ({"nmae": "a"}, "nmae: robot_msgs/msg/Robot has no such field; did you mean 'name'?"),
+        ({"goal": {"q": 1}}, "goal.q: robot_msgs/msg/Point has no such field"),
         ({"goal": 5}, "goal: must be a dictionary of robot_msgs/msg/Point, not 5"),
         ({"path": [{"x": "a"}]}, "path[0].x: must be a number"),
         ({"path": {"x": 1}}, "path: must be a list"),
-        ({"ids": [1, 2, 3, 4, 5]}, "ids: must be at most 4"),
-        ({"ids": "abc"}, "ids: must be"),
-        ({"ids": [2**31]}, "ids: must be"),
-        ({"pose": [1]}, "pose: must be"),
+        ({"ids": [1, 2, 3, 4, 5]}, "ids: has 5 elements, at most 4"),
+        ({"ids": "abc"}, "ids: "),
+        ({"ids": [2**31]}, "ids[0]: must be an integer"),
+        ({"pose": [1]}, "pose: has 1 element, needs "),
         ({"octet": 256}, "octet: must be an integer from 0 to 255"),
         ({"mode": -1}, "mode: must be an integer from 0"),
-        ({"name": "too long"}, "name: must be at most 5"),
+        ({"name": "too long"}, "name: has 8 characters, at most 5"),
         ([], "values: must be a dictionary"),
     ],
     ids=str,
 )
 def test_from_dict_refuses_what_does_not_fit(values, words):
-    with pytest.raises(ValueError, match="must be") as caught:
+    with pytest.raises(ValueError, match=re.escape(words)):
         get("msg/Robot").from_dict(values)
-    assert words in str(caught.value)
 
 
 def test_from_dict_fills_in_defaults():
@@ -385,9 +416,8 @@ def test_packages_import_lazily_and_list_what_they_have():
 
 
 def test_parts_are_buffers_that_are_not_copied():
-    image = array("B", bytes(100_000))
-    message = robot(image=image)
+    message = robot(image=bytes(100_000))
     parts = message._codec_("<").encode(message)
-    assert any(part is image for part in parts)
+    assert any(part is message.image for part in parts)
     assert parts[0][:4] == b"\0\1\0\0"
     assert b"".join(parts) == message.serialize()

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import refresh
 from test_scaffold import tree
 
 ROOT = Path(__file__).parents[1]
@@ -57,11 +58,11 @@ def replayed(tmp_path_factory) -> Path:
 def test_the_readme_makes_the_example(replayed):
     found, expected = tree(replayed), tree(EXAMPLE)
     expected.pop("README.md")
-    if os.environ.get("IDLC_REFRESH") == "example":
+    if refresh.wanted("example"):
         shutil.copytree(replayed, EXAMPLE, dirs_exist_ok=True)
         for path in expected.keys() - found.keys():
             (EXAMPLE / path).unlink()
-        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+        refresh.refreshed()
     assert sorted(found) == sorted(expected)
     lock = json.loads(expected[f"{EXAMPLE.name}/idlc.lock"])
     generated = {f"{EXAMPLE.name}/{path}" for path in ("idlc.lock", *lock["outputs"])}

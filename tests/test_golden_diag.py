@@ -8,11 +8,11 @@ import os
 import re
 import subprocess
 import sys
-from fnmatch import fnmatch
 from pathlib import Path
 
 import golden_text
 import pytest
+import refresh
 
 from idlc.cli.main import main
 from idlc.text.codes import CODES
@@ -20,7 +20,6 @@ from idlc.text.pages import page
 
 FOLDER = Path(__file__).parents[1] / "golden" / "diag"
 CASES = sorted(FOLDER.glob("*.txt"))
-REFRESH = os.environ.get("IDLC_REFRESH", "")
 
 #: Codes whose page cannot show how to trigger them.
 NOT_ON_DEMAND = {"IDL901"}
@@ -31,9 +30,9 @@ def test_golden_case(path, tmp_path, capsys, monkeypatch):
     text = path.read_text(encoding="utf-8")
     case = golden_text.read(text)
     found = golden_text.run(case, tmp_path, capsys, monkeypatch)
-    if REFRESH and fnmatch(f"diag/{path.stem}", REFRESH):
+    if refresh.wanted(f"diag/{path.stem}"):
         path.write_text(golden_text.write(case, found), encoding="utf-8")
-        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+        refresh.refreshed()
     assert golden_text.write(case, found) == text
 
 

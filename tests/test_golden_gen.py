@@ -4,15 +4,14 @@
 that the changes are looked at. The support package is the same in all cases and not among them.
 """
 
-import os
 import random
 import shutil
 import subprocess
 import sys
-from fnmatch import fnmatch
 
 import generated
 import pytest
+import refresh
 import values
 
 from idlc.emit.render import PACKAGE, render_package
@@ -20,7 +19,6 @@ from idlc.model import derive
 
 FOLDER = generated.ROOT / "golden" / "gen"
 CASES = sorted(path for path in FOLDER.iterdir() if path.is_dir())
-REFRESH = os.environ.get("IDLC_REFRESH", "")
 EACH = pytest.mark.parametrize("case", CASES, ids=lambda path: path.name)
 
 
@@ -44,12 +42,12 @@ def outputs(case):
 def test_golden_tree(case):
     found = outputs(case)
     out = case / "out"
-    if REFRESH and fnmatch(f"gen/{case.name}", REFRESH):
+    if refresh.wanted(f"gen/{case.name}"):
         shutil.rmtree(out, ignore_errors=True)
         for path, text in found.items():
             (out / path).parent.mkdir(parents=True, exist_ok=True)
             (out / path).write_text(text, encoding="utf-8")
-        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+        refresh.refreshed()
     wanted = {
         path.relative_to(out).as_posix(): path.read_text(encoding="utf-8")
         for path in out.rglob("*")

@@ -4,15 +4,14 @@
 match, and fails, so that the changes are looked at.
 """
 
-import os
 import shlex
 import shutil
 import subprocess
 import sys
-from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
+import refresh
 from catkin_pkg.package import parse_package
 
 from idlc.cli.main import main
@@ -20,7 +19,6 @@ from idlc.cli.main import main
 ROOT = Path(__file__).parents[1]
 GOLDEN = ROOT / "golden" / "scaffold"
 CASES = sorted(path.parent for path in GOLDEN.glob("*/commands"))
-REFRESH = os.environ.get("IDLC_REFRESH", "")
 
 
 def tree(folder: Path) -> dict[str, str]:
@@ -57,10 +55,10 @@ def test_golden_tree(case, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     carry_out(commands, monkeypatch)
     assert tree(tmp_path) == found, "the second time changed something"
-    if REFRESH and fnmatch(f"scaffold/{case.name}", REFRESH):
+    if refresh.wanted(f"scaffold/{case.name}"):
         shutil.rmtree(case / "out", ignore_errors=True)
         shutil.copytree(tmp_path, case / "out")
-        pytest.fail("refreshed: look at the difference, then run again without IDLC_REFRESH")
+        refresh.refreshed()
     expected = tree(case / "out")
     assert sorted(found) == sorted(expected)
     for path, text in expected.items():

@@ -98,6 +98,9 @@ class _Encoder:
     def fixed(self, step: layout.Step) -> None:
         """Add a value of fixed size to the frame."""
         match step:
+            case layout.Number(place, "?"):
+                truths = self.tables.function("truths", "TRUTHS")
+                self.field("?", 1, 1, f"{truths}[{place.text}]")
             case layout.Number(place, letter, size):
                 self.field(letter, size, size, place.text)
             case layout.Block(place, primitive, count):

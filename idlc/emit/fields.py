@@ -16,11 +16,16 @@ BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
 
 
 class FieldView(msgspec.Struct, frozen=True):
-    """A field: its line in the class, its parameter, and the lines that store it."""
+    """A field: its line in the class, its parameter, and the lines that store it.
+
+    `doubt` is true, in the constructor, for an argument that is perhaps not of the field's type.
+    A field of numbers has none, because it converts what it is given.
+    """
 
     declaration: str
     parameter: str
     stores: tuple[str, ...]
+    doubt: str = ""
 
 
 def shadows(structure: ir.Message) -> bool:
@@ -81,21 +86,28 @@ def view(field: ir.Field, references: References, receiver: str, qualify: bool) 
             f"{name}: {annotation}",
             f"{name}: {annotation} = {default}",
             tuple(assign(slot, name, 8)),
+            f"{name}.__class__ is not {annotation}",
         )
     if needs:
         return _numeric(field, name, slot)
     if isinstance(field.type, ir.Ref):
         annotation = _element(field.type, references)
         fresh = _fresh_message(field.type.target, references)
+        known = "" if field.type.target in references.implied else annotation
     else:
         element = _element(ir.element_of(field.type), references)
         inner = prefix + element if element in BUILTINS else element
         annotation = f"{prefix}list[{inner}]"
         fresh = _fresh_list(field, references)
+        known = f"{prefix}list"
+    doubt = f"{name} is not None"
+    if known:
+        doubt = f"({doubt} and {name}.__class__ is not {known})"
     return FieldView(
         f"{name}: {annotation}",
         f"{name}: {annotation} | None = None",
         tuple(_store(slot, name, fresh, name)),
+        doubt,
     )
 
 
@@ -197,12 +209,12 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
         code = f'"{field.type.element.info.code}"'
         values = "_idlc.Floats" if kind.startswith("Float") else "_idlc.Integers"
         declaration = f"{name}: _idlc.{kind} = _idlc.{kind}()"
-        given = call("_idlc.to_array", code, name)
+        given = call("_idlc.to_array", code, name, f'"{name}"')
     else:
         dtype = f"_arrays.{numpy_name(field.type.element.name).upper()}"
         values = "_arrays.Values"
         declaration = f"{name}: _arrays.{kind} = _arrays.{kind}({field.type.size})"
-        given = call("_arrays.to_ndarray", dtype, str(field.type.size), name)
+        given = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
     return FieldView(
         declaration, f"{name}: {values} | None = None", tuple(_store(slot, name, fresh, given))
     )

@@ -91,6 +91,24 @@ def all_of(conditions: list[str], indent: int) -> list[str]:
     return [f"{margin}return (", *(f"{margin}    {one}" for one in inner), f"{margin})"]
 
 
+def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
+    """Return the head of an `if`: one of the conditions, and the call `rest`."""
+    margin = " " * indent
+    if len(conditions) == 1:
+        return lines(rest, indent, f"if {conditions[0]} and ", ":")
+    either = " or ".join(conditions)
+    before = f"if ({either}) and "
+    if len(margin) + len(before) + len(rest.before) < WIDTH:
+        result = lines(rest, indent, before, ":")
+        items = ", ".join(map(flat, rest.items))
+        return result if len(result) == 1 else [result[0], f"{margin}    {items}", result[-1]]
+    inner = [either]
+    if len(margin) + 4 + len(either) > WIDTH:
+        inner = [conditions[0], *(f"or {one}" for one in conditions[1:])]
+    end = f"{margin}) and {flat(rest)}:"
+    return [f"{margin}if (", *(f"{margin}    {one}" for one in inner), end]
+
+
 def assign(target: Node, value: Node, indent: int) -> list[str]:
     """Return an assignment as lines; a tuple of targets is a Group without `before`."""
     margin = " " * indent

@@ -11,7 +11,7 @@ import msgspec
 from idlc.emit import code, documentation, fields, groups, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
-from idlc.emit.pretty import WIDTH, Group, all_of, assign, call, lines
+from idlc.emit.pretty import WIDTH, Group, all_of, assign, call, if_any, lines
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -206,13 +206,17 @@ def _receiver(structure: ir.Message) -> str:
 
 def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
     """Return the constructor."""
-    if not structure.fields:
-        return ["    def __init__(self) -> None:", "        pass"]
+    receiver = _receiver(structure)
+    options = "_options" if any(f.name == "options" for f in structure.fields) else "options"
+    doubts = [options, *(view.doubt for view in views[:1] if view.doubt)]
     return [
         "    def __init__(",
-        f"        {_receiver(structure)},",
+        f"        {receiver},",
         *(f"        {view.parameter}," for view in views),
+        f"        **{options}: _idlc.Unpack[_idlc.Options],",
         "    ) -> None:",
+        *if_any(doubts, call("_idlc.construct", receiver, options, "locals()"), 8),
+        "            return",
         *(line for view in views for line in view.stores),
     ]
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from .cdr import NATIVE
+from .names import name_of
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -22,19 +23,30 @@ if TYPE_CHECKING:
 Element = TypeVar("Element", bound="np.generic")
 
 
-def to_ndarray(dtype: Any, size: int, values: Any) -> Any:
-    """Return `values` as an array of `size` elements: themselves if they are one, else a copy.
+def to_ndarray(dtype: Any, size: int, values: Any, name: str) -> Any:
+    """Return `values` as a new array of `size` elements, as rosidl's classes do.
 
-    Raises ValueError for another size, TypeError or OverflowError for what does not fit.
+    Raises FieldTypeError, FieldRangeError or ValidationError with the `name` of the field.
     """
-    if type(values) is np.ndarray and values.dtype is dtype and values.shape == (size,):
-        return values
+    try:
+        return converted(dtype, size, values)
+    except (TypeError, ValueError, OverflowError) as error:
+        failure = error
+    from .validation import refused
+
+    raise refused(name, dtype.name, size, values, failure) from None
+
+
+def converted(dtype: Any, size: int, values: Any) -> Any:
+    """Return the same; errors are those of numpy, and ValueError for another size."""
+    if dtype.itemsize == 1 and isinstance(values, bytes):
+        values = bytearray(values)
     result = np.array(values, dtype)
-    if result.shape != (size,):
-        raise ValueError(
-            f"needs an array of {size} elements, not of shape {result.shape}"
-        )
-    return result
+    if result.shape == (size,):
+        return result
+    if result.shape[:1] == (size,) and result.size == size:  # a column
+        return result.reshape(size)
+    raise ValueError(f"needs an array of {size} elements, not of shape {result.shape}")
 
 
 INT8 = np.dtype("int8")
@@ -66,10 +78,11 @@ class NumberArray(Generic[Element]):
     def property_of(self, slot: Any) -> property:
         """Return the property over the slot member `slot`."""
         dtype, size = self.dtype, self.size
+        name = name_of(slot)
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
-            store(message, to_ndarray(dtype, size, values))
+            store(message, to_ndarray(dtype, size, values, name))
 
         return property(slot.__get__, setter)
 
@@ -149,10 +162,10 @@ def array_writer(order: str, name: str, size: int) -> Callable[[Any], bytes]:
     def native(values: Any) -> bytes:
         if type(values) is ndarray and values.dtype is dtype and len(values) == size:
             return values.tobytes()
-        return to_ndarray(dtype, size, values).tobytes()  # type: ignore[no-any-return]
+        return converted(dtype, size, values).tobytes()  # type: ignore[no-any-return]
 
     def swapped(values: Any) -> bytes:
-        return to_ndarray(dtype, size, values).byteswap().tobytes()  # type: ignore[no-any-return]
+        return converted(dtype, size, values).byteswap().tobytes()  # type: ignore[no-any-return]
 
     return native if order == NATIVE or dtype.itemsize == 1 else swapped
 

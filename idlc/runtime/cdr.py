@@ -98,14 +98,31 @@ def text_phases(order: str, fields: str, align: int = 1) -> tuple[Texts, ...]:
     return tuple(Texts(order, fields, start, align) for start in range(8))
 
 
-def flags(values: Iterable[object]) -> bytes:
+#: What a bool may be: True, False, 1 and 0, also of numpy. Nothing else is looked at for its truth.
+TRUTHS = {False: False, True: True}
+_truth = TRUTHS.__getitem__
+
+
+def flags(values: Iterable[Any]) -> bytes:
     """Return one byte per bool."""
-    return bytes(map(bool, values))
+    return bytes(map(_truth, values))
 
 
-def octets(values: Iterable[bytes]) -> bytes:
-    """Return one byte per `bytes` of length 1."""
-    return bytes(map(ord, values))
+def octets(values: Any) -> bytes:
+    """Return one byte per `bytes` of length 1, or the bytes of a buffer."""
+    if type(values) is not list:
+        try:
+            view = memoryview(values)
+        except TypeError:
+            values = list(values)
+        else:
+            if view.itemsize != 1:
+                raise ValueError("elements of more than one byte")
+            return view.tobytes()
+    raw = b"".join(values)
+    if len(raw) != len(values) or set(map(len, values)) - {1}:
+        raise ValueError("bytes of another length than 1")
+    return raw
 
 
 def read_flags(raw: bytes | memoryview) -> list[bool]:
@@ -120,7 +137,7 @@ def read_octets(raw: bytes | memoryview) -> list[bytes]:
     return values
 
 
-def flags_writer(size: int) -> Callable[[Iterable[object]], bytes]:
+def flags_writer(size: int) -> Callable[[Iterable[Any]], bytes]:
     """Return a function that writes exactly `size` bools."""
     return _exactly(size, flags)
 

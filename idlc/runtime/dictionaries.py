@@ -57,11 +57,10 @@ def _from_dict(kind: Any, name: str, values: Any, path: str) -> Any:
     for key, value in values.items():
         field = known.get(key)
         if field is None:
-            raise ValidationError(
-                _join(path, key), _unknown(name, key, list(known)), value
-            )
+            problem = f"{name} has no such field{close(str(key), list(known))}"
+            raise ValidationError(_join(path, key), "absent", value, problem)
         place = _join(path, field.public)
-        _set(message, field, _value(value, field, place), place)
+        _set(message, field, _value(value, field, place), path)
     return message
 
 
@@ -69,21 +68,17 @@ def _join(path: str, name: object) -> str:
     return f"{path}.{name}" if path else str(name)
 
 
-def _unknown(name: str, key: object, known: list[str]) -> str:
-    close = get_close_matches(str(key), known, 1)
-    hint = (
-        f"did you mean {close[0]!r}?"
-        if close
-        else f"known are {', '.join(known) or 'none'}"
-    )
-    return f"absent: {name} has no such field ({hint})"
+def close(name: str, known: list[str]) -> str:
+    """Return which known name was perhaps meant, in words that follow a statement."""
+    found = get_close_matches(name, known, 1)
+    return f"; did you mean {found[0]!r}?" if found else ""
 
 
 def _set(message: Any, field: FieldInfo, value: Any, path: str) -> None:
     try:
         setattr(message, field.public, value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValidationError(path, f"acceptable ({error})", value) from None
+    except ValidationError as error:
+        raise error.at(_join(path, error.path), ValidationError) from None
 
 
 def _value(value: Any, field: FieldInfo, path: str) -> Any:

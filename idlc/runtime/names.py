@@ -9,6 +9,10 @@ from __future__ import annotations
 
 from keyword import iskeyword
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 #: What a message class offers itself, and what it must not lose to a field.
 RESERVED = frozenset(
     {
@@ -38,3 +42,9 @@ def slot_name(field: str) -> str:
     """Return the slot that holds a field's value, named as rosidl names it."""
     slot = "_" + field
     return slot + "_" if slot in RESERVED_SLOTS else slot
+
+
+def name_of(slot: Any) -> str:
+    """Return the public name of the field that a slot's member descriptor holds."""
+    name: str = slot.__name__
+    return public_name(name[1:].removesuffix("_"))

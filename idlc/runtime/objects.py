@@ -15,6 +15,11 @@ ATOMIC = frozenset({bool, bytes, float, int, str})
 SMALL = 64
 
 
+def owner_of(kind: type) -> Any:
+    """Return the generated class that a class is, or that a user's class derives from."""
+    return next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+
+
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     if type(mine) is array and type(other) is array:

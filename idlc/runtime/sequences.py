@@ -6,6 +6,7 @@ from array import array
 
 from .cdr import NATIVE
 from .generics import Generic, TypeVar
+from .names import name_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -34,25 +35,41 @@ TYPE_CODES = {
 SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
 
 
-def to_array(code: str, values: Any) -> Any:
-    """Return `values` as an array of type `code`: themselves if they are one, else a copy.
+#: What `array` itself takes as rosidl means it: the memory of bytes, the elements of others.
+_TAKEN = (list, tuple, array, bytes, bytearray)
 
-    Buffers of the same type (of numpy, memoryview, bytes for uint8) are copied whole.
-    Raises TypeError or OverflowError for what does not fit, as `array.array` does.
+
+def to_array(code: str, values: Any, name: str) -> Any:
+    """Return `values` as a new array of type `code`, as rosidl's classes do.
+
+    Bytes are the memory of the elements. Buffers of the same type (of numpy, memoryview) are
+    copied whole. Raises FieldTypeError, FieldRangeError or ValidationError with the `name` of
+    the field.
     """
-    if type(values) is array and values.typecode == code:
-        return values
-    result = array(code)
+    try:
+        return converted(code, values)
+    except (TypeError, ValueError, OverflowError) as error:
+        failure = error
+    from .validation import refused
+
+    raise refused(name, code, None, values, failure) from None
+
+
+def converted(code: str, values: Any) -> Any:
+    """Return the same; errors are those of `array`."""
+    if isinstance(values, _TAKEN):
+        return array(code, values)
     try:
         view = memoryview(values)
     except TypeError:
-        result.extend(values)
-        return result
-    if view.ndim == 1 and SAME_NUMBER.get(view.format, view.format) == code:
-        if view.nbytes:
-            result.frombytes(view.cast("B") if view.c_contiguous else view.tobytes())
-    else:
-        result.extend(values.tolist() if hasattr(values, "tolist") else values)
+        return array(code, values)
+    if view.ndim != 1:
+        return array(code, values)
+    if SAME_NUMBER.get(view.format, view.format) != code:
+        return array(code, values.tolist() if hasattr(values, "tolist") else values)
+    result = array(code)
+    if view.nbytes:
+        result.frombytes(view.cast("B") if view.c_contiguous else view.tobytes())
     return result
 
 
@@ -67,10 +84,11 @@ class NumberSequence(Generic[Number]):
     def property_of(self, slot: Any) -> property:
         """Return the property over the slot member `slot`."""
         code = self.code
+        name = name_of(slot)
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
-            store(message, to_array(code, values))
+            store(message, to_array(code, values, name))
 
         return property(slot.__get__, setter)
 
@@ -146,10 +164,10 @@ def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:
     """Return a function that turns a field's value into a buffer in the wire's byte order."""
 
     def native(values: Any) -> Any:
-        return values if type(values) is array else to_array(code, values)
+        return values if type(values) is array else converted(code, values)
 
     def swapped(values: Any) -> Any:
-        result = array(code, to_array(code, values))
+        result = array(code, converted(code, values))
         result.byteswap()
         return result
 

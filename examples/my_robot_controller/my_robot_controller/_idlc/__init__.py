@@ -13,6 +13,7 @@ from .cdr import (
     PAD2,
     PAD4,
     PAD8,
+    TRUTHS,
     Texts,
     flags,
     flags_writer,
@@ -25,6 +26,7 @@ from .cdr import (
     text_phases,
 )
 from .codec import Codec, Reading, codec_for, maker
+from .construction import construct
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Service, make, several
 from .loading import lazily
@@ -64,10 +66,20 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from typing import Any as Any
     from typing import TypeAlias as TypeAlias
+    from typing import TypedDict
+
+    from typing_extensions import Unpack as Unpack
 
     #: What numeric sequences take.
     Integers: TypeAlias = Iterable[int]
     Floats: TypeAlias = Iterable[float]
+
+    class Options(TypedDict, total=False):
+        """What every constructor takes besides the fields."""
+
+        #: Raise AssertionError when a wrong value is assigned, as rosidl's classes do.
+        check_fields: bool
+
 
 __all__ = [
     "ENDS",
@@ -76,6 +88,7 @@ __all__ = [
     "PAD2",
     "PAD4",
     "PAD8",
+    "TRUTHS",
     "Action",
     "Codec",
     "DecodeError",
@@ -99,6 +112,7 @@ __all__ = [
     "ValidationError",
     "array",
     "codec_for",
+    "construct",
     "dataclass",
     "flags",
     "flags_writer",

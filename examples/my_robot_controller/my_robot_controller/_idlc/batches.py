@@ -38,8 +38,7 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
         index = len(result)
         found = encode_error(messages[index], byteorder, error)
         if isinstance(found, ValidationError):
-            path = f"[{index}].{found.path}"
-            raise ValidationError(path, found.allowed, found.value) from error
+            raise found.at(f"[{index}].{found.path}") from error
         raise found from error
     return result
 

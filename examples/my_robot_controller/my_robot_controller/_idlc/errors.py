@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 
 class DecodeError(ValueError):
     """Bytes that are not a message of the expected type.
@@ -24,20 +28,43 @@ class DecodeError(ValueError):
 class ValidationError(ValueError):
     """A value that its field cannot hold.
 
-    `path` names the field, `allowed` says what it can hold, `value` is what it holds.
+    `path` names the field, `allowed` says what it can hold, `value` is what it holds. A
+    `problem` is told instead of "must be `allowed`, not `value`".
     """
 
-    def __init__(self, path: str, allowed: str, value: object) -> None:
-        super().__init__(path, allowed, value)
+    def __init__(
+        self, path: str, allowed: str, value: object, problem: str = ""
+    ) -> None:
+        super().__init__(path, allowed, value, problem)
         self.path = path
         self.allowed = allowed
         self.value = value
+        self.problem = problem
 
     def __str__(self) -> str:
+        where = f"{self.path}: " if self.path else ""
+        if self.problem:
+            return where + self.problem
         text = repr(self.value)
         if len(text) > 80:
             text = text[:77] + "..."
-        return f"{self.path}: must be {self.allowed}, not {text}"
+        return f"{where}must be {self.allowed}, not {text}"
+
+    def at(self, path: str, kind: type[ValidationError] | None = None) -> Any:
+        """Return the same error for another path, or of another kind."""
+        return (kind or type(self))(path, self.allowed, self.value, self.problem)
+
+
+class FieldTypeError(ValidationError, TypeError):
+    """A value of the wrong type, found when it was assigned."""
+
+
+class FieldRangeError(ValidationError, OverflowError):
+    """A number that is too large or too small, found when it was assigned."""
+
+
+class FieldCheckError(ValidationError, AssertionError):
+    """What `check_fields` refuses; rosidl's classes raise AssertionError."""
 
 
 class importing:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from array import array
 
 from . import codec
+from .construction import CHECK_FIELDS, call_checked, is_checked
 from .generics import Generic, TypeVar
 from .names import public_name, slot_name
 from .objects import copied, deeply_copied
@@ -148,6 +149,17 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES = _SlotTypes()
         __dataclass_fields__ = _DataclassFields()
 
+    @property
+    def _check_fields(self) -> bool:
+        """Whether the message checks each value when it is assigned, as in rosidl."""
+        return is_checked(type(self))
+
+    @_check_fields.setter
+    def _check_fields(self, check: bool) -> None:
+        from .checked import become_checked
+
+        become_checked(self, check)
+
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
         """Return the IDL type of each field, by its name on the wire."""
@@ -263,6 +275,9 @@ class Message(metaclass=MessageMeta):
         package = kind.__module__.rpartition(".")[0]
         return f"{package}.{kind.__name__}({', '.join(parts)})"
 
+
+if CHECK_FIELDS:
+    MessageMeta.__call__ = call_checked  # type: ignore[assignment]
 
 __all__ = [
     "Fresh",

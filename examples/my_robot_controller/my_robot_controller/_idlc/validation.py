@@ -6,8 +6,8 @@ import math
 from array import array
 from typing import Any
 
-from .errors import ValidationError
-from .typeinfo import FieldInfo, Primitive, fields_of, type_name
+from .errors import FieldRangeError, FieldTypeError, ValidationError
+from .typeinfo import PRIMITIVES, FieldInfo, Primitive, fields_of, type_name
 
 
 def validate(message: Any, *, wire_only: bool = False) -> None:
@@ -16,6 +16,12 @@ def validate(message: Any, *, wire_only: bool = False) -> None:
     `wire_only` leaves out what the wire does not enforce: the bounds of strings.
     """
     _message(message, type_name(type(message)), "", wire_only)
+
+
+def validate_field(value: Any, field: FieldInfo) -> None:
+    """Raise ValidationError if a field, which is named by its path, cannot hold a value."""
+    check = _list if field.is_list else _element
+    check(value, field, field.public, wire_only=True)
 
 
 def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
@@ -31,15 +37,13 @@ def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
 
 
 def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if isinstance(values, (str, dict, set)) or not hasattr(values, "__len__"):
+    if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
         raise ValidationError(path, "a sequence", values)
     if field.size is not None and len(values) != field.size:
-        raise ValidationError(
-            path, f"{field.size} elements, it has {len(values)}", values
-        )
+        problem = f"has {counted(len(values), 'element')}, needs {field.size}"
+        raise ValidationError(path, f"{field.size} elements", values, problem)
     if field.bound is not None and len(values) > field.bound:
-        allowed = f"at most {field.bound} elements, it has {len(values)}"
-        raise ValidationError(path, allowed, values)
+        _too_many(path, "element", len(values), field.bound, values)
     if field.primitive is not None and _holds(values, field.primitive):
         return
     for index, value in enumerate(values):
@@ -47,7 +51,9 @@ def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
 
 
 def _holds(values: Any, primitive: Primitive) -> bool:
-    """Whether an array's own type already says that all elements fit."""
+    """Return whether an array's own type already says that all elements fit."""
+    if primitive.code == "c":
+        return isinstance(values, (bytes, bytearray))
     if isinstance(values, array):
         return values.typecode == primitive.code
     dtype = getattr(values, "dtype", None)
@@ -72,16 +78,23 @@ def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
     except UnicodeEncodeError:
         raise ValidationError(path, "a str without lone surrogates", value) from None
     if not wire_only and field.text_bound is not None and len(value) > field.text_bound:
-        allowed = f"at most {field.text_bound} characters, it has {len(value)}"
-        raise ValidationError(path, allowed, value)
+        _too_many(path, "character", len(value), field.text_bound, value)
+
+
+def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
+    problem = f"has {counted(count, what)}, at most {bound} are allowed"
+    raise ValidationError(path, f"at most {counted(bound, what)}", value, problem)
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f"{count} {what}{'s' * (count != 1)}"
 
 
 def _primitive(value: Any, primitive: Primitive, path: str) -> None:
     if primitive.code == "?":
-        if not isinstance(value, (bool, int)) and type(value).__name__ not in {
-            "bool_",
-            "bool",
-        }:
+        number = isinstance(value, (int, float)) and value in (0, 1)
+        if not number and type(value).__name__ not in {"bool_", "bool"}:
             raise ValidationError(path, "a bool", value)
     elif primitive.code == "c":
         if not isinstance(value, bytes) or len(value) != 1:
@@ -118,3 +131,34 @@ def _float(value: Any, primitive: Primitive, path: str) -> None:
             f"a number from {primitive.low} to {primitive.high} ({primitive.name})"
         )
         raise ValidationError(path, allowed, value)
+
+
+def refused(
+    name: str, kind: str, size: int | None, values: Any, error: Exception
+) -> ValidationError:
+    """Return the error for values that a field of numbers does not take.
+
+    `kind` is the name of their type, or its code in `struct`. `error` is what Python or
+    numpy said, and one of its kind is returned: rosidl's classes raise that.
+    """
+    primitive = next(one for one in PRIMITIVES.values() if kind in (one.code, one.name))
+    field = FieldInfo(name, primitive, False, False, None, "", size, size is None, None)
+    found = ValidationError(
+        name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
+    )
+    if isinstance(values, (bytes, bytearray)) and size is None:
+        problem = (
+            f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
+        )
+        found = ValidationError(name, "whole numbers of bytes", values, problem)
+    elif isinstance(values, (list, tuple)) or not hasattr(values, "__len__"):
+        try:
+            _list(values, field, name, wire_only=True)
+        except ValidationError as exact:
+            found = exact
+    raised = ValidationError
+    if isinstance(error, OverflowError):
+        raised = FieldRangeError
+    elif isinstance(error, TypeError) or isinstance(values, (str, dict)):
+        raised = FieldTypeError
+    return found.at(found.path, raised)  # type: ignore[no-any-return]

@@ -30,7 +30,12 @@ class Countdown_Goal(_idlc.Message):
     def __init__(
         self,
         target_count: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or target_count.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._target_count = target_count
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -80,7 +85,12 @@ class Countdown_Result(_idlc.Message):
         self,
         final_count: int = 0,
         success: bool = False,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or final_count.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._final_count = final_count
         self._success = success
 
@@ -96,12 +106,13 @@ class Countdown_Result(_idlc.Message):
 def _countdown__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4si?").pack
     new_countdown_result = _idlc.maker(Countdown_Result)
     read_1 = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._final_count, message._success)]
+        return [write_1(encapsulation, message._final_count, truths[message._success])]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_result()
@@ -127,7 +138,12 @@ class Countdown_Feedback(_idlc.Message):
     def __init__(
         self,
         current_count: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or current_count.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._current_count = current_count
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -179,7 +195,12 @@ class Countdown_SendGoal_Request(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         goal: Countdown_Goal | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -254,7 +275,12 @@ class Countdown_SendGoal_Response(_idlc.Message):
         self,
         accepted: bool = False,
         stamp: Time | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or accepted.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._accepted = accepted
         if stamp is None:
             self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
@@ -278,6 +304,7 @@ def _countdown__send_goal__response_codec(
         from builtin_interfaces.msg import Time
 
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4s?iI").pack
     new_countdown_send_goal_response = _idlc.maker(Countdown_SendGoal_Response)
     new_time = _idlc.maker(Time)
@@ -285,7 +312,14 @@ def _countdown__send_goal__response_codec(
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         stamp = message._stamp
-        return [write_1(encapsulation, message._accepted, stamp._sec, stamp._nanosec)]
+        return [
+            write_1(
+                encapsulation,
+                truths[message._accepted],
+                stamp._sec,
+                stamp._nanosec,
+            ),
+        ]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_send_goal_response()
@@ -325,7 +359,10 @@ class Countdown_SendGoal_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[Countdown_SendGoal_Request] | None = None,
         response: list[Countdown_SendGoal_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -358,6 +395,7 @@ def _countdown__send_goal__event_codec(
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16Bi").pack
     write_3 = _idlc.layout(order, "I").pack
+    truths = _idlc.TRUTHS
     write_4 = _idlc.layout(order, "?iI").pack
     new_countdown_send_goal_event = _idlc.maker(Countdown_SendGoal_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -400,7 +438,13 @@ def _countdown__send_goal__event_codec(
         put(write_3(len(response)))
         for item_2 in response:
             item_2_stamp = item_2._stamp
-            put(write_4(item_2._accepted, item_2_stamp._sec, item_2_stamp._nanosec))
+            put(
+                write_4(
+                    truths[item_2._accepted],
+                    item_2_stamp._sec,
+                    item_2_stamp._nanosec,
+                ),
+            )
         return parts
 
     def decode(data: _idlc.Any) -> _idlc.Any:
@@ -472,7 +516,12 @@ class Countdown_GetResult_Request(_idlc.Message):
     def __init__(
         self,
         goal_id: UUID | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -538,7 +587,12 @@ class Countdown_GetResult_Response(_idlc.Message):
         self,
         status: int = 0,
         result: Countdown_Result | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or status.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._status = status
         self._result = Countdown_Result() if result is None else result
 
@@ -554,6 +608,7 @@ def _countdown__get_result__response_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Countdown_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4sbi?").pack
     new_countdown_get_result_response = _idlc.maker(Countdown_GetResult_Response)
     new_countdown_result = _idlc.maker(Countdown_Result)
@@ -566,7 +621,7 @@ def _countdown__get_result__response_codec(
                 encapsulation,
                 message._status,
                 result._final_count,
-                result._success,
+                truths[result._success],
             ),
         ]
 
@@ -608,7 +663,10 @@ class Countdown_GetResult_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[Countdown_GetResult_Request] | None = None,
         response: list[Countdown_GetResult_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -641,6 +699,7 @@ def _countdown__get_result__event_codec(
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16B", start=4).pack
     write_3 = _idlc.layout(order, "I").pack
+    truths = _idlc.TRUTHS
     write_4 = _idlc.phases(order, "bi?")
     new_countdown_get_result_event = _idlc.maker(Countdown_GetResult_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -688,7 +747,7 @@ def _countdown__get_result__event_codec(
                 write_4[low & 3].pack(
                     item_2._status,
                     result._final_count,
-                    result._success,
+                    truths[result._success],
                 ),
             )
             low = 1
@@ -769,7 +828,12 @@ class Countdown_FeedbackMessage(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         feedback: Countdown_Feedback | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:

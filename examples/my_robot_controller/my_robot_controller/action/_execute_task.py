@@ -30,7 +30,12 @@ class ExecuteTask_Goal(_idlc.Message):
     def __init__(
         self,
         task_name: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or task_name.__class__ is not str) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._task_name = task_name
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -81,7 +86,12 @@ class ExecuteTask_Result(_idlc.Message):
     def __init__(
         self,
         success: bool = False,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or success.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._success = success
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -94,12 +104,13 @@ class ExecuteTask_Result(_idlc.Message):
 def _execute_task__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4s?").pack
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
     read_1 = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._success)]
+        return [write_1(encapsulation, truths[message._success])]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_result()
@@ -125,7 +136,12 @@ class ExecuteTask_Feedback(_idlc.Message):
     def __init__(
         self,
         current_status: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or current_status.__class__ is not str) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._current_status = current_status
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -190,7 +206,12 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         goal: ExecuteTask_Goal | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -277,7 +298,12 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
         self,
         accepted: bool = False,
         stamp: Time | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or accepted.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._accepted = accepted
         if stamp is None:
             self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
@@ -301,6 +327,7 @@ def _execute_task__send_goal__response_codec(
         from builtin_interfaces.msg import Time
 
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4s?iI").pack
     new_execute_task_send_goal_response = _idlc.maker(ExecuteTask_SendGoal_Response)
     new_time = _idlc.maker(Time)
@@ -308,7 +335,14 @@ def _execute_task__send_goal__response_codec(
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         stamp = message._stamp
-        return [write_1(encapsulation, message._accepted, stamp._sec, stamp._nanosec)]
+        return [
+            write_1(
+                encapsulation,
+                truths[message._accepted],
+                stamp._sec,
+                stamp._nanosec,
+            ),
+        ]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_send_goal_response()
@@ -348,7 +382,10 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[ExecuteTask_SendGoal_Request] | None = None,
         response: list[ExecuteTask_SendGoal_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -381,6 +418,7 @@ def _execute_task__send_goal__event_codec(
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.text_phases(order, "16BI*")
     write_3 = _idlc.phases(order, "I")
+    truths = _idlc.TRUTHS
     write_4 = _idlc.layout(order, "?iI").pack
     new_execute_task_send_goal_event = _idlc.maker(ExecuteTask_SendGoal_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -434,7 +472,13 @@ def _execute_task__send_goal__event_codec(
         put(write_3[low & 3].pack(len(response)))
         for item_2 in response:
             item_2_stamp = item_2._stamp
-            put(write_4(item_2._accepted, item_2_stamp._sec, item_2_stamp._nanosec))
+            put(
+                write_4(
+                    truths[item_2._accepted],
+                    item_2_stamp._sec,
+                    item_2_stamp._nanosec,
+                ),
+            )
         return parts
 
     def decode(data: _idlc.Any) -> _idlc.Any:
@@ -512,7 +556,12 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
     def __init__(
         self,
         goal_id: UUID | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -578,7 +627,12 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
         self,
         status: int = 0,
         result: ExecuteTask_Result | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or status.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._status = status
         self._result = ExecuteTask_Result() if result is None else result
 
@@ -594,6 +648,7 @@ def _execute_task__get_result__response_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_GetResult_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4sb?").pack
     new_execute_task_get_result_response = _idlc.maker(ExecuteTask_GetResult_Response)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
@@ -601,7 +656,7 @@ def _execute_task__get_result__response_codec(
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         result = message._result
-        return [write_1(encapsulation, message._status, result._success)]
+        return [write_1(encapsulation, message._status, truths[result._success])]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_get_result_response()
@@ -641,7 +696,10 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[ExecuteTask_GetResult_Request] | None = None,
         response: list[ExecuteTask_GetResult_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -674,6 +732,7 @@ def _execute_task__get_result__event_codec(
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16B", start=4).pack
     write_3 = _idlc.layout(order, "I").pack
+    truths = _idlc.TRUTHS
     write_4 = _idlc.layout(order, "b?", start=4).pack
     new_execute_task_get_result_event = _idlc.maker(ExecuteTask_GetResult_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -701,7 +760,10 @@ def _execute_task__get_result__event_codec(
         if len(response) > 1:
             raise ValueError("too many elements")
         response_block = b"".join(
-            [write_4(item_2._status, item_2._result._success) for item_2 in response],
+            [
+                write_4(item_2._status, truths[item_2._result._success])
+                for item_2 in response
+            ],
         )
         return [
             write_1(
@@ -790,7 +852,12 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         feedback: ExecuteTask_Feedback | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:

@@ -48,7 +48,12 @@ class RobotCommand(_idlc.Message):
         linear_velocity_x: float = 0.0,
         angular_velocity_z: float = 0.0,
         frame_id: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or command_type.__class__ is not str) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._command_type = command_type
         self._linear_velocity_x = linear_velocity_x
         self._angular_velocity_z = angular_velocity_z

@@ -31,7 +31,12 @@ class AddTwoInts_Request(_idlc.Message):
         self,
         a: int = 0,
         b: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or a.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._a = a
         self._b = b
 
@@ -76,7 +81,12 @@ class AddTwoInts_Response(_idlc.Message):
     def __init__(
         self,
         sum: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or sum.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._sum = sum
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -132,7 +142,10 @@ class AddTwoInts_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[AddTwoInts_Request] | None = None,
         response: list[AddTwoInts_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:

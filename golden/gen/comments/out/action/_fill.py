@@ -30,7 +30,12 @@ class Fill_Goal(_idlc.Message):
     def __init__(
         self,
         level: float = 0.0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or level.__class__ is not float) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._level = level
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -74,7 +79,12 @@ class Fill_Result(_idlc.Message):
     def __init__(
         self,
         reached: float = 0.0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or reached.__class__ is not float) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._reached = reached
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -118,7 +128,12 @@ class Fill_Feedback(_idlc.Message):
     def __init__(
         self,
         level: float = 0.0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or level.__class__ is not float) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._level = level
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -167,7 +182,12 @@ class Fill_SendGoal_Request(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         goal: Fill_Goal | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -238,7 +258,12 @@ class Fill_SendGoal_Response(_idlc.Message):
         self,
         accepted: bool = False,
         stamp: Time | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or accepted.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._accepted = accepted
         if stamp is None:
             self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
@@ -260,6 +285,7 @@ def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idl
         from builtin_interfaces.msg import Time
 
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4s?iI").pack
     new_fill_send_goal_response = _idlc.maker(Fill_SendGoal_Response)
     new_time = _idlc.maker(Time)
@@ -267,7 +293,14 @@ def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idl
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
         stamp = message._stamp
-        return [write_1(encapsulation, message._accepted, stamp._sec, stamp._nanosec)]
+        return [
+            write_1(
+                encapsulation,
+                truths[message._accepted],
+                stamp._sec,
+                stamp._nanosec,
+            ),
+        ]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_send_goal_response()
@@ -307,7 +340,10 @@ class Fill_SendGoal_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[Fill_SendGoal_Request] | None = None,
         response: list[Fill_SendGoal_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -338,6 +374,7 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16Bf").pack
     write_3 = _idlc.layout(order, "I").pack
+    truths = _idlc.TRUTHS
     write_4 = _idlc.layout(order, "?iI").pack
     new_fill_send_goal_event = _idlc.maker(Fill_SendGoal_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -380,7 +417,13 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
         put(write_3(len(response)))
         for item_2 in response:
             item_2_stamp = item_2._stamp
-            put(write_4(item_2._accepted, item_2_stamp._sec, item_2_stamp._nanosec))
+            put(
+                write_4(
+                    truths[item_2._accepted],
+                    item_2_stamp._sec,
+                    item_2_stamp._nanosec,
+                ),
+            )
         return parts
 
     def decode(data: _idlc.Any) -> _idlc.Any:
@@ -452,7 +495,12 @@ class Fill_GetResult_Request(_idlc.Message):
     def __init__(
         self,
         goal_id: UUID | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:
@@ -516,7 +564,12 @@ class Fill_GetResult_Response(_idlc.Message):
         self,
         status: int = 0,
         result: Fill_Result | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or status.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._status = status
         self._result = Fill_Result() if result is None else result
 
@@ -579,7 +632,10 @@ class Fill_GetResult_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[Fill_GetResult_Request] | None = None,
         response: list[Fill_GetResult_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -725,7 +781,12 @@ class Fill_FeedbackMessage(_idlc.Message):
         self,
         goal_id: UUID | None = None,
         feedback: Fill_Feedback | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or goal_id is not None) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         if goal_id is None:
             self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
         else:

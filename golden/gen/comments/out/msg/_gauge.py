@@ -77,7 +77,12 @@ class Gauge(_idlc.Message):
         samples: _idlc.Integers | None = None,
         covariance: _arrays.Values | None = None,
         flags: bytes = b"\x07",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or rate.__class__ is not float) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._rate = rate
         self._level = level
         self._label = label
@@ -85,11 +90,16 @@ class Gauge(_idlc.Message):
         if samples is None:
             self._samples = _array("h", (-1, 0, 1))
         else:
-            self._samples = _idlc.to_array("h", samples)
+            self._samples = _idlc.to_array("h", samples, "samples")
         if covariance is None:
             self._covariance = _arrays.zeros(9, _arrays.FLOAT64)
         else:
-            self._covariance = _arrays.to_ndarray(_arrays.FLOAT64, 9, covariance)
+            self._covariance = _arrays.to_ndarray(
+                _arrays.FLOAT64,
+                9,
+                covariance,
+                "covariance",
+            )
         self._flags = flags
 
     def __eq__(self, other: _idlc.Any) -> bool:

@@ -28,7 +28,12 @@ class Reset_Request(_idlc.Message):
     def __init__(
         self,
         reason: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or reason.__class__ is not str) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._reason = reason
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -79,7 +84,12 @@ class Reset_Response(_idlc.Message):
     def __init__(
         self,
         ok: bool = False,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or ok.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._ok = ok
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -92,12 +102,13 @@ class Reset_Response(_idlc.Message):
 def _reset__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Reset_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.layout(order, "4s?").pack
     new_reset_response = _idlc.maker(Reset_Response)
     read_1 = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._ok)]
+        return [write_1(encapsulation, truths[message._ok])]
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_reset_response()
@@ -135,7 +146,10 @@ class Reset_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[Reset_Request] | None = None,
         response: list[Reset_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:
@@ -165,6 +179,7 @@ def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.text_phases(order, "I*")
     write_3 = _idlc.phases(order, "I")
+    truths = _idlc.TRUTHS
     write_4 = _idlc.layout(order, "?", start=4).pack
     new_reset_event = _idlc.maker(Reset_Event)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
@@ -204,7 +219,7 @@ def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         response = message._response
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join([write_4(item_2._ok) for item_2 in response])
+        response_block = b"".join([write_4(truths[item_2._ok]) for item_2 in response])
         put(write_3[low & 3].pack(len(response)))
         put(response_block)
         return parts

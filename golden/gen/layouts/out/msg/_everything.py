@@ -114,7 +114,12 @@ class Everything(_idlc.Message):
         stamps: list[Time] | None = None,
         weights: _arrays.Values | None = None,
         last: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or flag.__class__ is not bool) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._flag = flag
         self._inner = Inner() if inner is None else inner
         self._inners = [] if inners is None else inners
@@ -122,8 +127,14 @@ class Everything(_idlc.Message):
         self._pair = _idlc.several(Row, 2) if pair is None else pair
         self._nothing = Nothing() if nothing is None else nothing
         self._nothings = [] if nothings is None else nothings
-        self._doubles = _array("d") if doubles is None else _idlc.to_array("d", doubles)
-        self._shorts = _array("h") if shorts is None else _idlc.to_array("h", shorts)
+        if doubles is None:
+            self._doubles = _array("d")
+        else:
+            self._doubles = _idlc.to_array("d", doubles, "doubles")
+        if shorts is None:
+            self._shorts = _array("h")
+        else:
+            self._shorts = _idlc.to_array("h", shorts, "shorts")
         self._flags = [] if flags is None else flags
         self._octets = [b"\x00"] * 2 if octets is None else octets
         self._texts = [] if texts is None else texts
@@ -132,7 +143,7 @@ class Everything(_idlc.Message):
         if weights is None:
             self._weights = _arrays.zeros(4, _arrays.FLOAT32)
         else:
-            self._weights = _arrays.to_ndarray(_arrays.FLOAT32, 4, weights)
+            self._weights = _arrays.to_ndarray(_arrays.FLOAT32, 4, weights, "weights")
         self._last = last
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -167,6 +178,7 @@ class Everything(_idlc.Message):
 def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Everything in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     wide_text = _idlc.wide_text(order)
     write_1 = _idlc.Texts(order, "4s?BdI*I")
     write_2 = _idlc.layout(order, "I").pack
@@ -226,7 +238,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         parts = [
             write_1[c_size](
                 encapsulation,
-                message._flag,
+                truths[message._flag],
                 inner._a,
                 inner._b,
                 c_size + 1,

@@ -33,7 +33,12 @@ class Inner(_idlc.Message):
         b: float = 0.0,
         c: str = "",
         d: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or a.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._a = a
         self._b = b
         self._c = c

@@ -13,8 +13,12 @@ class Nothing(_idlc.Message):
     __match_args__ = ()
     _fields_and_field_types = _idlc.frozen({})
 
-    def __init__(self) -> None:
-        pass
+    def __init__(
+        self,
+        **options: _idlc.Unpack[_idlc.Options],
+    ) -> None:
+        if options and _idlc.construct(self, options, locals()):
+            return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Nothing):

@@ -25,7 +25,12 @@ class Pair(_idlc.Message):
         self,
         key: str = "",
         value: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or key.__class__ is not str) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._key = key
         self._value = value
 

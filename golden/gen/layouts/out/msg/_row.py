@@ -31,13 +31,18 @@ class Row(_idlc.Message):
         a: int = 0,
         b: int = 0,
         c: _arrays.Values | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or a.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._a = a
         self._b = b
         if c is None:
             self._c = _arrays.zeros(3, _arrays.UINT8)
         else:
-            self._c = _arrays.to_ndarray(_arrays.UINT8, 3, c)
+            self._c = _arrays.to_ndarray(_arrays.UINT8, 3, c, "c")
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Row):

@@ -40,7 +40,12 @@ class Texts(_idlc.Message):
         few: list[Pair] | None = None,
         titled: list[Titled] | None = None,
         last: str = "",
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (
+            options or (pairs is not None and pairs.__class__ is not list)
+        ) and _idlc.construct(self, options, locals()):
+            return
         self._pairs = [] if pairs is None else pairs
         self._few = [] if few is None else few
         self._titled = [] if titled is None else titled

@@ -39,7 +39,12 @@ class Titled(_idlc.Message):
         title: str = "",
         pairs: list[Pair] | None = None,
         number: float = 0.0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or level.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._level = level
         self._title = title
         self._pairs = [] if pairs is None else pairs

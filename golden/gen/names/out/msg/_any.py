@@ -27,7 +27,12 @@ class Any(_idlc.Message):
     def __init__(
         self,
         pose: Pose | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (
+            options or (pose is not None and pose.__class__ is not Pose)
+        ) and _idlc.construct(self, options, locals()):
+            return
         self._pose = Pose() if pose is None else pose
 
     def __eq__(self, other: _idlc.Any) -> bool:

@@ -23,7 +23,12 @@ class FOOBar(_idlc.Message):
     def __init__(
         self,
         inner: FooBar | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (
+            options or (inner is not None and inner.__class__ is not FooBar)
+        ) and _idlc.construct(self, options, locals()):
+            return
         self._inner = FooBar() if inner is None else inner
 
     def __eq__(self, other: _idlc.Any) -> bool:

@@ -22,7 +22,12 @@ class FooBar(_idlc.Message):
     def __init__(
         self,
         a: int = 0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or a.__class__ is not int) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._a = a
 
     def __eq__(self, other: _idlc.Any) -> bool:

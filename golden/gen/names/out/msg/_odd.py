@@ -112,7 +112,12 @@ class Odd(_idlc.Message):
         item: _builtins.list[Point] | None = None,
         array: Point | None = None,
         order: _arrays.Values | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or class_.__class__ is not _builtins.int) and _idlc.construct(
+            _self, options, locals()
+        ):
+            return
         _self._class = class_
         _self._serialize = serialize_
         _self._self = self
@@ -131,7 +136,7 @@ class Odd(_idlc.Message):
         if order is None:
             _self._order = _arrays.array((1, 2, 3), _arrays.INT32)
         else:
-            _self._order = _arrays.to_ndarray(_arrays.INT32, 3, order)
+            _self._order = _arrays.to_ndarray(_arrays.INT32, 3, order, "order")
 
     def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Odd):
@@ -161,6 +166,7 @@ class Odd(_idlc.Message):
 def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     encapsulation = _idlc.HEADERS[order]
+    truths = _idlc.TRUTHS
     write_1 = _idlc.Texts(order, "4siiiiiI*c?fI", align=4)
     write_str_2 = _idlc.text_block(order)
     write_2 = _idlc.phases(order, "iiiI")
@@ -201,7 +207,7 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 list_2_size + 1,
                 list_2,
                 message._bytes,
-                message._bool,
+                truths[message._bool],
                 message._float,
                 len(str_2),
             ),

@@ -25,7 +25,12 @@ class Point(_idlc.Message):
         self,
         x: float = 0.0,
         y: float = 0.0,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or x.__class__ is not float) and _idlc.construct(
+            self, options, locals()
+        ):
+            return
         self._x = x
         self._y = y
 

@@ -41,7 +41,13 @@ class Text(_idlc.Message):
         other: geometry_msgs_Point | None = None,
         own: names_msgs_Point | None = None,
         any: list[Any] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (
+            options
+            or (other is not None and other.__class__ is not geometry_msgs_Point)
+        ) and _idlc.construct(self, options, locals()):
+            return
         self._other = geometry_msgs_Point() if other is None else other
         self._own = names_msgs_Point() if own is None else own
         self._any = [] if any is None else any

@@ -19,8 +19,12 @@ class None_Request(_idlc.Message):
     __match_args__ = ()
     _fields_and_field_types = _idlc.frozen({})
 
-    def __init__(self) -> None:
-        pass
+    def __init__(
+        self,
+        **options: _idlc.Unpack[_idlc.Options],
+    ) -> None:
+        if options and _idlc.construct(self, options, locals()):
+            return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Request):
@@ -54,8 +58,12 @@ class None_Response(_idlc.Message):
     __match_args__ = ()
     _fields_and_field_types = _idlc.frozen({})
 
-    def __init__(self) -> None:
-        pass
+    def __init__(
+        self,
+        **options: _idlc.Unpack[_idlc.Options],
+    ) -> None:
+        if options and _idlc.construct(self, options, locals()):
+            return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Response):
@@ -110,7 +118,10 @@ class None_Event(_idlc.Message):
         info: ServiceEventInfo | None = None,
         request: list[None_Request] | None = None,
         response: list[None_Response] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (options or info is not None) and _idlc.construct(self, options, locals()):
+            return
         if info is None:
             self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
         else:

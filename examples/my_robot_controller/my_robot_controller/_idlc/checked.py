@@ -1,0 +1,196 @@
+"""Checks when a value is assigned, as rosidl's classes make them when they are asked to.
+
+They are asked by `check_fields=True`, or by the environment for all messages. A message that
+checks is an instance of a subclass whose fields are properties, so that all others pay nothing.
+What is refused is what rosidl refuses, and its AssertionError names the field.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections import UserList, UserString
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from functools import cache
+from typing import Any
+
+from .dictionaries import close
+from .errors import FieldCheckError, FieldTypeError, ValidationError
+from .objects import owner_of
+from .typeinfo import FieldInfo, Primitive, class_of, fields_of, type_name
+from .validation import validate_field
+
+#: rosidl's limits of a float32, which are not quite those of IEEE 754.
+_FLOAT32 = 3.402823466e38
+
+
+def construct(message: Any, options: Mapping[str, Any], given: dict[str, Any]) -> bool:
+    """Return whether `message` got all its fields here, because it is to check them.
+
+    `options` are the constructor's further keywords, `given` its local variables. Raises
+    TypeError for an unknown keyword and for a first field of another type: ROS's tools try
+    `type(field)(value)`, and go over the fields of a dictionary only after a TypeError.
+    """
+    kind = type(message)
+    unknown = [name for name in options if name != "check_fields"]
+    check = bool(options.get("check_fields"))
+    fields = fields_of(type_name(kind))
+    if unknown:
+        names = [field.public for field in fields]
+        hint = close(unknown[0], names)
+        problem = (
+            f"{kind.__name__}() got an unexpected keyword argument {unknown[0]!r}{hint}"
+        )
+        error = FieldCheckError if check else FieldTypeError
+        raise error("", "absent", options[unknown[0]], problem)
+    if check:
+        _assign(message, fields, given)
+    elif fields:
+        first = fields[0]
+        try:
+            validate_field(given[first.public], first)
+        except ValidationError as error:
+            raise error.at(error.path, FieldTypeError) from None
+    return check
+
+
+def _assign(message: Any, fields: tuple[FieldInfo, ...], given: dict[str, Any]) -> None:
+    default = owner_of(type(message))()
+    kind: Any = type(message)
+    message.__class__ = checked_class(kind)
+    for field in fields:
+        value = given[field.public]
+        if value is None:
+            value = getattr(default, field.slot)
+        elif field.is_sequence and field.is_numeric:
+            value = array(field.primitive.code, value)  # type: ignore[union-attr]
+        setattr(message, field.public, value)
+
+
+def become_checked(message: Any, check: bool) -> None:
+    """Let a message check its fields from now on, or no longer."""
+    kind: Any = type(message)
+    if check and not issubclass(kind, Checked):
+        message.__class__ = checked_class(kind)
+    elif not check and issubclass(kind, Checked):
+        message.__class__ = kind.__base__
+
+
+class Checked:
+    """What the classes of messages that check their fields have in common."""
+
+    __slots__ = ()
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        plain: Any = type(self).__base__
+        slots = owner_of(plain).__slots__
+        return _restored, (plain, {slot: getattr(self, slot) for slot in slots})
+
+
+def _restored(kind: type, values: dict[str, Any]) -> Any:
+    message = object.__new__(checked_class(kind))
+    for slot, value in values.items():
+        owner_of(kind).__dict__[slot].__set__(message, value)
+    return message
+
+
+@cache
+def checked_class(kind: Any) -> Any:
+    """Return the subclass whose fields check what they are given."""
+    owner = owner_of(kind)
+    namespace: dict[str, Any] = {
+        name: getattr(kind, name) for name in ("__module__", "__qualname__", "__doc__")
+    }
+    for field in fields_of(type_name(kind)):
+        namespace[field.public] = _property(owner.__dict__[field.slot], field)
+    return type(kind)(kind.__name__, (kind, Checked), {"__slots__": (), **namespace})
+
+
+def _property(slot: Any, field: FieldInfo) -> property:
+    store = slot.__set__
+
+    def setter(message: Any, value: Any) -> None:
+        _check(value, field)
+        if field.is_list and field.is_numeric:
+            value = _numbers(value, field)
+        store(message, value)
+
+    return property(slot.__get__, setter)
+
+
+def _numbers(value: Any, field: FieldInfo) -> Any:
+    """Return checked values as the field holds them: an array as it is, others copied."""
+    assert field.primitive is not None
+    if field.is_sequence:
+        return value if isinstance(value, array) else array(field.primitive.code, value)
+    import numpy as np
+
+    if isinstance(value, np.ndarray):
+        return value
+    return np.array(value, field.primitive.name)
+
+
+def _check(value: Any, field: FieldInfo) -> None:
+    allowed = _refusal(value, field)
+    if allowed:
+        raise FieldCheckError(field.public, allowed, value)
+
+
+def _refusal(value: Any, field: FieldInfo) -> str:
+    """Return what the field allows if it refuses a value, else nothing."""
+    if not field.is_list:
+        return _refusal_of_one(value, field)
+    if field.is_numeric and field.primitive is not None:
+        if field.is_sequence and isinstance(value, array):
+            right = value.typecode == field.primitive.code
+            return "" if right else f"an array.array of {field.primitive.code!r}"
+        if field.size is not None and type(value).__module__ == "numpy":
+            right = value.dtype.name == field.primitive.name
+            right = right and value.size == field.size
+            return "" if right else f"{field.size} numbers ({field.primitive.name})"
+    if not isinstance(value, (Sequence, AbstractSet, UserList)) or isinstance(
+        value, (str, UserString)
+    ):
+        return "a set or sequence"
+    if field.size is not None and len(value) != field.size:
+        return f"a set or sequence of length {field.size}"
+    if field.bound is not None and len(value) > field.bound:
+        return f"a set or sequence of length <= {field.bound}"
+    found = (_refusal_of_one(one, field, listed=True) for one in value)
+    return next((f"a set or sequence, each value {one}" for one in found if one), "")
+
+
+def _refusal_of_one(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
+    if field.nested:
+        right = isinstance(value, class_of(field.nested))
+        return "" if right else f"a {field.nested}"
+    if field.text:
+        types: Any = str if listed else (str, UserString)
+        if not isinstance(value, types):
+            return "a str"
+        if field.text_bound is not None and len(value) > field.text_bound:
+            return f"a str not longer than {field.text_bound}"
+        return ""
+    assert field.primitive is not None
+    return _refusal_of_primitive(value, field.primitive, listed=listed)
+
+
+def _refusal_of_primitive(value: Any, primitive: Primitive, *, listed: bool) -> str:
+    code = primitive.code
+    if code == "?":
+        return "" if isinstance(value, bool) else "a bool"
+    if code == "c":
+        types: Any = bytes if listed else (bytes, bytearray)
+        right = isinstance(value, types) and (listed or len(value) == 1)
+        return "" if right else "bytes of length 1"
+    if code in "fd":
+        if not isinstance(value, float):
+            return f"a float ({primitive.name})"
+        far = code == "f" and abs(value) > _FLOAT32 and not math.isinf(value)
+        return f"a float in [-{_FLOAT32}, {_FLOAT32}]" if far else ""
+    assert primitive.low is not None
+    assert primitive.high is not None
+    if isinstance(value, int) and primitive.low <= value <= primitive.high:
+        return ""
+    return f"an integer in [{primitive.low}, {primitive.high}]"

@@ -1,0 +1,112 @@
+"""Where idlc's classes differ from rosidl's: one function for each section of docs/differences.md.
+
+Each is given an operation and both outcomes, and returns whether it explains their difference. What
+rosidl itself means by a value, its own check tells (`checked`): a value that the check refuses and
+that is sent all the same is read as if it were of the right type, which is whatever lies in memory.
+"""
+
+from typing import NamedTuple
+
+
+class Case(NamedTuple):
+    """An operation and what came of it on both sides.
+
+    `field` is the field's container, size and element as in `trees`, or nothing for a whole
+    message; `value` names what was given to it.
+    """
+
+    key: str
+    field: list
+    value: str
+    checked: dict
+    official: dict
+    idlc: dict
+
+    @property
+    def is_checked(self):
+        return self.key.endswith(", checked")
+
+    @property
+    def constructed(self):
+        return "(" in self.key
+
+    @property
+    def is_numeric_list(self):
+        """Whether rosidl's class converts what it is given."""
+        container, _, element = self.field
+        return container != "one" and isinstance(element, str) and element not in BYTES
+
+
+BYTES = ("boolean", "octet")
+
+
+def refuses(outcome):
+    return "raised" in outcome or "refused" in outcome
+
+
+def sends(outcome):
+    return "bytes" in outcome
+
+
+def wrong_values(case):
+    """rosidl reads wrong values as if they were right; idlc refuses them, or sends the number."""
+    if case.is_checked or not case.field or case.is_numeric_list:
+        return False
+    if not refuses(case.checked) and case.value not in ("append wrong", "append None"):
+        return False
+    if refuses(case.idlc):
+        return True
+    _, _, element = case.field
+    return sends(case.idlc) and isinstance(element, str) and "text" not in case.value
+
+
+def other_sizes(case):
+    """rosidl sends arrays of another size or shape, cut or with what lies behind them."""
+    return bool(case.field) and case.field[0] == "array" and refuses(case.idlc)
+
+
+def columns(case):
+    """A column of the right size is stored flat."""
+    return (
+        bool(case.field)
+        and case.field[0] == "array"
+        and case.official.get("bytes") == case.idlc.get("bytes")
+        and case.value.endswith(("column", "list with list"))
+    )
+
+
+def texts_with_zeros(case):
+    """rosidl cuts a text at a zero character."""
+    return case.value == "text NUL" and sends(case.idlc)
+
+
+def nothing_is_the_default(case):
+    """None in the place of a message or of elements is the default, where rosidl fails later."""
+    return case.constructed and case.value == "None" and not refuses(case.idlc)
+
+
+def unknown_keywords(case):
+    """rosidl ignores keywords that are no fields, unless it checks."""
+    return case.key.endswith("unknown keyword")
+
+
+def positions(case):
+    """Fields may be given by position."""
+    return case.key.endswith(("by position", "filled by a text"))
+
+
+def more_is_taken(case):
+    """idlc sends more kinds of sequences and texts than rosidl."""
+    return bool(case.field) and refuses(case.official) and sends(case.idlc)
+
+
+DIFFERENCES = (
+    unknown_keywords,
+    positions,
+    nothing_is_the_default,
+    texts_with_zeros,
+    columns,
+    other_sizes,
+    wrong_values,
+    more_is_taken,
+)

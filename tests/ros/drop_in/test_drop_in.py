@@ -1,0 +1,111 @@
+"""idlc's classes in the place of rosidl's: the same operations, compared by what comes of them."""
+
+import json
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from differences import DIFFERENCES, Case, refuses
+from installed import SHARE, generate, interfaces, names_in
+
+HERE = Path(__file__).parent
+#: How a key names a field and the value that is given to it.
+KEY = re.compile(
+    r"(?P<message>[\w/]+)(?:\.(?P<field>\w+) = (?P<value>.*?)(?P<checked>, checked)?"
+    r"|\((?P<field_2>\w+)=(?P<value_2>.*)\)|\.(?P<field_3>\w+) (?:aliases )?(?P<value_3>.*)| .*)"
+)
+
+
+def start(outcomes, names, environment):
+    command = [sys.executable, str(HERE / "side.py"), str(outcomes), *names]
+    return subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def load(path):
+    with path.open(encoding="utf-8") as lines:
+        return dict(map(json.loads, lines))
+
+
+@pytest.fixture(scope="module")
+def classes(tmp_path_factory):
+    """Return a folder with idlc's classes for every package of the wheels."""
+    out = tmp_path_factory.mktemp("classes")
+    for package in interfaces():
+        generate(SHARE / package, out / package)
+    return out
+
+
+@pytest.fixture(scope="module")
+def cases(classes, ros_environment, tmp_path_factory):
+    """Return every operation with both outcomes, bytes as idlc writes what they say."""
+    folder = tmp_path_factory.mktemp("outcomes")
+    found = interfaces()
+    names = [name for name in names_in(sorted(found), found) if "/msg/" in name]
+    official, idlc = folder / "official.jsonl", folder / "idlc.jsonl"
+    theirs = ros_environment | {"PYTHONPATH": str(classes)}
+    for process in (start(official, names, ros_environment), start(idlc, names, theirs)):
+        _, errors = process.communicate()
+        assert process.returncode == 0, errors[-3000:]
+    command = [sys.executable, str(HERE / "canonical.py"), str(official), str(idlc)]
+    done = subprocess.run(command, env=theirs, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    shapes = json.loads(done.stdout)
+    ours, known = load(idlc), load(official)
+    assert list(ours) == list(known)
+    return [case_of(key, known, ours, shapes) for key in known]
+
+
+def case_of(key, official, idlc, shapes):
+    match = KEY.fullmatch(key)
+    assert match, key
+    parts = match.groupdict()
+    field = parts["field"] or parts["field_2"] or parts["field_3"] or ""
+    value = parts["value"] or parts["value_2"] or parts["value_3"] or ""
+    checked = official.get(f"{parts['message']}.{field} = {value}, checked", {})
+    shape = shapes[parts["message"]].get(field, [])
+    return Case(key, shape, value, checked, official[key], idlc[key])
+
+
+def agree(case):
+    """Return whether both sides did the same."""
+    if same(case.official.get("told"), case.idlc.get("told")) and "told" in case.official:
+        return True
+    if not refuses(case.official) or not refuses(case.idlc):
+        return case.official == case.idlc
+    raised, ours = case.official.get("raised"), case.idlc.get("raised")
+    # what is refused when it is assigned can be caught there as the same exception
+    return raised is None or (ours is not None and raised[0] in ours)
+
+
+def same(official, idlc):
+    """Return whether two answers are the same; refusals are, if both can be caught alike."""
+    if isinstance(official, dict) and isinstance(idlc, dict):
+        return official.keys() == idlc.keys() and all(
+            same(official[key], idlc[key]) for key in official
+        )
+    if isinstance(official, list) and official and official[-1] == "Exception":
+        return official[0] in idlc
+    return official == idlc
+
+
+def test_every_difference_is_known_and_every_known_one_is_seen(cases, record_property):
+    seen, unknown = Counter(), {}
+    for case in cases:
+        if agree(case):
+            seen["the same"] += 1
+            continue
+        reason = next((one.__name__ for one in DIFFERENCES if one(case)), None)
+        seen[reason] += 1
+        if reason is None:
+            kind = (str(case.field), case.value or case.key.partition(" ")[2], "(" in case.key)
+            text = f"{case.key}\n    {case.official}\n    {case.idlc}"
+            unknown.setdefault(kind, []).append(text)
+    print(f"{len(cases)} operations:", dict(seen))
+    examples = [f"{len(texts)} x {texts[0]}" for texts in unknown.values()]
+    assert not unknown, f"{len(unknown)} kinds of differences:\n" + "\n".join(examples[:60])
+    assert {one.__name__ for one in DIFFERENCES} <= set(seen)
