@@ -154,22 +154,32 @@ class Library:
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
         for root in self._roots(package):
-            found = [
-                (KINDS[path.suffix], path.stem)
-                for folder in (root, *(root / kind for kind in sorted(KIND_FOLDERS)))
-                for path in _files(folder)
-                if path.suffix in KINDS
-            ]
-            if found:
-                return sorted(set(found))
+            if found := _interfaces(root):
+                return found
         return []
 
-    def packages(self) -> Iterable[str]:
-        """Return the names of all packages, for suggestions."""
+    def home(self, package: str) -> Path | None:
+        """Return the folder that a package's interfaces lie in; `None` if they are built in."""
+        return next((root for root in self._roots(package) if _interfaces(root)), None)
+
+    def packages(self) -> Sequence[str]:
+        """Return the names of all packages, sorted."""
         if self._packages is None:
             found = set(catalog.packages()) | set(self._own)
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
+
+
+def _interfaces(root: Path) -> list[tuple[ir.Kind, str]]:
+    """Return kind and name of each interface file of a folder and of its folders for kinds."""
+    return sorted(
+        {
+            (KINDS[path.suffix], path.stem)
+            for folder in (root, *(root / kind for kind in KIND_FOLDERS))
+            for path in _files(folder)
+            if path.suffix in KINDS
+        }
+    )
 
 
 def _files(folder: Path) -> list[Path]:
