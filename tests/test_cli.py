@@ -399,24 +399,6 @@ def test_a_working_folder_that_is_gone():
     assert "the working folder is gone" in done.stderr
 
 
-def complete(*words: str) -> list[str]:
-    env = {
-        **os.environ,
-        "_IDLC_COMPLETE": "bash_complete",
-        "COMP_WORDS": " ".join(("idlc", *words)),
-        "COMP_CWORD": str(len(words)),
-    }
-    done = idlc(env=env)
-    return [line.partition(",")[2] for line in done.stdout.splitlines()]
-
-
-def test_shell_completion():
-    assert complete("e") == ["explain"]
-    assert set(complete("")) == set(COMMANDS)
-    assert "--vendor-deps" in complete("gen", "--v")
-    assert "complete" in idlc(env={**os.environ, "_IDLC_COMPLETE": "bash_source"}).stdout
-
-
 def wait_for(condition) -> None:
     end = time.monotonic() + 30
     while not condition():

@@ -104,6 +104,14 @@ def test_a_package_means_all_that_it_holds(capsys):
     assert {"greenhouse_msgs/msg/Twist", "std_msgs/msg/Header"} < set(names)
 
 
+def test_all_folders_of_a_package_count(monkeypatch, capsys):
+    monkeypatch.chdir("src/greenhouse")
+    write("more/msg/Extra.msg", "int8 a\n")
+    assert main(["list", "greenhouse_msgs"]) == 0
+    names = capsys.readouterr().out.split()
+    assert {"greenhouse_msgs/msg/Extra", "greenhouse_msgs/msg/Twist"} < set(names)
+
+
 def test_an_existing_file_is_never_a_type(capsys):
     write("Header", "no interface")
     assert main(["show", "Header"]) == 2

@@ -52,10 +52,12 @@ class App(LazyGroup):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is asked for; `help` is another way to write `--help`."""
-        if args == ["help"]:
+        if args[0] == "help" and len(args) > 1:
+            args = [*args[1:], *([] if ctx.resilient_parsing else ["--help"])]
+        elif args[0] == "help" and not ctx.resilient_parsing:
             click.echo(ctx.get_help())
             ctx.exit()
-        return super().resolve_command(ctx, [*args[1:], "--help"] if args[0] == "help" else args)
+        return super().resolve_command(ctx, args)
 
 
 EPILOG = """\
@@ -66,10 +68,12 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-Completion in bash:
+Completion of commands, options, types and codes, for bash, zsh and fish:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"
+  eval "$(_IDLC_COMPLETE=zsh_source idlc)"
+  _IDLC_COMPLETE=fish_source idlc | source
 """
 
 

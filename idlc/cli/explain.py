@@ -7,6 +7,8 @@ import sys
 
 import click
 
+from idlc.cli import complete
+
 EPILOG = """\
 Example:
 
@@ -16,7 +18,7 @@ Example:
 
 
 @click.command("explain", epilog=EPILOG)
-@click.argument("code", metavar="[CODE]", required=False)
+@click.argument("code", metavar="[CODE]", required=False, shell_complete=complete.codes)
 @click.option("--all", "everything", is_flag=True, help="Every code, as one Markdown document.")
 def command(code: str | None, everything: bool) -> int:
     """Explain a code: what it means, why, an example that triggers it and one that is right.

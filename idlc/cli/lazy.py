@@ -45,7 +45,8 @@ class LazyGroup(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the command that is asked for; suggest one for a name that there is not."""
         name = args[0]
-        if name not in self._overview and not name.startswith("-"):
+        unknown = name not in self._overview and not name.startswith("-")
+        if unknown and not ctx.resilient_parsing:
             raise click.UsageError(f"no such command: {name!r}; {self._hint(name)}", ctx)
         return super().resolve_command(ctx, args)
 

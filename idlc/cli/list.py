@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options
+from idlc.cli import complete, options
 
 EPILOG = """\
 Example:
@@ -17,7 +17,7 @@ Example:
 
 
 @click.command("list", epilog=EPILOG)
-@click.argument("packages", metavar="[PACKAGE]...", nargs=-1)
+@click.argument("packages", metavar="[PACKAGE]...", nargs=-1, shell_complete=complete.packages)
 @options.include
 @options.style
 def command(packages: tuple[str, ...], include: tuple[str, ...], style: str) -> int:

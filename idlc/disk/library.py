@@ -144,7 +144,10 @@ class Library:
         return tuple(sorted(on_disk or [n for n in catalog.interfaces() if n.package == package]))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
-        """Return kind and name of each file of a package, in the first place that has any."""
+        """Return kind and name of each file of a package, from the first place that has any.
+
+        What is being compiled is one place, of however many folders.
+        """
         if not _NAME.fullmatch(package):
             return []
         known = self._listed.get(package)
@@ -153,10 +156,10 @@ class Library:
         return known
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
-        for root in self._roots(package):
-            if found := _interfaces(root):
-                return found
-        return []
+        own = {one for root in self._own.get(package, ()) for one in _interfaces(root)}
+        if own:
+            return sorted(own)
+        return next(filter(None, map(_interfaces, self._roots(package))), [])
 
     def home(self, package: str) -> Path | None:
         """Return the folder that a package's interfaces lie in; `None` if they are built in."""
