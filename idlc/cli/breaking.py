@@ -98,7 +98,11 @@ def command(
         if verdict:
             sys.stdout.write(f"{_summary(verdict)}\n")
     else:
-        reports.write(report, style, (), 0, sys.stdout)
+        reports.write(report, style, (), 0, sys.stdout, command="breaking")
+    if style == "github" and verdict:
+        from idlc.text.github import notice
+
+        sys.stdout.write(notice("idlc breaking", _summary(verdict)))
     return terminal.status(report)
 
 
