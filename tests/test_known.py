@@ -70,11 +70,15 @@ def test_a_name_that_means_one_type_is_that_type(text, name, folder, monkeypatch
         ("Headr", ["did you mean `std_msgs/msg/Header`?"]),
         ("std_msgs/Headr", ["did you mean `std_msgs/msg/Header`?"]),
         ("std_mgs/Header", ["did you mean `std_msgs/msg/Header`?"]),
+        ("scr", ["did you mean `src`?"]),
         ("std_msg", ["did you mean `std_msgs`?"]),
         ("nav2_msgs/NavigateToPose", ["package `nav2_msgs` is not known: point -I to it"]),
         ("std_msgs/Quaternionnnnn", ["`idlc list std_msgs` names its types"]),
         ("qqqqqqqqqq", ["no file or folder, and no type or package", "`idlc list` shows"]),
-        ("std_srvs/Trigger_Reply", ["`std_srvs/srv/Trigger_Response`"]),
+        (
+            "std_srvs/Trigger_Reply",
+            ["the parts of `std_srvs/srv/Trigger` are `Trigger_Event`"],
+        ),
         ("std_msgs/foo/Header", ["did you mean `std_msgs/msg/Header`?"]),
     ],
 )

@@ -24,6 +24,14 @@ def below() -> Mapping[str, Sequence[Path]]:
     return _packages((".",))
 
 
+def names() -> list[str]:
+    """Return what is in the working folder."""
+    try:
+        return sorted(path.name for path in Path.cwd().iterdir())
+    except OSError:
+        return []
+
+
 def _packages(paths: Sequence[str]) -> dict[str, tuple[Path, ...]]:
     """Return folders by package; what is wrong with files is said when they are compiled."""
     unheard = Report()

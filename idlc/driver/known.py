@@ -134,7 +134,7 @@ def _similar(parts: Sequence[str], library: Library) -> str | None:
     """Return the hint that names what is nearest to a type's or package's name."""
     if len(parts) == 1:
         named = {one.name: str(one) for one in _all(library)}
-        near = closest(parts[0], [*named, *library.packages()])
+        near = closest(parts[0], [*here.names(), *named, *library.packages()])
         return f"did you mean `{named.get(near, near)}`?" if near else None
     package = closest(parts[0], library.packages()) or ""
     named = {one.name: str(one) for one in library.interfaces(package)}

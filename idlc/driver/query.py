@@ -78,5 +78,6 @@ def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[
         elif str(name) in names:
             yield model, [str(name)]
         else:
-            hint = f"`{interface}` has {', '.join(f'`{one}`' for one in names)}"
+            parts = (one.rpartition("/")[2] for one in names if one != str(interface))
+            hint = f"the parts of `{interface}` are {', '.join(f'`{one}`' for one in parts)}"
             report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
