@@ -140,6 +140,7 @@ def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
     assert done.returncode == 1
     assert "::warning file=demo/msg/Wide.msg,line=1" in done.stdout
     assert "+float32 speed" in done.stdout
+    assert "::error file=demo/msg/Drive.msg,title=idlc fmt::the layout is not" in done.stdout
     assert "::error file=demo/msg/Drive.msg,line=1,endLine=1,col=1" in done.stdout
     assert "title=IDL507 field-type-changed::field `speed`" in done.stdout
     annotation = next(line for line in done.stdout.splitlines() if "IDL507" in line)

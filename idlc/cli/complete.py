@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
-Completer: TypeAlias = Callable[
-    [click.Context, click.Parameter, str], "list[CompletionItem[str]] | list[str]"
-]
 _KINDS = {"publisher": "msg", "subscriber": "msg", "service": "srv", "client": "srv"}
 
 
