@@ -2,12 +2,14 @@
 #
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
+#   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
 
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
+BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/dev/null),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13
 ARGS ?=
@@ -25,7 +27,8 @@ LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros -m 'not ros'
-SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS))
+WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),--ignore=tests/test_docs_browser.py)
+SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
@@ -53,6 +56,9 @@ test: $(TEST_ENV)/installed ## run the tests
 ifeq ($(ROS),no)
 	@echo 'without the ROS 2 wheels: the tests marked "ros" are left out'
 endif
+ifeq ($(BROWSER),no)
+	@echo 'without Chromium: tests/test_docs_browser.py is left out'
+endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
@@ -63,7 +69,7 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(ARGS)
+	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \

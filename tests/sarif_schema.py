@@ -18,13 +18,18 @@ def validator():
     return jsonschema.Draft4Validator(schema, format_checker=checker)
 
 
-def run_of(text):
-    """Return the one run of a SARIF document, after the schema has accepted all of it."""
+def runs_of(text):
+    """Return the runs of a SARIF document, after the schema has accepted all of it."""
     log = json.loads(text)
     problems = [f"{one.json_path}: {one.message}" for one in validator().iter_errors(log)]
     assert problems == []
     text.encode("utf-8")  # no half of a surrogate pair
-    (run,) = log["runs"]
+    return log["runs"]
+
+
+def run_of(text):
+    """Return the one run of a SARIF document."""
+    (run,) = runs_of(text)
     return run
 
 

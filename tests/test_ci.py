@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from sarif_schema import run_of
+from sarif_schema import runs_of
 
 ROOT = Path(__file__).parents[1]
 LOOSE = "float64   speed# [m/s]\n"
@@ -68,6 +68,9 @@ def hooks():
         ("idlc-fmt", LOOSE, 0),
         ("idlc-gen-check", TIDY, 0),
         ("idlc-gen-check", "float64 other\n", 1),
+        ("idlc-gen", TIDY, 0),
+        ("idlc-gen", "float64 other\n", 0),
+        ("idlc-gen", "flot64 other\n", 1),
     ],
 )
 @pytest.mark.usefixtures("here")
@@ -83,6 +86,8 @@ def test_each_hook_runs_on_the_files_that_changed(hook, text, status):
         files = []
     done = run(*shlex.split(settings["entry"]), *files)
     assert done.returncode == status, done.stdout + done.stderr
+    if hook == "idlc-gen" and not status:
+        assert run("idlc", "gen", "--check").returncode == 0
     if hook == "idlc-fmt":
         # pre-commit fails a hook that changed files
         assert Path("demo/msg/Drive.msg").read_text() == TIDY
@@ -112,7 +117,7 @@ def act(environment, **inputs):
         re.findall(r"(?m)^  (\w+):\n    description: .*\n    default: \"?(.*?)\"?$", text)
     )
     passed = re.findall(r"(IDLC_\w+): \$\{\{ inputs\.(\w+) \}\}", text)
-    assert len(passed) == 5
+    assert len(passed) == 6
     values = {**defaults, **inputs}
     given = {variable: values[name] for variable, name in passed}
     return run("sh", str(ROOT / ".ci/action"), **environment, **given)
@@ -121,8 +126,10 @@ def act(environment, **inputs):
 def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
     done = act(pull_request, paths="demo")
     assert (done.returncode, done.stderr) == (0, "1 file in order\n")
-    assert done.stdout == ""
-    assert run_of((here / "idlc.sarif").read_text())["results"] == []
+    token, again, notice = done.stdout.splitlines()
+    assert token.removeprefix("::stop-commands") == again[:-2]
+    assert notice.startswith("::notice title=idlc breaking::nothing breaks")
+    assert [one["results"] for one in runs_of((here / "idlc.sarif").read_text())] == [[], []]
     assert (here / "output").read_text() == "sarif=idlc.sarif\n"
 
 
@@ -133,10 +140,65 @@ def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
     assert done.returncode == 1
     assert "::warning file=demo/msg/Wide.msg,line=1" in done.stdout
     assert "+float32 speed" in done.stdout
+    assert "::error file=demo/msg/Drive.msg,title=idlc fmt::the layout is not" in done.stdout
     assert "::error file=demo/msg/Drive.msg,line=1,endLine=1,col=1" in done.stdout
-    assert "title=IDL507 field-type-changed" in done.stdout
-    results = run_of((here / "idlc.sarif").read_text())["results"]
-    assert [one["ruleId"] for one in results] == ["IDL421"]
+    assert "title=IDL507 field-type-changed::field `speed`" in done.stdout
+    annotation = next(line for line in done.stdout.splitlines() if "IDL507" in line)
+    assert "%0Abreaks: wire, hash" in annotation
+    assert "::notice title=idlc breaking::breaks: 1 wire, 1 hash" in done.stdout
+    check, breaking = runs_of((here / "idlc.sarif").read_text())
+    assert [one["ruleId"] for one in check["results"]] == ["IDL421"]
+    assert [one["ruleId"] for one in breaking["results"]] == ["IDL507"]
+    assert "breaks: wire, hash" in breaking["results"][0]["message"]["text"]
+    # code scanning refuses two runs that it cannot keep apart
+    assert [run["automationDetails"]["id"] for run in (check, breaking)] == [
+        "idlc/check/",
+        "idlc/breaking/",
+    ]
+
+
+def test_the_action_checks_generated_code_where_there_is_any(pull_request):
+    write("pyproject.toml", '[tool.idlc]\npaths = ["demo"]\nout = "out/demo"\n')
+    done = act(pull_request, paths="demo", breaking="false")
+    assert done.returncode == 1
+    assert "[IDL616]" in done.stderr
+    assert act(pull_request, paths="demo", breaking="false", generated="false").returncode == 0
+    assert run("idlc", "gen").returncode == 0
+    assert act(pull_request, paths="demo", breaking="false").returncode == 0
+    Path("pyproject.toml").unlink()
+    assert act(pull_request, paths="demo", breaking="false", generated="true").returncode == 2
+
+
+def test_what_files_say_is_no_command_of_githubs(pull_request):
+    """GitHub takes lines that begin with two colons for commands, blanks before them or not."""
+    write("demo/msg/Drive.msg", "# ::error::mine\n::error::mine\n  ::error::mine\nint8   a\n")
+    done = act(pull_request, paths="demo")
+    heard = True
+    for line in done.stdout.splitlines():
+        if line.startswith("::stop-commands::"):
+            heard, token = False, line.removeprefix("::stop-commands::")
+        elif not heard and line == f"::{token}::":
+            heard = True
+        elif heard and line.strip().startswith("::error"):
+            assert "file=demo/msg/Drive.msg" in line
+    assert heard
+
+
+def test_the_action_leaves_the_jobs_python_alone(pull_request, here, monkeypatch):
+    """idlc goes into an environment that ends with the step."""
+    text = (ROOT / "action.yml").read_text(encoding="utf-8")
+    assert "update-environment: false" in text
+    assert "if: ${{ inputs.python-version != '' }}" in text
+    said = here / "said"
+    pip = f'#!/bin/sh\necho "$0 $@" >>"{said}"\nexec "{sys.executable}" "$@"\n'
+    (here / "python-of-setup").write_text(pip)
+    (here / "python-of-setup").chmod(0o755)
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("RUNNER_TEMP", str(here / "temp"))
+    (here / "temp").mkdir()
+    done = act({**pull_request, "IDLC_PYTHON": str(here / "python-of-setup")}, paths="demo")
+    assert done.returncode == 3, "without an index, pip cannot install what idlc needs"
+    assert f"-m venv {here}/temp/idlc." in said.read_text()
 
 
 def test_the_actions_inputs(pull_request):
@@ -154,7 +216,7 @@ def test_no_text_of_a_pull_request_becomes_a_command(pull_request, here):
     assert not (here / "hacked").exists()
     action = (ROOT / "action.yml").read_text(encoding="utf-8")
     scripts = re.findall(r"(?m)^ +run: (.*)$", action)
-    assert len(scripts) == 2
+    assert len(scripts) == 1
     assert not any("${{" in script for script in scripts)
 
 
@@ -163,11 +225,29 @@ def test_the_gitlab_snippet(here, text, status):
     write("demo/msg/Drive.msg", text)
     document = (ROOT / "docs/ci.md").read_text(encoding="utf-8")
     script = document.partition("  script:\n")[2].partition("  artifacts:")[0]
-    lines = [line.removeprefix("    - ") for line in script.splitlines()]
-    assert lines.pop(0) == "pip install idlc"
-    assert run("sh", "-c", "set -e\n" + "\n".join(lines)).returncode == status
+    # as YAML reads it: a line that goes on is joined to the one before
+    lines = script.removeprefix("    - ").replace("\n      ", " ").split("\n    - ")
+    assert lines.pop(0).startswith("pip install ")
+    git("init", "-q")
+    git("add", "demo")
+    git("commit", "-q", "-m", "base")
+    for base in ("", git("rev-parse", "HEAD").strip()):
+        words = ("sh", "-c", "set -e\n" + "\n".join(lines))
+        assert run(*words, CI_MERGE_REQUEST_DIFF_BASE_SHA=base).returncode == status
     assert len(json.loads((here / "gl-code-quality-report.json").read_text())) == status
     assert f'failures="{status}"' in (here / "idlc.xunit.xml").read_text()
+
+
+def test_documents_name_no_release_that_there_is_not():
+    """With the first tag, the documents have to name it."""
+    text = (ROOT / "docs/ci.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"(?:OWNER/idlc@|rev: )(\w[\w.]*)", text))
+    assert named == {"COMMIT"}
+    head, _, rest = text.partition("## Anywhere")
+    assert "`OWNER/idlc`" in head
+    assert "`COMMIT`" in head
+    assert not re.search(r"pip install idlc\b", rest)
+    assert "idlc==" not in text
 
 
 def run_pytest(*words):

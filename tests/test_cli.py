@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 from idlc import __version__
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
+from idlc.text import codes
 
 MSG = "float64 speed\n"
 
@@ -121,6 +123,9 @@ def test_the_example_in_each_help_works_as_pasted(command):
         ("describe nope", 2),
         ("explain IDL201", 0),
         ("explain idl201", 0),
+        ("explain unknown-type", 0),
+        ("explain", 0),
+        ("help", 0),
         ("explain IDL999", 2),
         ("--help", 0),
     ],
@@ -137,12 +142,38 @@ def test_exit_statuses(words, status, capfd):
 def test_an_unknown_code_or_command_gets_a_suggestion(capsys):
     for words, hint in (
         (["explain", "IDL2O1"], "did you mean IDL201?"),
-        (["explain", "201"], "did you mean IDL201?"),
-        (["explain", "unknown-type"], "did you mean IDL201?"),
+        (["explain", "wide-strin"], "did you mean wide-string?"),
+        (["explain", "nonsense"], "`idlc explain` lists the codes"),
         (["chekc"], "did you mean `check`?"),
+        (["generate"], "did you mean `gen`?"),
+        (["new"], "did you mean `scaffold`?"),
+        (["help", "lint"], "did you mean `check`?"),
+        (["xyzzy"], "the commands are gen, check"),
+        (["scaffold", "pkg"], "did you mean `package`?"),
+        (["scaffold", "xyzzy"], "the commands are package, interface, node"),
     ):
         assert main(words) == 2
         assert hint in capsys.readouterr().err
+
+
+def test_help_is_a_command_too(capsys):
+    for words in ([], ["gen"], ["scaffold"], ["scaffold", "node"]):
+        assert main([*words, "--help"]) == 0
+        expected = capsys.readouterr().out
+        assert main(["help", *words]) == 0
+        assert capsys.readouterr().out == expected
+
+
+def test_codes_go_by_id_and_name(capsys):
+    assert main(["explain", "IDL422"]) == 0
+    expected = capsys.readouterr().out
+    for word in ("char-type", "CHAR_TYPE", "idl422", "422"):
+        assert main(["explain", word]) == 0
+        assert capsys.readouterr().out == expected
+    assert main(["explain"]) == 0
+    listed = capsys.readouterr().out
+    assert all(f"  {one.id}  {one.slug} " in listed for one in codes.CODES.values())
+    assert re.search(r"(?m)^Style\n  IDL401 ", listed)
 
 
 def test_what_is_compiled_again_and_what_is_not():
@@ -366,24 +397,6 @@ def test_a_working_folder_that_is_gone():
     )
     assert done.returncode == 2
     assert "the working folder is gone" in done.stderr
-
-
-def complete(*words: str) -> list[str]:
-    env = {
-        **os.environ,
-        "_IDLC_COMPLETE": "bash_complete",
-        "COMP_WORDS": " ".join(("idlc", *words)),
-        "COMP_CWORD": str(len(words)),
-    }
-    done = idlc(env=env)
-    return [line.partition(",")[2] for line in done.stdout.splitlines()]
-
-
-def test_shell_completion():
-    assert complete("e") == ["explain"]
-    assert set(complete("")) == set(COMMANDS)
-    assert "--vendor-deps" in complete("gen", "--v")
-    assert "complete" in idlc(env={**os.environ, "_IDLC_COMPLETE": "bash_source"}).stdout
 
 
 def wait_for(condition) -> None:

@@ -20,7 +20,7 @@ FILES = {
     "demo/srv/Ask.srv": "bool ok\n---\nDrive drive\nbool ok\n",
     "demo/action/Go.action": "---\n---\n",
 }
-VOID = {"meta", "link", "input", "img", "br"}
+VOID = {"meta", "link", "input", "img", "br", "wbr"}
 
 
 class Page(HTMLParser):
@@ -110,6 +110,53 @@ def test_text_of_files_stays_text(site):
         assert not any(key.startswith("on") for _, attrs in page.tags for key in attrs)
         assert "img" not in {tag for tag, _ in page.tags}
     assert "&lt;script&gt;alert(1)" in read(site, "demo/msg-Part.html")
+
+
+def test_control_characters_of_files_are_spelled_out(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bidi = "\u202e\u2066"
+    write("odd/msg/Odd.msg", f"# red \x1b[31m and {bidi} \x7f\x9b\n\nint8 a  # \x1b]0;t\x07 b\n")
+    write("odd/package.xml", f"<package><name>odd</name><license>{bidi}</license></package>")
+    assert main(["docs", "odd", "-o", "site"]) == 0
+    for path in filter(Path.is_file, Path("site").rglob("*")):
+        text = path.read_text(encoding="utf-8")
+        assert not set(text) & {"\x1b", "\x07", "\x7f", "\x9b", *bidi}, path
+        assert "\\u001b" not in text
+    page = read(Path("site"), "odd/msg-Odd.html")
+    assert "red \N{SYMBOL FOR ESCAPE}[31m and &lt;U+202E&gt;" in page
+    assert page.isprintable() or set(filter(lambda c: not c.isprintable(), page)) == {"\n"}
+
+
+def test_the_title_page_tells_what_package_xml_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write("demo/msg/Drive.msg", "# How to drive.\n\nint8 a\n")
+    write(
+        "demo/package.xml",
+        "<package format='3'><name>demo_msgs</name><version>1.2.3</version>"
+        "<description>Drives\n   &amp; stops.</description>"
+        "<maintainer email='a@example.org'>Ann</maintainer><license>MIT</license></package>",
+    )
+    assert main(["docs", "demo", "-o", "site"]) == 0
+    text = read(Path("site"), "index.html")
+    assert "<h1>demo_<wbr>msgs</h1>" in text
+    assert "Drives &amp; stops." in text
+    assert "version 1.2.3 · maintained by Ann · licence MIT" in text
+
+
+def test_a_page_holds_the_text_of_its_file(site):
+    page = read(site, "demo/msg-Drive.html")
+    assert "<pre># How to drive.\n\nuint8 STOP=0  # halt\n" in page
+    assert "<details>" in page
+
+
+def test_only_what_is_drawn_is_kept_as_drawn():
+    from idlc.emit.site.html import prose
+
+    assert prose(["-PI..+PI,  (radians)"]).startswith("<p>")
+    assert prose(["one  two"]).startswith("<p>"), "one line is no drawing"
+    assert prose(["A sentence.  Another one,", "which goes on."]).startswith("<p>")
+    assert prose(["+--+  +--+", "|a |--|b |"]).startswith("<pre>")
+    assert prose(["A list:", "  - one"]).startswith("<pre>")
 
 
 def test_pictures_are_well_formed(site):

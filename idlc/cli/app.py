@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 import click
 
 from idlc import __version__
 from idlc.cli.ending import PipeClosedError
+from idlc.cli.lazy import LazyGroup
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {
@@ -17,6 +16,7 @@ COMMANDS = {
     "fmt": "Lay interface files out.",
     "hash": "Print type hashes (RIHS01).",
     "show": "Show an interface with the messages in it.",
+    "list": "List the packages and types that are known here.",
     "docs": "Write a site about interfaces.",
     "describe": "Print a type description, as ROS 2 installs it.",
     "scaffold": "Write packages, interfaces and nodes.",
@@ -24,19 +24,22 @@ COMMANDS = {
 }
 
 
-class LazyGroup(click.Group):
-    """A group that knows its commands by name only."""
+#: What people type who know other tools, and what it is called here.
+MEANT = {
+    **dict.fromkeys(("generate", "compile", "build", "codegen", "make"), "gen"),
+    **dict.fromkeys(("new", "create", "init", "add"), "scaffold"),
+    **dict.fromkeys(("lint", "validate", "verify", "test"), "check"),
+    **dict.fromkeys(("format", "tidy"), "fmt"),
+    **dict.fromkeys(("doc", "documentation", "html", "site"), "docs"),
+    **dict.fromkeys(("diff", "compare", "compat", "changes"), "breaking"),
+    **dict.fromkeys(("info", "cat", "view", "print", "proto"), "show"),
+    **dict.fromkeys(("ls", "packages", "types", "search", "find"), "list"),
+    **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
+}
 
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
-        """Return the names in the order in which people need them."""
-        return list(COMMANDS)
 
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Return a command by name; this imports it."""
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"idlc.cli.{cmd_name}").command
-        return command
+class App(LazyGroup):
+    """The group of all commands, which `idlc help` explains too."""
 
     def invoke(self, ctx: click.Context) -> object:
         """Run the command that was asked for."""
@@ -48,19 +51,13 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for; suggest one for a name that there is not."""
-        name = args[0]
-        if name not in COMMANDS and not name.startswith("-"):
-            from idlc.text.suggest import did_you_mean
-
-            hint = did_you_mean(name, COMMANDS) or f"the commands are {', '.join(COMMANDS)}"
-            raise click.UsageError(f"no such command: {name!r}; {hint}", ctx)
+        """Return the command that is asked for; `help` is another way to write `--help`."""
+        if args[0] == "help" and len(args) > 1:
+            args = [*args[1:], *([] if ctx.resilient_parsing else ["--help"])]
+        elif args[0] == "help" and not ctx.resilient_parsing:
+            click.echo(ctx.get_help())
+            ctx.exit()
         return super().resolve_command(ctx, args)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """Write the overview without importing any command."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
 
 
 EPILOG = """\
@@ -71,15 +68,20 @@ Example:
   echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
   idlc gen demo -o out/demo
 
-Completion in bash:
+Completion of commands, options, types and codes, for bash, zsh and fish:
 
 \b
   eval "$(_IDLC_COMPLETE=bash_source idlc)"
+  eval "$(_IDLC_COMPLETE=zsh_source idlc)"
+  _IDLC_COMPLETE=fish_source idlc | source
 """
 
 
 @click.group(
-    cls=LazyGroup,
+    cls=App,
+    overview=COMMANDS,
+    modules="idlc.cli.",
+    meant=MEANT,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
     no_args_is_help=True,

@@ -11,6 +11,7 @@ from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.driver.breaking import Verdict
+    from idlc.text.diagnostics import Report
 
 EPILOG = """\
 Example:
@@ -65,7 +66,7 @@ def command(
     """
     import datetime
 
-    from idlc.cli import reports, terminal
+    from idlc.cli import terminal
     from idlc.disk import config, tables
     from idlc.driver.breaking import BreakingOptions, breaking
     from idlc.text.diagnostics import Report
@@ -89,6 +90,14 @@ def command(
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
         verdict = breaking(wanted, report)
+    _show(report, verdict, style)
+    return terminal.status(report)
+
+
+def _show(report: Report, verdict: Verdict | None, style: str) -> None:
+    from idlc.cli import reports, terminal
+    from idlc.text.github import notice
+
     if style == "json":
         terminal.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
@@ -98,8 +107,9 @@ def command(
         if verdict:
             sys.stdout.write(f"{_summary(verdict)}\n")
     else:
-        reports.write(report, style, (), 0, sys.stdout)
-    return terminal.status(report)
+        reports.write(report, style, (), 0, sys.stdout, command="breaking")
+        if style == "github" and verdict:
+            sys.stdout.write(notice("idlc breaking", _summary(verdict)))
 
 
 def _summary(verdict: Verdict) -> str:

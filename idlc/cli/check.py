@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from idlc.cli import options
+from idlc.cli import complete, options
 
 EPILOG = """\
 Example:
@@ -18,8 +18,13 @@ Example:
 
 @click.command("check", epilog=EPILOG)
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
-@click.option("--select", metavar="RULE,...", help="Only these: categories, codes or `all`.")
-@click.option("--ignore", metavar="RULE,...", help="Not these.")
+@click.option(
+    "--select",
+    metavar="RULE,...",
+    shell_complete=complete.rules,
+    help="Only these: categories, codes or `all`.",
+)
+@click.option("--ignore", metavar="RULE,...", shell_complete=complete.rules, help="Not these.")
 @click.option("--fix", is_flag=True, help="Mend what can be mended without harm.")
 @click.option("--strict", is_flag=True, help="Fail on warnings as well.")
 @options.package

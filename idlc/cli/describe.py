@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options
+from idlc.cli import complete, options
 
 EPILOG = """\
 Example:
@@ -17,7 +17,12 @@ Example:
 
 
 @click.command("describe", epilog=EPILOG)
-@click.argument("wanted", metavar="TYPE|PATH", type=click.Path())
+@click.argument(
+    "wanted",
+    metavar="TYPE|PATH",
+    type=click.Path(),
+    shell_complete=complete.types_and_paths,
+)
 @options.package
 @options.include
 def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:

@@ -7,34 +7,38 @@ import sys
 
 import click
 
+from idlc.cli import complete
+
 EPILOG = """\
 Example:
 
 \b
-  idlc explain IDL603
+  idlc explain wide-string
 """
 
 
 @click.command("explain", epilog=EPILOG)
-@click.argument("code", metavar="[CODE]", required=False)
+@click.argument("code", metavar="[CODE]", required=False, shell_complete=complete.codes)
 @click.option("--all", "everything", is_flag=True, help="Every code, as one Markdown document.")
 def command(code: str | None, everything: bool) -> int:
-    """Explain a code: what it means, why, an example that triggers it and one that is right."""
-    if everything:
-        from idlc.text.rulebook import document
+    """Explain a code: what it means, why, an example that triggers it and one that is right.
 
-        sys.stdout.write(document())
+    CODE is an id such as IDL201 or a name such as unknown-type; without it, all are listed.
+    """
+    from idlc.cli import terminal
+    from idlc.text import rulebook
+    from idlc.text.pages import close_name, page
+
+    if everything:
+        sys.stdout.write(rulebook.document())
         return 0
     if code is None:
-        raise click.UsageError("give a CODE such as IDL201, or --all")
-    from idlc.cli import terminal
-    from idlc.text.codes import CODES
-    from idlc.text.pages import close_code, page
-
+        sys.stdout.writelines(f"{line}\n" for line in rulebook.overview())
+        return 0
     text = page(code)
     if text is None:
-        close = close_code(code)
-        hint = f"did you mean {close}?" if close else f"codes run from {min(CODES)} to {max(CODES)}"
+        close = close_name(code)
+        hint = f"did you mean {close}?" if close else "`idlc explain` lists the codes"
         raise click.UsageError(f"no such code: {code}; {hint}")
     if terminal.colours(sys.stdout):
         _show(text)

@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options
+from idlc.cli import complete, options
 
 EPILOG = """\
 Example:
@@ -17,7 +17,14 @@ Example:
 
 
 @click.command("hash", epilog=EPILOG)
-@click.argument("wanted", metavar="PATH|TYPE...", nargs=-1, required=True, type=click.Path())
+@click.argument(
+    "wanted",
+    metavar="PATH|TYPE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(),
+    shell_complete=complete.types_and_paths,
+)
 @options.package
 @options.include
 def command(wanted: tuple[str, ...], package: str | None, include: tuple[str, ...]) -> int:

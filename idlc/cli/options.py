@@ -66,4 +66,4 @@ def check_rules(*lists: str | None) -> None:
     for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
-                raise click.UsageError(f"{word!r} means no rule; see `idlc explain` for codes")
+                raise click.UsageError(f"{word!r} means no rule; `idlc explain` lists the codes")

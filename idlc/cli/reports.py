@@ -11,7 +11,15 @@ from idlc.text.diagnostics import Report
 from idlc.text.present import counted, summary
 
 
-def write(report: Report, style: str, files: Sequence[str], fixed: int, stream: TextIO) -> None:
+def write(
+    report: Report,
+    style: str,
+    files: Sequence[str],
+    fixed: int,
+    stream: TextIO,
+    *,
+    command: str = "check",
+) -> None:
     """Write a report on files that were looked at; formats for machines are one whole document."""
     match style:
         case "text":
@@ -32,7 +40,7 @@ def write(report: Report, style: str, files: Sequence[str], fixed: int, stream: 
         case "sarif":
             from idlc.text import sarif
 
-            stream.write(sarif.document(report, __version__))
+            stream.write(sarif.document(report, __version__, command))
         case "junit":
             from idlc.text import junit
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any, TypeVar
 
 import click
 
 from idlc.cli import options
+from idlc.cli.lazy import LazyGroup
 
 EPILOG = """\
 Example:
@@ -32,27 +32,22 @@ COMMANDS = {
 }
 
 
-class Scaffolds(click.Group):
-    """A group that imports a command when it is asked for."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
-        """Return the names in the order in which people need them."""
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
-        """Return a command by name; this imports it."""
-        if cmd_name not in COMMANDS:
-            return None
-        command: click.Command = import_module(f"idlc.cli.scaffold_{cmd_name}").command
-        return command
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """Write the overview without importing any command."""
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+#: What people type for them, too.
+MEANT = {
+    **dict.fromkeys(("pkg", "project", "workspace"), "package"),
+    **dict.fromkeys(("msg", "srv", "action", "message", "service", "type"), "interface"),
+    **dict.fromkeys(("publisher", "subscriber", "client", "server"), "node"),
+}
 
 
-@click.group("scaffold", cls=Scaffolds, epilog=EPILOG)
+@click.group(
+    "scaffold",
+    cls=LazyGroup,
+    overview=COMMANDS,
+    modules="idlc.cli.scaffold_",
+    meant=MEANT,
+    epilog=EPILOG,
+)
 def command() -> None:
     """Write packages, interfaces and nodes, and enter them where they belong.
 

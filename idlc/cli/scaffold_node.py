@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from idlc.cli import complete
 from idlc.cli.scaffold import common, finish
 
 EPILOG = """\
@@ -41,7 +42,7 @@ class NodeCommand(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Attach each quality of service to its endpoint, then go on as usual."""
-        return super().parse_args(ctx, _attached(args, ctx))
+        return super().parse_args(ctx, args if ctx.resilient_parsing else _attached(args, ctx))
 
 
 def _attached(args: list[str], ctx: click.Context) -> list[str]:
@@ -70,7 +71,12 @@ def _attached(args: list[str], ctx: click.Context) -> list[str]:
 def _endpoint_options(function: Any) -> Any:
     for name, (metavar, text) in reversed(_ENDPOINTS.items()):
         function = click.option(
-            f"--{name}", name.replace("-", "_"), metavar=metavar, multiple=True, help=text
+            f"--{name}",
+            name.replace("-", "_"),
+            metavar=metavar,
+            multiple=True,
+            shell_complete=complete.endpoint,
+            help=text,
         )(function)
     return function
 
@@ -82,7 +88,12 @@ def _endpoint_options(function: Any) -> Any:
 @click.option(
     "--param", "parameters", metavar="NAME:TYPE=DEFAULT", multiple=True, help="Declare a parameter."
 )
-@click.option("--qos", metavar="|".join(QOS), help="The quality of service of the endpoint before.")
+@click.option(
+    "--qos",
+    metavar="|".join(QOS),
+    shell_complete=lambda _, __, word: [one for one in QOS if one.startswith(word)],
+    help="The quality of service of the endpoint before.",
+)
 @click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
 @common
 def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  # noqa: ARG001

@@ -6,7 +6,7 @@ import sys
 
 import click
 
-from idlc.cli import options
+from idlc.cli import complete, options
 
 FORMATS = ("text", "json", "ros2idl", "jsonschema", "mcap")
 
@@ -19,7 +19,12 @@ Example:
 
 
 @click.command("show", epilog=EPILOG)
-@click.argument("wanted", metavar="TYPE|PATH", type=click.Path())
+@click.argument(
+    "wanted",
+    metavar="TYPE|PATH",
+    type=click.Path(),
+    shell_complete=complete.types_and_paths,
+)
 @click.option(
     "--format",
     "style",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
@@ -26,6 +27,8 @@ KIND_FOLDERS = frozenset(KINDS.values())
 SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
 #: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
+#: What may be a type or package, as ROS 2, Python or C++ writes it.
+_NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
 
 
 class InterfaceFile(msgspec.Struct, frozen=True):
@@ -49,8 +52,9 @@ class InterfaceFile(msgspec.Struct, frozen=True):
 
 
 def is_path(text: str) -> bool:
-    """Whether a word on the command line means a path rather than a type."""
-    return Path(text).suffix in KINDS or text.count("/") not in (1, 2) or os.path.lexists(text)
+    """Whether a word on the command line means a path rather than a type or package."""
+    named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
+    return not named or os.path.lexists(text)
 
 
 def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:

@@ -144,7 +144,10 @@ class Library:
         return tuple(sorted(on_disk or [n for n in catalog.interfaces() if n.package == package]))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
-        """Return kind and name of each file of a package, in the first place that has any."""
+        """Return kind and name of each file of a package, from the first place that has any.
+
+        What is being compiled is one place, of however many folders.
+        """
         if not _NAME.fullmatch(package):
             return []
         known = self._listed.get(package)
@@ -153,23 +156,33 @@ class Library:
         return known
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
-        for root in self._roots(package):
-            found = [
-                (KINDS[path.suffix], path.stem)
-                for folder in (root, *(root / kind for kind in sorted(KIND_FOLDERS)))
-                for path in _files(folder)
-                if path.suffix in KINDS
-            ]
-            if found:
-                return sorted(set(found))
-        return []
+        own = {one for root in self._own.get(package, ()) for one in _interfaces(root)}
+        if own:
+            return sorted(own)
+        return next(filter(None, map(_interfaces, self._roots(package))), [])
 
-    def packages(self) -> Iterable[str]:
-        """Return the names of all packages, for suggestions."""
+    def home(self, package: str) -> Path | None:
+        """Return the folder that a package's interfaces lie in; `None` if they are built in."""
+        return next((root for root in self._roots(package) if _interfaces(root)), None)
+
+    def packages(self) -> Sequence[str]:
+        """Return the names of all packages, sorted."""
         if self._packages is None:
             found = set(catalog.packages()) | set(self._own)
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
+
+
+def _interfaces(root: Path) -> list[tuple[ir.Kind, str]]:
+    """Return kind and name of each interface file of a folder and of its folders for kinds."""
+    return sorted(
+        {
+            (KINDS[path.suffix], path.stem)
+            for folder in (root, *(root / kind for kind in KIND_FOLDERS))
+            for path in _files(folder)
+            if path.suffix in KINDS
+        }
+    )
 
 
 def _files(folder: Path) -> list[Path]:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from idlc.disk import inputs
 from idlc.disk.find import find
+from idlc.disk.package import manifest
 from idlc.disk.site import write
+from idlc.disk.statements import statements
 from idlc.driver.stages import models_of, stage
 from idlc.text.diagnostics import Report
+
+if TYPE_CHECKING:
+    from idlc.emit.site.pages import About
 
 
 def docs(
@@ -21,8 +27,26 @@ def docs(
         return 0
     from idlc.emit.site.pages import site
 
+    about = {one.package: _about(one) for one in given}
     with stage("document", out):
-        files = {file.path: file.text for file in site(models)}
+        files = {file.path: file.text for file in site(models, about)}
     if not write(out, files, report):
         return 0
     return sum(path.endswith(".html") for path in files)
+
+
+def _about(given: inputs.Inputs) -> About:
+    """Return what a package's package.xml says of it."""
+    from idlc.emit.site.pages import About
+
+    path = manifest(given.folders[0]) if given.folders else None
+    said = statements(path, path.as_posix(), Report()) if path else ()
+    texts: dict[str, list[str]] = {}
+    for one in said:
+        texts.setdefault(one.tag, []).append(" ".join(one.text.split()))
+    return About(
+        version=" ".join(texts.get("version", [])),
+        description=" ".join(texts.get("description", [])),
+        maintainers=tuple(texts.get("maintainer", [])),
+        licenses=tuple(texts.get("license", [])),
+    )

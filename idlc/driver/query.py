@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 from idlc.disk import inputs
 from idlc.disk.find import find, is_path
-from idlc.disk.library import Library
+from idlc.driver import known
 from idlc.driver.stages import compile_package, derived_names, models_of, stage
-from idlc.model import ir
 from idlc.text import codes
 from idlc.text.diagnostics import Report
-from idlc.text.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -52,11 +50,10 @@ def wanted_models(
 ) -> Iterator[tuple[Model, list[str]]]:
     """Yield, for paths and type names, sound models and the names in them that are meant."""
     paths = [one for one in wanted if is_path(one)]
-    library = Library(include, report)
     for one in wanted:
         if one not in paths:
             found = Report()
-            yield from _named(one, library, found)
+            yield from _named(one, include, found)
             report.extend(found)
     if paths:
         files = find(paths, report)
@@ -65,30 +62,22 @@ def wanted_models(
                 yield model, names
 
 
-def _named(text: str, library: Library, report: Report) -> Iterator[tuple[Model, list[str]]]:
-    """Yield the model of one type and the names meant: a derived type alone, or all of a file."""
-    package, _, rest = text.partition("/")
-    full = f"{package}/msg/{rest}" if rest and "/" not in rest else text
-    try:
-        name = ir.TypeName.parse(full)
-    except ValueError:
-        message = f"`{text}` is neither a path nor a type such as `std_msgs/msg/Header`"
-        report.add(codes.NO_SUCH_TYPE.of("", message))
-        return
-    base, source = name, library.source(name)
-    while source is None and "_" in base.name and base.kind != "msg":
-        base = base._replace(name=base.name.rpartition("_")[0])
-        source = library.source(base)
-    model = source and compile_package(package, [(base, source)], library, report)
-    if model and not report.had_errors:
-        names = [n for own in model.own if own.name == base for n in derived_names(own)]
-        if base == name:
+def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[Model, list[str]]]:
+    """Yield the models that a type's or package's name means, and the names that are meant."""
+    library, meant = known.resolve(text, include, report)
+    for name, interface in meant:
+        source = library.source(interface)
+        model = source and compile_package(
+            interface.package, [(interface, source)], library, report
+        )
+        if not model or report.had_errors:
+            return
+        names = [n for own in model.own if own.name == interface for n in derived_names(own)]
+        if name == interface:
             yield model, names
-            return
-        if full in names:
-            yield model, [full]
-            return
-    if not report.had_errors:
-        near = did_you_mean(full, (str(known) for known in library.interfaces(package)))
-        hint = near or did_you_mean(package, library.packages())
-        report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
+        elif str(name) in names:
+            yield model, [str(name)]
+        else:
+            parts = (one.rpartition("/")[2] for one in names if one != str(interface))
+            hint = f"the parts of `{interface}` are {', '.join(f'`{one}`' for one in parts)}"
+            report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))

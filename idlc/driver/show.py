@@ -21,14 +21,17 @@ def show(
 ) -> list[str]:
     """Return the interfaces that a type name or path means, each as text in a format."""
     texts = []
+    wholes: list[ir.TypeName] = []
     for model, names in list(wanted_models((wanted,), package, include, report)):
         for own in model.own:
+            wholes.append(own.name)
             if str(own.name) in names:
                 with stage("show", str(own.name)):
                     texts.append(_text(own, model, style))
     if not texts and not report.had_errors:
-        message = f"`{wanted}` is a part of a service or action; show the whole"
-        report.add(codes.NO_SUCH_TYPE.of(wanted, message))
+        message = f"`{wanted}` is a part of a service or action"
+        hint = f"`idlc show {wholes[0]}` shows the whole" if wholes else None
+        report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return texts
 
 

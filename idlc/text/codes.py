@@ -197,3 +197,12 @@ USAGE: frozenset[str] = frozenset(
 CODES: dict[str, Code] = {
     code.id: code for code in tuple(globals().values()) if isinstance(code, Code)
 }
+
+_BY_WORD = {
+    word: code for code in CODES.values() for word in (code.id.lower(), code.id[3:], code.slug)
+}
+
+
+def find(word: str) -> Code | None:
+    """Return the code that a word means: its id in any case, the id's digits, or its name."""
+    return _BY_WORD.get(word.lower().replace("_", "-"))

@@ -60,6 +60,11 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
         """The path and offset that order diagnostics."""
         return (self.span.source.path, self.span.start) if self.span else (self.path, -1)
 
+    @property
+    def breaks(self) -> str:
+        """What it breaks, in words, such as `breaks: wire, hash`; empty if that is not said."""
+        return f"breaks: {', '.join(self.levels)}" if self.levels else ""
+
 
 class Report:
     """The problems of one run, one per cause: the same code at the same place counts once."""

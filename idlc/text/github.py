@@ -17,8 +17,13 @@ def lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
         listed = ",".join(
             f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
         )
-        text = "\n".join(one_line(part) for part in (one.message, one.hint) if part)
+        text = "\n".join(one_line(part) for part in (one.message, one.breaks, one.hint) if part)
         yield f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
+
+
+def notice(title: str, text: str) -> str:
+    """Return a command that shows a line about the whole run."""
+    return f"::notice title={_property(one_line(title))}::{_escaped(one_line(text))}\n"
 
 
 def _region(one: Diagnostic) -> dict[str, int]:

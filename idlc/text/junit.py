@@ -31,7 +31,10 @@ def _failed(one: Diagnostic) -> str:
     if one.span:
         line = ":{}:{}".format(*one.span.source.position(one.span.start))
     slug = CODES[one.code].slug if one.code in CODES else ""
-    lines = (f"{path}{line}: {one.message}", *([f"hint: {one.hint}"] if one.hint else []))
+    lines = (
+        f"{path}{line}: {one.message}",
+        *filter(None, (one.breaks, one.hint and f"hint: {one.hint}")),
+    )
     text = "\n".join(map(one_line, lines))
     name = f"{one.code} {slug}{line}"
     return (

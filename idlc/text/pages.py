@@ -1,4 +1,4 @@
-"""The page behind each code: what it means, why, an example that triggers it and one that is right.
+"""The page of each code: what it means, why, an example that triggers it and one that is right.
 
 The pages are data of idlc, one Markdown file per code in `explain/`.
 """
@@ -7,25 +7,21 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from idlc.text.codes import CODES
+from idlc.text.codes import CODES, find
 from idlc.text.suggest import closest
 
 SECTIONS = ("## Why", "## Bad", "## Good")
 
 
-def page(code: str) -> str | None:
-    """Return the Markdown page of a code, given in any case; `None` if there is none."""
-    known = CODES.get(code.upper())
+def page(word: str) -> str | None:
+    """Return the Markdown page of a code, given by id or name; `None` if there is none."""
+    known = find(word)
     if known is None:
         return None
     path = files("idlc.text") / "explain" / f"{known.id}.md"
     return path.read_text(encoding="utf-8") if path.is_file() else None
 
 
-def close_code(code: str) -> str | None:
-    """Return the code that `code` may stand for: a slug, digits alone, or a near miss."""
-    word = code.lower().removeprefix("idl").strip("-_ ")
-    for known in CODES.values():
-        if word in (known.slug, known.id[3:]):
-            return known.id
-    return closest(code.upper(), CODES) or closest(word, (known.slug for known in CODES.values()))
+def close_name(word: str) -> str | None:
+    """Return the id or name of a code that is nearest to a word, `None` if none is near."""
+    return closest(word.upper(), CODES) or closest(word, (known.slug for known in CODES.values()))

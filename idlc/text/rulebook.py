@@ -1,9 +1,10 @@
-"""All codes' pages as one Markdown document, which is docs/rules.md."""
+"""All codes: their pages as one Markdown document, which is docs/rules.md, and their names."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import groupby
 
 from idlc.text.codes import CODES
 from idlc.text.diagnostics import Severity
@@ -53,13 +54,20 @@ def document() -> str:
 
 def _parts() -> Iterator[str]:
     yield _HEAD
-    group = ""
-    for code in sorted(CODES):
-        name = _group(code)
-        if name != group:
-            yield f"## {name}\n"
-            group = name
-        yield _section(code)
+    for group, ids in groupby(sorted(CODES), _group):
+        yield f"## {group}\n"
+        yield from map(_section, ids)
+
+
+def overview() -> Iterator[str]:
+    """Yield the lines of a list of all codes, by group."""
+    width = max(len(code.slug) for code in CODES.values())
+    for group, ids in groupby(sorted(CODES), _group):
+        yield f"{group}"
+        for code in map(CODES.__getitem__, ids):
+            yield f"  {code.id}  {code.slug:{width}}  {code.severity.name.lower()}"
+        yield ""
+    yield "`idlc explain IDL201` or `idlc explain unknown-type` shows a page."
 
 
 def _group(code: str) -> str:

@@ -16,8 +16,11 @@ from idlc.text.source import Span
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def document(diagnostics: Iterable[Diagnostic], version: str) -> str:
-    """Return the JSON document; `version` is idlc's."""
+def document(diagnostics: Iterable[Diagnostic], version: str, category: str) -> str:
+    """Return the JSON document; `version` is idlc's.
+
+    Services that are given several documents keep them apart by `category`.
+    """
     found = list(diagnostics)
     codes = sorted({one.code for one in found})
     seen: dict[str, int] = {}
@@ -25,6 +28,7 @@ def document(diagnostics: Iterable[Diagnostic], version: str) -> str:
         "tool": {
             "driver": {"name": "idlc", "version": version, "rules": [_rule(code) for code in codes]}
         },
+        "automationDetails": {"id": f"idlc/{category}/"},
         "columnKind": "unicodeCodePoints",
         "results": [_result(one, codes.index(one.code), seen) for one in found],
     }
@@ -52,7 +56,7 @@ def _level(severity: Severity) -> str:
 
 
 def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
-    text = one.message if one.hint is None else f"{one.message}; {one.hint}"
+    text = "; ".join(filter(None, (one.message, one.breaks, one.hint)))
     result: dict[str, object] = {
         "ruleId": one.code,
         "ruleIndex": rule,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
 TAB_STOP = 4
 #: Control, format, surrogate, private-use and unassigned characters, line and paragraph ends.
 _HIDDEN = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
+#: Control characters, those of the direction of writing included, other than tabs and line feeds.
+_CONTROL = re.compile("[\\0-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]")
 
 
 def visible(text: str, column: int = 0) -> str:
@@ -30,6 +33,14 @@ def one_line(text: str) -> str:
     if text.isascii() and text.isprintable():
         return text
     return "".join(_spelled(character) for character in text)
+
+
+def printable(text: str) -> str:
+    """Return text of any number of lines with its control characters spelled out.
+
+    What writing needs stays, such as the joiners of scripts and emoji.
+    """
+    return _CONTROL.sub(lambda found: _spelled(found[0]), text)
 
 
 def _spelled(character: str) -> str:

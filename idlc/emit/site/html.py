@@ -4,28 +4,41 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
+from html import escape as escape_markup
 
 from idlc.model import ir
 from idlc.model.spelling import spell
+from idlc.text.visible import printable
 
 #: The pages by interface; a link from one page to another goes up one folder.
 Pages = Mapping[ir.TypeName, str]
 
 
-def page_of(name: ir.TypeName) -> str:
+#: Blanks that draw something: at the start of a line, or several that no punctuation explains.
+_DRAWING = re.compile(r"(?m)^[ \t]|[^\s.,;:!?]([ ]{2,}|\t)\S")
+
+
+def escape(text: str) -> str:
+    """Return text as HTML; control characters are spelled out."""
+    return escape_markup(printable(text))
+
+
+def breakable(text: str) -> str:
+    """Return a name as HTML that may break between its words."""
+    return re.sub(r"([_/.]|[a-z0-9](?=[A-Z]))", r"\1<wbr>", escape(text))
+
+
+def page_of(type_name: ir.TypeName) -> str:
     """Return the path of an interface's page."""
-    return f"{name.package}/{name.kind}-{name.name}.html"
+    return f"{type_name.package}/{type_name.kind}-{type_name.name}.html"
 
 
-def link(name: ir.TypeName, text: str, pages: Pages) -> str:
+def link(target: ir.TypeName, text: str, pages: Pages) -> str:
     """Return a text that leads to an interface's page, if there is one."""
-    shown = escape(text)
-    if name not in pages:
-        return f'<span class="type" title="{escape(str(name))}">{shown}</span>'
-    return (
-        f'<a class="type" href="../{escape(pages[name])}" title="{escape(str(name))}">{shown}</a>'
-    )
+    title = f'title="{escape(str(target))}"'
+    if target not in pages:
+        return f"<span {title}>{breakable(text)}</span>"
+    return f'<a href="../{escape(pages[target])}" {title}>{breakable(text)}</a>'
 
 
 def type_(type_: ir.FieldType, package: str, pages: Pages) -> str:
@@ -33,9 +46,9 @@ def type_(type_: ir.FieldType, package: str, pages: Pages) -> str:
     element = ir.element_of(type_)
     written = spell(type_, package)
     if not isinstance(element, ir.Ref):
-        return f'<span class="type">{escape(written)}</span>'
-    name = spell(element, package)
-    return link(element.target, name, pages) + escape(written.removeprefix(name))
+        return breakable(written)
+    target = spell(element, package)
+    return link(element.target, target, pages) + escape(written.removeprefix(target))
 
 
 def prose(lines: Sequence[str]) -> str:
@@ -45,19 +58,30 @@ def prose(lines: Sequence[str]) -> str:
 
 
 def _block(block: str) -> str:
-    drawn = any(line.startswith((" ", "\t")) or "  " in line for line in block.split("\n"))
-    tag = "pre" if drawn else "p"
+    tag = "pre" if "\n" in block and _DRAWING.search(block) else "p"
     return f"<{tag}>{escape(block)}</{tag}>\n"
 
 
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table of cells that are HTML already; empty without rows."""
-    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>\n" for row in rows)
-    if not body:
+def table(columns: Sequence[tuple[str, str]], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table of cells that are HTML already; empty without rows.
+
+    A column is a class and a heading. One that is empty in all rows is left out.
+    """
+    cells = list(zip(*rows, strict=True))
+    used = [(*column, one) for column, one in zip(columns, cells, strict=False) if any(one)]
+    if not used:
         return ""
-    head = "".join(f"<th>{escape(one)}</th>" for one in heads)
-    top = f'<div class="wide"><table>\n<thead><tr>{head}</tr></thead>\n'
-    return f"{top}<tbody>\n{body}</tbody></table></div>\n"
+    head = "".join(f'<th class="{kind}">{escape(title)}</th>' for kind, title, _ in used)
+    body = "".join(
+        f"<tr>{''.join(map(_cell, used, row))}</tr>\n"
+        for row in zip(*(one for _, _, one in used), strict=True)
+    )
+    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody></table>\n"
+
+
+def _cell(column: tuple[str, str, object], content: str) -> str:
+    """Return a cell that knows its heading, for windows where it stands below others."""
+    return f'<td class="{column[0]}" data-head="{escape(column[1])}">{content}</td>'
 
 
 def document(title: str, root: str, body: str) -> str:
@@ -78,7 +102,9 @@ def document(title: str, root: str, body: str) -> str:
 <input type="search" id="search" placeholder="type, field, constant …" autocomplete="off">
 </label>
 </header>
+<div role="status">
 <ol id="found" hidden></ol>
+</div>
 <main>
 {body}</main>
 <script src="{root}index.js"></script>

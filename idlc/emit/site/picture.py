@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from html import escape
 from typing import TypeAlias
 
-from idlc.emit.site.html import Pages
+from idlc.emit.site.html import Pages, escape
 from idlc.model import ir
 
 _Node: TypeAlias = "tuple[ir.TypeName | None, str]"
@@ -49,7 +48,7 @@ def picture(
         parts += [_box(start, y, width, one, name, pages) for y, one in _places(column, height)]
     label = escape(f"what uses {name.name}, and what it uses")
     return (
-        f'<div class="wide"><svg role="img" aria-label="{label}" width="{total + 1:.0f}" '
+        f'<div class="picture"><svg role="img" aria-label="{label}" width="{total + 1:.0f}" '
         f'height="{height:.0f}" viewBox="0 0 {total + 1:.0f} {height:.0f}">\n'
         + "\n".join(parts)
         + "\n</svg></div>\n"
