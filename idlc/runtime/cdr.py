@@ -103,26 +103,34 @@ TRUTHS = {False: False, True: True}
 _truth = TRUTHS.__getitem__
 
 
-def flags(values: Iterable[Any]) -> bytes:
-    """Return one byte per bool."""
-    return bytes(map(_truth, values))
+def flags(values: Any) -> bytes:
+    """Return one byte per bool; of a buffer of bytes, whether each is not zero."""
+    raw = None if type(values) is list else _single_bytes(values)
+    if raw is None:
+        return bytes(map(_truth, values))
+    return bytes(map(bool, raw))
 
 
 def octets(values: Any) -> bytes:
     """Return one byte per `bytes` of length 1, or the bytes of a buffer."""
     if type(values) is not list:
-        try:
-            view = memoryview(values)
-        except TypeError:
-            values = list(values)
-        else:
-            if view.itemsize != 1:
-                raise ValueError("elements of more than one byte")
-            return view.tobytes()
+        raw = _single_bytes(values)
+        if raw is not None:
+            return raw
+        values = list(values)
     raw = b"".join(values)
     if len(raw) != len(values) or set(map(len, values)) - {1}:
         raise ValueError("bytes of another length than 1")
     return raw
+
+
+def _single_bytes(values: Any) -> bytes | None:
+    """Return the content of a buffer whose elements are bytes."""
+    try:
+        view = memoryview(values)
+    except TypeError:
+        return None
+    return view.tobytes() if view.itemsize == 1 else None
 
 
 def read_flags(raw: bytes | memoryview) -> list[bool]:

@@ -52,7 +52,7 @@ def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
 
 def _holds(values: Any, primitive: Primitive) -> bool:
     """Return whether an array's own type already says that all elements fit."""
-    if primitive.code == "c":
+    if primitive.code in "?c":
         return isinstance(values, (bytes, bytearray))
     if isinstance(values, array):
         return values.typecode == primitive.code

@@ -168,7 +168,7 @@ ON_MESSAGES = {
     "value as read": lambda cls: repr(deserialize_message(serialize_message(invented(cls)), cls)),
     "fields": lambda cls: fields_of(cls),
     "slot types": lambda cls: {name: str(shape) for name, shape in shape_of(cls).items()},
-    "slots": lambda cls: [name for name in cls.__slots__ if name != "_check_fields"],
+    "slots": lambda cls: list(cls.__slots__),
     "constants": constants,
     "constants of an instance": lambda cls: {
         name: repr(getattr(cls(), name)) for name in constants(cls)
