@@ -47,16 +47,21 @@ def construct(message: Any, options: Mapping[str, Any], given: dict[str, Any]) -
     if check:
         _assign(message, fields, given)
     elif fields:
-        first = fields[0]
-        try:
-            validate_field(given[first.public], first)
-        except ValidationError as error:
-            raise error.at(error.path, FieldTypeError) from None
+        _check_first(fields[0], given[fields[0].public])
     return check
 
 
+def _check_first(field: FieldInfo, value: Any) -> None:
+    if value is None and (field.is_list or field.nested):
+        return  # the default
+    try:
+        validate_field(value, field)
+    except ValidationError as error:
+        raise error.at(error.path, FieldTypeError) from None
+
+
 def _assign(message: Any, fields: tuple[FieldInfo, ...], given: dict[str, Any]) -> None:
-    default = owner_of(type(message))()
+    default = owner_of(type(message))(check_fields=False)
     kind: Any = type(message)
     message.__class__ = checked_class(kind)
     for field in fields:
@@ -143,8 +148,10 @@ def _refusal(value: Any, field: FieldInfo) -> str:
         return _refusal_of_one(value, field)
     if field.is_numeric and field.primitive is not None:
         if field.is_sequence and isinstance(value, array):
-            right = value.typecode == field.primitive.code
-            return "" if right else f"an array.array of {field.primitive.code!r}"
+            if value.typecode != field.primitive.code:
+                return f"an array.array of {field.primitive.code!r}"
+            far = field.bound is not None and len(value) > field.bound
+            return f"an array.array of length <= {field.bound}" if far else ""
         if field.size is not None and type(value).__module__ == "numpy":
             right = value.dtype.name == field.primitive.name
             right = right and value.size == field.size

@@ -139,7 +139,7 @@ def copies(cls):
     message = invented(cls)
     made = [copy.copy(message), copy.deepcopy(message)]
     made += [pickle.loads(pickle.dumps(message, protocol)) for protocol in range(2, 6)]
-    return [[type(one) is cls, repr(one) == repr(message)] for one in made]
+    return [[isinstance(one, cls), repr(one) == repr(message)] for one in made]
 
 
 def shared(cls):
