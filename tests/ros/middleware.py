@@ -263,15 +263,15 @@ class Official:
         assert self.deserialize(self._cdr(kept), memory)
 
 
-def official_members(name):
-    """Return the introspection members that rosidl_typesupport_introspection_c generated."""
+def official_handle(name):
+    """Return the introspection type support that rosidl generated."""
     package, kind, short = name.split("/")
     prefix = "rosidl_typesupport_introspection_c"
     library = ctypes.CDLL(f"lib{package}__{prefix}.so")
     symbol = f"{prefix}__get_message_type_support_handle__{package}__{kind}__{short}"
     function = getattr(library, symbol)
     function.restype = c_void_p
-    return members_of(function())
+    return function()
 
 
 def interface_of(name):
