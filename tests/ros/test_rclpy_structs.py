@@ -1,13 +1,16 @@
 """The introspection road, which middlewares like Cyclone DDS take: real C structures.
 
 No wheel has such a middleware, so a test-only one reads and writes the memory: it walks over the
-members as Cyclone DDS does. For types of the wheels, the C++ code that rosidl generated reads and
-writes it, too.
+members as Cyclone DDS does, from a thread that never gets Python's lock. For types of the wheels,
+the C++ code that rosidl generated reads and writes it, too, and C code that rosidl generated makes
+and frees it.
 """
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from installed import HERE, SHARE, generate, interfaces, interfaces_in, names_in
@@ -17,12 +20,26 @@ OURS = (HERE / "every_kind", HERE.parents[1] / "examples" / "my_robot_controller
 
 
 @pytest.fixture(scope="module")
-def look(tmp_path_factory, ros_environment):
+def walker(tmp_path_factory) -> Path:
+    """Return the middleware of walker.c, compiled."""
+    library = tmp_path_factory.mktemp("walker") / "walker.so"
+    prefix = Path(sys.prefix)
+    command = [os.environ.get("CC", "cc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
+    command += ["-o", library, HERE / "walker.c", f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
+    for package in ("rcutils", "rosidl_runtime_c", "rosidl_typesupport_interface"):
+        command += [f"-I{prefix / 'include' / package}"]
+    command += [f"-I{prefix / 'include' / 'rosidl_typesupport_introspection_c'}", "-lpthread"]
+    subprocess.run([str(word) for word in command], check=True)
+    return library
+
+
+@pytest.fixture(scope="module")
+def look(tmp_path_factory, ros_environment, walker):
     """Run structs_side.py on names; fail with what it complains about."""
     classes = tmp_path_factory.mktemp("classes")
     for files in (*(SHARE / package for package in (*PACKAGES, "test_msgs")), *OURS):
         generate(files, classes / files.name)
-    environment = {**ros_environment, "PYTHONPATH": f"{HERE}:{classes}"}
+    environment = {**ros_environment, "PYTHONPATH": f"{HERE}:{classes}", "WALKER": str(walker)}
 
     def run(script, *words):
         done = subprocess.run(

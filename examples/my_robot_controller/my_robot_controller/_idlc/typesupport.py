@@ -6,7 +6,6 @@ rclpy reads capsules from `type(cls)` and, if they are missing, calls the metacl
 
 from __future__ import annotations
 
-from ctypes import PYFUNCTYPE, py_object
 from functools import cache
 from importlib import import_module
 from types import ModuleType
@@ -25,12 +24,12 @@ _UNSUPPORTED = ("rmw_connextdds", "rmw_connextddsmicro")
 #: What rclpy reads from the metaclass; the type support comes last, because its presence
 #: says that all is there.
 _SUPPORT = "_TYPE_SUPPORT"
-_CREATE = "_CREATE_ROS_MESSAGE"
-_SHARED = {
-    "_DESTROY_ROS_MESSAGE": "Py_DecRef",
-    "_CONVERT_FROM_PY": "PyNumber_MatrixMultiply",
-    "_CONVERT_TO_PY": "PyNumber_Positive",
-}
+_MEMORY = (
+    "_CREATE_ROS_MESSAGE",
+    "_DESTROY_ROS_MESSAGE",
+    "_CONVERT_FROM_PY",
+    "_CONVERT_TO_PY",
+)
 
 
 @cache
@@ -88,24 +87,15 @@ def _message(cls: Any) -> c.MessageSupport:
     return _road().message(cls, name)  # type: ignore[no-any-return]
 
 
-@cache
-def _shared() -> dict[str, object]:
-    """Return the capsules that are the same for all messages."""
-    return {
-        name: c.capsule(c.c_function(function)) for name, function in _SHARED.items()
-    }
-
-
 def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
     built = extension(cls, _name(cls))
     if built:
         _give(cls, built.message())
         return
-    support = _message(cls)
-    create = c.address(PYFUNCTYPE(py_object)(support.memory))
-    _give(cls, {_CREATE: c.capsule(create), **_shared()})
-    _give(cls, {_SUPPORT: c.capsule(support.handle)})
+    handle, *functions = map(c.capsule, _message(cls))
+    _give(cls, dict(zip(_MEMORY, functions, strict=True)))
+    _give(cls, {_SUPPORT: handle})
 
 
 def import_service(cls: Any) -> None:
@@ -115,7 +105,7 @@ def import_service(cls: Any) -> None:
     if built:
         _give(cls, {_SUPPORT: built.service()})
         return
-    event = services.event(cls.Event, happened, _message(cls.Event).memory)
+    event = services.event(cls, happened)
     support = services.service(_name(cls), request, response, event, _road())
     _give(cls, {_SUPPORT: c.capsule(support)})
 

@@ -14,7 +14,6 @@ import itertools
 import operator
 import struct
 import sys
-from collections.abc import Callable
 from ctypes import c_char, c_char_p, c_size_t, c_uint8, c_uint64, c_void_p, py_object
 from typing import Any, NamedTuple, TypeVar
 
@@ -177,6 +176,18 @@ def resolver(answers: dict[bytes, int]) -> int:
     return address(prototype(operator.getitem))
 
 
+def load_library(name: str) -> ctypes.CDLL:
+    """Return a shared library of ROS 2; raises ImportError that says what to do."""
+    try:
+        return ctypes.CDLL(name)
+    except OSError as error:
+        raise ImportError(
+            f"{name} cannot be loaded ({error}): install ROS 2's rclpy and a middleware "
+            "(for example `pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp`), "
+            "or source your ROS 2 installation first"
+        ) from error
+
+
 _new_capsule = ctypes.PYFUNCTYPE(py_object, c_void_p, c_char_p, c_void_p)(
     ("PyCapsule_New", ctypes.pythonapi)
 )
@@ -235,7 +246,13 @@ def c_function(name: str) -> int:
 
 
 class MessageSupport(NamedTuple):
-    """What a road makes for a message class: its type support, and the type of its memory."""
+    """What a road makes for a message class: its type support, and the functions of its memory.
+
+    All are addresses.
+    """
 
     handle: int
-    memory: Callable[[], object]
+    create: int
+    destroy: int
+    convert_from_py: int
+    convert_to_py: int

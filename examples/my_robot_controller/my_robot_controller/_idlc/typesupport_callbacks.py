@@ -12,7 +12,6 @@ import logging
 import opcode
 from collections.abc import Callable
 from ctypes import py_object
-from functools import cache
 from importlib import import_module
 from types import FunctionType
 from typing import Any
@@ -69,18 +68,48 @@ def report(what: str, error: BaseException) -> None:
     logging.getLogger(__package__).warning("%s: %s", what, error)
 
 
-@cache
-def nothing_taken(name: str) -> Any:
+def taking(name: str, decode: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return a function that gives what `decode` does, and never raises.
+
+    A signal does not cost the message; garbage is told to rclpy as `_nothing_taken` does.
+    """
+
+    def taken(memory: Any) -> Any:
+        try:
+            return decode(memory)
+        except BaseException as error:
+            failure = error
+        try:
+            if not interrupted(failure):
+                report(f"a received {name} was dropped", failure)
+                nothing = _nothing_taken(name, f"{name}: {failure}")
+                thread = _thread.get_ident()
+                return nothing[thread]
+        except Exception:
+            return None
+        except BaseException:  # noqa: S110 (one more interrupt)
+            pass
+        return taken(memory)
+
+    return deaf(taken)
+
+
+def _nothing_taken(name: str, why: str) -> Any:
     """Return an object whose `[thread]` is `None`, and no message of that type to rclpy.
 
     rclpy can only be told that before a message is decoded. Afterwards an InvalidHandle
-    does it, which executors expect from entities that die. It is raised in the thread
-    when C code is left, and no sooner if no call follows; for actions, `None` is enough.
+    does it, which executors expect from entities that die; it is an RMWError as well,
+    which is what `deserialize_message` raises. It is raised in the thread when C code is
+    left, and no sooner if no call follows; for actions, `None` is enough.
     """
     package, kind, _ = name.split("/")
     if kind == "action" or package == "action_msgs":
         return type("Nothing", (), {"__getitem__": {}.get})()
-    raised = import_module("rclpy.exceptions").InvalidHandle
+    errors = (
+        import_module("rclpy.exceptions").InvalidHandle,
+        import_module("rclpy._rclpy_pybind11").RMWError,
+    )
+    raised = type("UndecodableMessage", errors, {"__str__": lambda _: why})
     prototype = ctypes.PYFUNCTYPE(None, ctypes.c_ulong, py_object)
     later = prototype(
         ("PyThreadState_SetAsyncExc", ctypes.pythonapi), ((1,), (1, "", raised))

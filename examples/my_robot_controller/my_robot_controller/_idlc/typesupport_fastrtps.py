@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from _thread import get_ident
 from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
@@ -116,30 +115,17 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
 
     def taken(memory: Any) -> Any:
         try:
+            data = memory.received
+        except AttributeError:
+            return memory.message
+        if data[1] == native and not data[0]:
             try:
-                data = memory.received
-            except AttributeError:
-                return memory.message
-            if data[1] == native and not data[0]:
-                try:
-                    return decode(data)
-                except Exception:  # noqa: S110 (told exactly by what follows)
-                    pass
-            return decode_any(data)
-        except BaseException as error:
-            failure = error
-        try:
-            if not callbacks.interrupted(failure):
-                callbacks.report(f"a received {name} was dropped", failure)
-                nothing, thread = callbacks.nothing_taken(name), get_ident()
-                return nothing[thread]
-        except Exception:
-            return None
-        except BaseException:  # noqa: S110 (one more interrupt)
-            pass
-        return taken(memory)
+                return decode(data)
+            except Exception:  # noqa: S110 (told exactly by what follows)
+                pass
+        return decode_any(data)
 
-    return callbacks.deaf(taken)
+    return callbacks.taking(name, taken)
 
 
 class _Callbacks(ctypes.Structure):
@@ -244,7 +230,7 @@ def _unbounded() -> int:
 
 @cache
 def _identifier() -> int:
-    library = introspection.load_library(f"lib{IDENTIFIER}.so")
+    library = c.load_library(f"lib{IDENTIFIER}.so")
     return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
 
 
@@ -262,11 +248,17 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     support = c.keep(c.MessageTypeSupport(_identifier(), c.pointer(functions)))
     answers = {
         IDENTIFIER.encode(): ctypes.addressof(support),
-        introspection.IDENTIFIER.encode(): introspection.handle(name),
+        introspection.IDENTIFIER.encode(): introspection.handle(name, functional=False),
     }
     support.func = c.resolver(answers)
     support.about = about(name)
-    return c.MessageSupport(ctypes.addressof(support), _memory_type(name, cls))
+    return c.MessageSupport(
+        ctypes.addressof(support),
+        c.address(PYFUNCTYPE(py_object)(_memory_type(name, cls))),
+        c.c_function("Py_DecRef"),
+        c.c_function("PyNumber_MatrixMultiply"),
+        c.c_function("PyNumber_Positive"),
+    )
 
 
 def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001

@@ -7,7 +7,6 @@ road.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from ctypes import (
     PYFUNCTYPE,
     c_bool,
@@ -47,35 +46,52 @@ class Event(NamedTuple):
     destroy: int = 0
 
 
-def _message_at(memory: int | None) -> list[object]:
-    """Return the message in some memory as a list, as events hold it; NULL is no message."""
-    if memory is None:
-        return []
-    return [+ctypes.cast(memory, py_object).value]
+class _Memory:
+    """What rclpy finds on a message class's metaclass, for calls from here."""
+
+    def __init__(self, cls: type) -> None:
+        def function(name: str, *prototype: Any) -> Any:
+            capsule = getattr(type(cls), name)
+            return PYFUNCTYPE(*prototype)(c.capsule_pointer(capsule))
+
+        self.create = function("_CREATE_ROS_MESSAGE", c_void_p)
+        self.destroy = function("_DESTROY_ROS_MESSAGE", None, c_void_p)
+        self.store = function("_CONVERT_FROM_PY", c_bool, py_object, c_void_p)
+        self.fetch = function("_CONVERT_TO_PY", py_object, c_void_p)
+
+    def messages(self, memory: int | None) -> list[object]:
+        """Return the message in some memory, as events hold it; NULL is no message."""
+        return [] if memory is None else [self.fetch(memory)]
 
 
-def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
+def event(cls: Any, handle: int) -> Event:
     """Return how rcl makes and frees messages of a service's Event class.
 
     Both functions are needed as soon as there is a handle: rcl calls them without a look.
     """
+    requests, responses, events = map(_Memory, (cls.Request, cls.Response, cls.Event))
 
     def create(info: Any, _: int, request: int | None, response: int | None) -> int:
+        memory = 0
         try:
             told = info.contents
-            message = cls(request=_message_at(request), response=_message_at(response))
+            message = cls.Event(
+                request=requests.messages(request),
+                response=responses.messages(response),
+            )
             message.info.event_type = told.event_type
             message.info.stamp.sec = told.sec
             message.info.stamp.nanosec = told.nanosec
             message.info.client_gid = list(told.client_gid)
             message.info.sequence_number = told.sequence_number
-            memory = memory_type()
-            message @ memory
-            ctypes.pythonapi.Py_IncRef(py_object(memory))
-            return id(memory)
+            memory = int(events.create())
+            events.store(message, memory)
+            return memory
         except BaseException as error:
             failure = error
         try:
+            if memory:
+                events.destroy(memory)
             if callbacks.interrupted(failure):
                 return create(info, _, request, response)
             callbacks.report("a service event was not sent", failure)
@@ -83,9 +99,9 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
             pass
         return 0
 
-    def destroy(memory: Any, _: int) -> bool:
+    def destroy(memory: int, _: int) -> bool:
         try:
-            ctypes.pythonapi.Py_DecRef(py_object(memory))
+            events.destroy(memory)
         except BaseException as error:
             failure = error
         else:
@@ -102,7 +118,7 @@ def event(cls: type[Any], handle: int, memory_type: Callable[[], Any]) -> Event:
         callbacks.callback(
             PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create
         ),
-        callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), destroy),
+        callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, c_void_p), destroy),
     )
 
 

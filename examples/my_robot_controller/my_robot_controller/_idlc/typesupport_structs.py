@@ -1,60 +1,58 @@
 """The introspection road: rmw_cyclonedds_cpp and others that walk over C structures.
 
-Message memory is a `bytes` object in which the C structure lies. The middleware is
-given the object itself, with a member table whose offsets are shifted to where the
-content of `bytes` begins. So convert and destroy are functions of Python's own C
-interface, as on the other road.
+Message memory is what rosidl's is: the C structure, and what it refers to, all from
+rosidl's allocator. So it does not matter whose type support a middleware works with where
+it takes two of one type name for the same, idlc's or rosidl's.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
-from functools import cache, partial
 from typing import Any
 
 from . import typesupport_c as c
+from . import typesupport_callbacks as callbacks
 from . import typesupport_introspection as introspection
+from . import typesupport_native as native
 from . import typesupport_transcode as transcode
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error
+from .typesupport_layout import structure
 
 _HEADER = 4
 
 
-@cache
-def _memory_type(cls: Any, name: str) -> type[bytes]:
-    """Return the type of memory for a class: `message @ memory` fills it, `+memory` reads it."""
+def _converter(cls: Any, name: str) -> object:
+    """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     everything = transcode.whole(name)
-    true = c.TRUE
 
-    def store(memory: bytes, message: Any) -> object:
+    def store(address: int, message: Any) -> None:
         try:
             data = b"".join(encode(message))
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        cursor = transcode.Cursor(memoryview(data)[_HEADER:])
-        everything.fill(cursor, id(memory) + c.BYTES_OFFSET)
-        return true
+        everything.fill(transcode.Cursor(memoryview(data)[_HEADER:]), address)
 
-    def fetch(memory: bytes) -> object:
+    def fetch(address: int) -> Any:
         data = bytearray(HEADERS[NATIVE])
-        everything.drain(id(memory) + c.BYTES_OFFSET, data)
+        everything.drain(address, data)
         return cls.deserialize(data)
 
-    def free(memory: bytes) -> None:
-        everything.free(id(memory) + c.BYTES_OFFSET)
-
-    methods = {"__rmatmul__": store, "__pos__": fetch, "__del__": free}
-    return type("Memory", (bytes,), methods)
+    methods = {
+        "__setitem__": staticmethod(store),
+        "__getitem__": staticmethod(callbacks.taking(name, fetch)),
+    }
+    return type("Converter", (), methods)()
 
 
 def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
-    zeros = bytes(ctypes.sizeof(introspection.structure(name)))
-    handle = introspection.handle(name, c.BYTES_OFFSET)
-    return c.MessageSupport(handle, partial(_memory_type(cls, name), zeros))
+    size = ctypes.sizeof(structure(name))
+    functions = native.functions(size, native.content(name), _converter(cls, name))
+    handle = introspection.handle(name, functional=True)
+    return c.MessageSupport(handle, *functions[:4])
 
 
 class _ServiceMembers(ctypes.Structure):

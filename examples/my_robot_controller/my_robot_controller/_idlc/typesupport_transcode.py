@@ -17,8 +17,8 @@ from struct import Struct
 from typing import Any, NamedTuple, Protocol
 
 from . import typesupport_c as c
-from . import typesupport_introspection as introspection
 from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field
+from .typesupport_layout import element_type, placed_fields
 
 _HEADER = 4
 _COUNT = Struct("=I")
@@ -53,17 +53,16 @@ def _put(out: bytearray, data: bytes | memoryview, align: int) -> None:
 
 
 class _Runtime(NamedTuple):
-    """rosidl_runtime_c; `init` and `fini` do for any sequence, counted in bytes."""
+    """rosidl_runtime_c; `init` does for any sequence, counted in bytes."""
 
     assign: Any
     assign_wide: Any
     init: Any
-    fini: Any
 
 
 @cache
 def _runtime() -> _Runtime:
-    library = introspection.load_library("librosidl_runtime_c.so")
+    library = c.load_library("librosidl_runtime_c.so")
 
     def function(name: str, result: Any, *arguments: Any) -> Any:
         return PYFUNCTYPE(result, *arguments)((f"rosidl_runtime_c__{name}", library))
@@ -72,7 +71,6 @@ def _runtime() -> _Runtime:
         function("String__assignn", c_bool, c_void_p, c_char_p, c_size_t),
         function("U16String__assignn", c_bool, c_void_p, c_void_p, c_size_t),
         function("uint8__Sequence__init", c_bool, c_void_p, c_size_t),
-        function("uint8__Sequence__fini", None, c_void_p),
     )
 
 
@@ -84,9 +82,6 @@ class Step(Protocol):
 
     def drain(self, base: int, out: bytearray) -> None:
         """Append to CDR what C memory holds."""
-
-    def free(self, base: int) -> None:
-        """Free what the piece has allocated."""
 
 
 class Run:
@@ -102,9 +97,6 @@ class Run:
     def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
         start = base + self.offset
         _put(out, c.MEMORY[start : start + self.size], self.align)
-
-    def free(self, base: int) -> None:  # noqa: D102
-        pass
 
 
 class Text:
@@ -122,9 +114,6 @@ class Text:
         _put(out, _COUNT.pack(size + 1), 4)
         out += c.MEMORY[data : data + size]
         out += b"\0"
-
-    def free(self, base: int) -> None:  # noqa: D102
-        _release(base + self.offset)
 
 
 class WideText(Text):
@@ -162,11 +151,6 @@ class Repeat:
             for step in self.steps:
                 step.drain(base + start, out)
 
-    def free(self, base: int) -> None:  # noqa: D102
-        for start in self.starts:
-            for step in self.steps:
-                step.free(base + start)
-
 
 class Many:
     """A sequence; `steps` move one element, which takes `stride` bytes."""
@@ -197,12 +181,6 @@ class Many:
         if count:
             self.content(count).drain(data, out)
 
-    def free(self, base: int) -> None:  # noqa: D102
-        data, count = _data_and_size(base + self.offset)
-        if not self.align:
-            self.content(count).free(data)
-        _release(base + self.offset)
-
 
 def _demand(done: bool) -> None:
     if not done:
@@ -225,17 +203,11 @@ def allocate(sequence: int, count: int, stride: int, *, zero: bool) -> int:
     return data
 
 
-def _release(address: int) -> None:
-    """Free the data of a string or sequence, which is empty then."""
-    if c.WORDS[address >> 3]:
-        _runtime().fini(address)
-
-
 def _element_steps(field: Field) -> list[Step]:
     """Return the steps of one element that begins at 0."""
     if field.base == NESTED:
         return list(steps(field.nested_type_name))
-    kind = introspection.element_type(field)
+    kind = element_type(field)
     if kind is c.String:
         return [WideText(0) if field.base in _WIDE else Text(0)]
     return [Run(0, ctypes.sizeof(kind), ctypes.sizeof(kind))]
@@ -250,7 +222,7 @@ def _moved(step: Step, offset: int) -> Step:
 
 def _field_steps(field: Field, offset: int) -> list[Step]:
     elements = _element_steps(field)
-    stride = ctypes.sizeof(introspection.element_type(field))
+    stride = ctypes.sizeof(element_type(field))
     if field.shape == SCALAR:
         return [_moved(step, offset) for step in elements]
     if field.shape == ARRAY:
@@ -262,7 +234,7 @@ def _field_steps(field: Field, offset: int) -> list[Step]:
 def steps(name: str) -> tuple[Step, ...]:
     """Return how a type moves, neighbouring runs joined."""
     joined: list[Step] = []
-    for field, offset in introspection.placed_fields(name):
+    for field, offset in placed_fields(name):
         for step in _field_steps(field, offset):
             last = joined[-1] if joined else None
             if isinstance(step, Run) and isinstance(last, Run) and _follows(step, last):
