@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, RMWError
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
@@ -151,7 +151,8 @@ def garbage_is_dropped():
             del data[chance.randrange(len(data) + 1) :]
         try:
             result = deserialize_message(bytes(data), type(message))
-        except RuntimeError:
+        except RMWError as error:
+            assert str(error)
             outcomes["error"] += 1
         else:
             assert type(result) is type(message)
@@ -374,7 +375,14 @@ def says_what_to_do(case):
     utilities = importlib.import_module("rclpy.utilities")
     fastcdr = importlib.import_module("std_msgs._idlc.typesupport_fastcdr")
     introspection = importlib.import_module("std_msgs._idlc.typesupport_introspection")
-    if case == "middleware":
+    native = importlib.import_module("std_msgs._idlc.typesupport_native")
+    if case in {"machine", "memory"}:
+        utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
+    if case == "machine":
+        native._MACHINES = ()
+    elif case == "memory":
+        native._MAP_PRIVATE = 0  # the system refuses this, too
+    elif case == "middleware":
         utilities.get_rmw_implementation_identifier = lambda: "rmw_connextdds"
     elif case == "layout":
         fastcdr._find = lambda *_: None

@@ -126,6 +126,8 @@ def test_the_type_description_is_the_installed_one(start):
         ("layout", ["Fast CDR", "unknown", "RMW_IMPLEMENTATION"]),
         ("symbol", ["Fast CDR", "no_such_symbol", "colcon"]),
         ("fast cdr", ["libfastcdr.so.1", "RMW_IMPLEMENTATION"]),
+        ("machine", ["machine code", "there is none for", "rmw_fastrtps_cpp", "colcon"]),
+        ("memory", ["machine code", "does not allow", "rmw_fastrtps_cpp", "colcon"]),
         ("library", ["librosidl_typesupport_elsewhere_c.so", "source your ROS 2"]),
     ],
 )
