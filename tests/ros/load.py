@@ -1,7 +1,8 @@
 """What a busy and hostile system does to idlc's classes, each a function.
 
-load.py NAME [ARGUMENT...]. The package `same` on PYTHONPATH is idlc's; `Thing` has other fields
-on the attacker's side. A function fails by raising; it prints what the test looks at.
+load.py NAME [ARGUMENT...]. The package `same` on PYTHONPATH is idlc's; its `Thing` holds every kind
+of field, and other ones on the attacker's side. A function fails by raising; it prints what the
+test looks at.
 """
 
 import array
@@ -13,6 +14,7 @@ import random
 import sys
 import threading
 import time
+from functools import cache
 from pathlib import Path
 
 import rclpy
@@ -21,6 +23,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from same.msg import Thing
+from trees import Values, class_of, shape_of
 
 PATIENCE = 60.0
 SIDES = 8
@@ -42,11 +45,23 @@ def resident():
     return int(words[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+KINDS = ("Arrays", "BoundedSequences", "Everything", "Inner", "Scalars", "Sequences")
+
+
+@cache
+def every_kind(number):
+    """Return a message that holds every kind of field, some of the type in sequences."""
+    names = [f"same/msg/{kind}" for kind in KINDS]
+    values = Values({name: shape_of(class_of(*name.split("/"))) for name in names}, seed=number)
+    return values.build("same/msg/Everything", values.invent("same/msg/Everything"))
+
+
 def thing(sender, number):
     return Thing(
         name=f"{sender} {number}",
         numbers=array.array("i", [sender, number, sender ^ number]),
         words=[str(number)] * (number % 5),
+        rest=[every_kind(index) for index in range(number % 8 - 5)],
     )
 
 
@@ -71,7 +86,8 @@ class Listener:
 
     def check(self, message):
         sender, number = map(int, message.name.split())
-        if message != thing(sender, number):
+        # bytes, because a number that is none is not equal to itself
+        if message.serialize() != thing(sender, number).serialize():
             self.problems.append(message)
         self.received += 1
 

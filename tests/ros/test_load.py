@@ -4,6 +4,7 @@ import os
 import random
 import re
 import select
+import shutil
 import subprocess
 import sys
 import time
@@ -15,7 +16,11 @@ from installed import HERE, generate
 #: Each is delivered eight times.
 MESSAGES = 125_000 if os.environ.get("IDLC_LONG") else 1_200
 TIMEOUT = 3600 if os.environ.get("IDLC_LONG") else 120
-THING = "string name\nint32[] numbers\nstring[] words\n"
+THING = "string name\nint32[] numbers\nstring[] words\nEverything[] rest\n"
+EVERYTHING = (
+    "Scalars scalars\nArrays arrays\nBoundedSequences bounded\nSequences sequences\n"
+    "Arrays[2] pair\nBoundedSequences[<=3] few\nSequences[] many\n"
+)
 #: A type of the same name that means something else.
 OTHER = "float64 value\nuint32 count\nuint32[8] more\nstring name\n"
 
@@ -26,7 +31,9 @@ def sides(tmp_path_factory) -> dict[str, Path]:
     found = {}
     for side, text in (("sound", THING), ("other", OTHER)):
         folder = tmp_path_factory.mktemp(side)
-        (folder / "files/msg").mkdir(parents=True)
+        shutil.copytree(HERE / "every_kind/msg", folder / "files/msg")
+        (folder / "files/msg/Others.msg").unlink()  # needs other packages
+        (folder / "files/msg/Everything.msg").write_text(EVERYTHING, encoding="utf-8")
         (folder / "files/msg/Thing.msg").write_text(text, encoding="utf-8")
         generate(folder / "files", folder / "same")
         found[side] = folder
