@@ -45,6 +45,19 @@ class Functions(NamedTuple):
     in_array: int
 
 
+class Words(NamedTuple):
+    """What the machine code reads, in the order in which it follows the code."""
+
+    allocate: int
+    deallocate: int
+    set_item: int
+    get_item: int
+    converter: int
+    plan: int
+    sequence: int
+    size: int
+
+
 @cache
 def elements(size: int, content: int) -> Functions:
     """Return functions for all elements of a size and with a content to free."""
@@ -54,14 +67,14 @@ def elements(size: int, content: int) -> Functions:
 def functions(size: int, content: int, converter: object) -> Functions:
     """Return new functions; they live as long as the process."""
     machine = _machine()
-    words = (
+    words = Words(
         *_allocator(),
-        c.c_function("PySequence_SetItem"),
-        c.c_function("PySequence_GetItem"),
-        id(c.keep(converter)),
-        content or _table(),
-        _table((0, 0, size, content)),
-        size,
+        set_item=c.c_function("PySequence_SetItem"),
+        get_item=c.c_function("PySequence_GetItem"),
+        converter=id(c.keep(converter)),
+        plan=content or _table(),
+        sequence=_table((0, 0, size, content)),
+        size=size,
     )
     start = _executable(machine.CODE + pack(f"={len(words)}Q", *words))
     return Functions(*(start + machine.ENTRIES[key] for key in Functions._fields))
