@@ -5,20 +5,36 @@ qemu for it are there (Debian: binutils-aarch64-linux-gnu gcc-aarch64-linux-gnu 
 """
 
 import platform
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from idlc.runtime import typesupport_aarch64, typesupport_native, typesupport_x86_64
+from idlc.runtime import (
+    typesupport_fastrtps_aarch64,
+    typesupport_fastrtps_x86_64,
+    typesupport_structs_aarch64,
+    typesupport_structs_x86_64,
+)
 
 HERE = Path(__file__).parent
-MACHINES = {"x86_64": typesupport_x86_64, "aarch64": typesupport_aarch64}
+MODULES = {
+    ("structs", "x86_64"): typesupport_structs_x86_64,
+    ("structs", "aarch64"): typesupport_structs_aarch64,
+    ("fastrtps", "x86_64"): typesupport_fastrtps_x86_64,
+    ("fastrtps", "aarch64"): typesupport_fastrtps_aarch64,
+}
 
 
-@pytest.fixture(params=MACHINES)
+@pytest.fixture(params=["x86_64", "aarch64"])
 def machine(request):
+    return request.param
+
+
+@pytest.fixture(params=["structs", "fastrtps"])
+def road(request):
     return request.param
 
 
@@ -42,28 +58,30 @@ def run(*words):
     return done.stdout
 
 
-def test_the_code_is_what_its_text_says(machine, tool, tmp_path):
-    module = MACHINES[machine]
+def test_the_code_is_what_its_text_says(road, machine, tool, tmp_path):
+    module = MODULES[road, machine]
     (tmp_path / "code.s").write_text(module.TEXT)
     run(tool("as"), tmp_path / "code.s", "-o", tmp_path / "code.o")
     run(tool("objcopy"), "-O", "binary", tmp_path / "code.o", tmp_path / "code")
     code = (tmp_path / "code").read_bytes()
-    words = typesupport_native.Words._fields
-    assert code == module.CODE + bytes(8 * len(words))
     symbols = dict(line.split()[::-2] for line in run(tool("nm"), tmp_path / "code.o").splitlines())
-    places = {name: int(symbols[name], 16) for name in (*module.ENTRIES, *words)}
-    assert places == {
-        **module.ENTRIES,
-        **{name: len(module.CODE) + 8 * index for index, name in enumerate(words)},
-    }
-    assert list(module.ENTRIES) == list(typesupport_native.Functions._fields)
+    assert {name: int(symbols[name], 16) for name in module.ENTRIES} == module.ENTRIES
+    words = re.findall(r"^(\w+): \.quad 0$", module.TEXT, re.MULTILINE)
+    assert code == module.CODE + bytes(8 * len(words))
 
 
-def test_the_code_does_what_it_should(machine, tool, tmp_path):
-    module = MACHINES[machine]
+def test_all_machines_have_the_same_functions_and_words(road):
+    texts = [(module.ENTRIES, module.TEXT) for key, module in MODULES.items() if key[0] == road]
+    found = [(list(entries), re.findall(r"^(\w+): \.quad", text, re.M)) for entries, text in texts]
+    assert found[0] == found[1]
+
+
+def test_the_code_does_what_it_should(road, machine, tool, tmp_path):
+    module = MODULES[road, machine]
     program, code = tmp_path / "program", tmp_path / "code"
     static = [] if platform.machine() == machine else ["-static"]
-    run(tool("gcc"), *static, "-Wall", "-Werror", HERE / "machine_code.c", "-o", program)
+    source = HERE / f"machine_code_{road}.c"
+    run(tool("gcc"), *static, "-Wall", "-Werror", source, "-o", program)
     code.write_bytes(module.CODE)
     emulator = [] if platform.machine() == machine else [f"qemu-{machine}"]
     if emulator and not shutil.which(emulator[0]):

@@ -71,6 +71,14 @@ def test_behaviour(behaviour, start):
     assert finish(start(behaviour)) == ("", "")
 
 
+@pytest.mark.parametrize(
+    "behaviour",
+    ["wrong_values_raise_where_they_are_published", "garbage_is_dropped", "many_threads"],
+)
+def test_behaviour_without_machine_code(behaviour, start):
+    assert finish(start("without_machine_code", behaviour)) == ("", "")
+
+
 def test_memory_stays_flat(start):
     assert finish(start("memory_stays_flat", "200000")) == ("", "")
 
