@@ -4,7 +4,8 @@ The middleware never looks into message memory here, so it is a `Memory` that ho
 encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
 calls the two functions that copy the bytes while it holds the mutex of a writer or a
 reader, and another thread may wait for that mutex while it holds the interpreter's lock.
-Whoever gave that lock away in there would never get it back.
+Whoever gave that lock away in there would never get it back. So these functions are
+machine code that allocates nothing but `bytes`, which starts no garbage collection.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
-from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
+from ctypes import PYFUNCTYPE, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
+from struct import Struct, pack
 from typing import Any
 
 from . import typesupport_c as c
 from . import typesupport_callbacks as callbacks
+from . import typesupport_fastrtps_python as python
 from . import typesupport_introspection as introspection
+from . import typesupport_native as native
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, install
 from .typesupport_descriptions import about
@@ -33,41 +37,27 @@ _LARGE = 16384
 
 
 class Memory:
-    """Message memory: `message @ memory` encodes into it, `+memory` is the message.
+    """Message memory: `message @ memory` encodes into it, `+memory` is the message."""
 
-    `__len__` is the encoded size. It is a slot that holds a function, so that no
-    bytecode runs where C asks for the size.
-    """
+    __slots__ = ("body", "message", "received", "size", "spans")
 
-    __slots__ = (
-        *("body", "first", "head", "length"),
-        *("message", "received", "second", "size", "tail"),
-    )
-
-    #: The encoded message without header, and its size. Of a large one, the body is only
-    #: its largest array, which stands from `first` to `second`, between head and tail.
-    body: bytes | memoryview
+    #: The encoded message without header: `bytes`, or a list with the parts of a large
+    #: one, which are not copied.
+    body: Any
     size: int
-    first: int
-    second: int
-    head: bytes
-    tail: bytes
-    length: Callable[[], int]
+    #: For machine code: size, then address and size of each part, as words.
+    spans: bytes
     #: The message that `body` was made from.
     message: Any
     #: What was received, with header; no attribute in a memory that is sent.
     received: bytes
 
 
-_memory: Any = Memory
-_memory.__len__ = _memory.length
-
-
-def _memory_type(name: str, cls: Any) -> type[Memory]:
-    """Return the memory of a message class, which works with the class's codec."""
+def _memory_type(name: str, cls: Any, apart: bool) -> type[Memory]:
+    """Return the memory of a message class; `apart`: large ones may stay in parts."""
     codec = cls._codec_(NATIVE)
-    encode, bulk = codec.encode, codec.bulk
-    true = c.TRUE
+    encode, bulk = codec.encode, codec.bulk and apart
+    true, content, span = c.TRUE, c.BYTES_OFFSET, Struct("=3Q").pack
     large = False
 
     def store(memory: Any, message: Any) -> object:
@@ -78,15 +68,14 @@ def _memory_type(name: str, cls: Any) -> type[Memory]:
             if large:
                 size = _store_apart(memory, parts)
             else:
-                memory.body = body = parts[0] if len(parts) == 1 else b"".join(parts)
-                memory.second = size = len(body)
-                memory.first, memory.head, memory.tail = 0, b"", b""
+                memory.body = body = b"".join(parts)
+                size = len(body)
+                memory.spans = span(size, id(body) + content, size)
             # what follows on a topic is as large as what came before
             large = bulk and size >= _LARGE
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
         memory.size = size
-        memory.length = size.__index__
         memory.message = message
         return true
 
@@ -95,15 +84,63 @@ def _memory_type(name: str, cls: Any) -> type[Memory]:
 
 
 def _store_apart(memory: Memory, parts: list[Any]) -> int:
-    """Put the parts of a message into a memory, the largest uncopied; return their size."""
-    views = [memoryview(part).cast("B") for part in parts]
-    sizes = list(map(len, views))
-    at = sizes.index(max(sizes))
-    memory.head, memory.body = b"".join(views[:at]), views[at]
-    memory.tail = b"".join(views[at + 1 :])
-    memory.first = sum(sizes[:at])
-    memory.second = memory.first + sizes[at]
-    return sum(sizes)
+    """Put the parts of a message into a memory, uncopied; return their size."""
+    memory.body = views = [memoryview(part).cast("B") for part in parts]
+    start = _view_start() >> 3
+    words: list[int] = []
+    for view in views:
+        words += c.WORDS[(id(view) >> 3) + start], len(view)
+    size = sum(words[1::2])
+    memory.spans = pack(f"={1 + len(words)}Q", size, *words)
+    return size
+
+
+def _offset(owner: object, word: int) -> int:
+    """Return where in an object a word lies; raises RefusedError if that is unknown."""
+    first, last = id(owner), id(owner) + type(owner).__basicsize__
+    words = c.WORDS[first >> 3 : last >> 3].tolist()
+    if words.count(word) != 1:
+        raise native.RefusedError("the layout of this Python's objects is unknown")
+    return 8 * words.index(word)
+
+
+@cache
+def _view_start() -> int:
+    """Return where a memoryview says where its content is."""
+    content = b"content"
+    return _offset(memoryview(content), id(content) + c.BYTES_OFFSET)
+
+
+@cache
+def _words() -> dict[str, int]:
+    """Return what the machine code reads, the same for all types."""
+    position, end = fast_cdr()
+    memory, spans, received = Memory(), b"spans", b"received"
+    memory.spans, memory.received = spans, received
+    _view_start()
+    return {
+        "copy": c.address(ctypes.CDLL(None).memcpy),
+        "new_bytes": c.c_function("PyBytes_FromStringAndSize"),
+        "forget": c.c_function("Py_DecRef"),
+        "clear_error": c.c_function("PyErr_Clear"),
+        "position": 8 * position,
+        "end": 8 * end,
+        "spans": _offset(memory, id(spans)),
+        "received": _offset(memory, id(received)),
+        "content": c.BYTES_OFFSET,
+    }
+
+
+def _native(answers: dict[bytes, int]) -> dict[str, int]:
+    """Return the addresses of the functions that Fast DDS calls; raises RefusedError."""
+    words = [
+        word
+        for identifier, handle in answers.items()
+        for word in (id(c.keep(identifier)) + c.BYTES_OFFSET, handle)
+    ]
+    table = c.keep((c_size_t * (len(words) + 1))(*words))
+    answered = ctypes.addressof(table)
+    return native.functions("fastrtps", {**_words(), "answers": answered})
 
 
 def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
@@ -154,81 +191,6 @@ class _ServiceCallbacks(ctypes.Structure):
 
 
 @cache
-def _serializer(bulk: bool) -> int:
-    """Return `cdr_serialize(memory, cdr)`, which never lets another thread run.
-
-    The interpreter may do so after a call and where it jumps, so there is neither.
-    """
-    position, end = fast_cdr()
-    everything, words = c.MEMORY, c.WORDS
-
-    def serialize(memory: Any, cdr: int) -> bool:
-        try:
-            here = cdr >> 3
-            start = words[here + position]
-            stop = start + memory.size
-            if stop <= words[here + end]:
-                everything[start:stop] = memory.body
-                words[here + position] = stop
-                return True
-        except BaseException:  # noqa: S110
-            pass
-        return False
-
-    def serialize_bulk(memory: Any, cdr: int) -> bool:
-        try:
-            here = cdr >> 3
-            start = words[here + position]
-            stop = start + memory.size
-            if stop <= words[here + end]:
-                first, second = start + memory.first, start + memory.second
-                everything[start:first] = memory.head
-                everything[first:second] = memory.body
-                everything[second:stop] = memory.tail
-                words[here + position] = stop
-                return True
-        except BaseException:  # noqa: S110
-            pass
-        return False
-
-    function = serialize_bulk if bulk else serialize
-    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), function)
-
-
-@cache
-def _deserializer() -> int:
-    """Return `cdr_deserialize(cdr, memory)`, which never lets another thread run either."""
-    position, end = fast_cdr()
-    characters, words = c.CHARACTERS, c.WORDS
-
-    def deserialize(cdr: int, memory: Any) -> bool:
-        try:
-            here = cdr >> 3
-            memory.received = characters[
-                words[here + position] - _HEADER : words[here + end]
-            ]
-            return True
-        except BaseException:
-            return False
-
-    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
-
-
-@cache
-def _unbounded() -> int:
-    """Return `max_serialized_size(bounds_info)`, which says that there is no maximum."""
-
-    def maximum(bounds_info: Any) -> int:
-        try:  # noqa: SIM105 (a context manager would be called outside of it)
-            bounds_info[0] = b"\0"
-        except BaseException:  # noqa: S110
-            pass
-        return 0
-
-    return callbacks.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
-
-
-@cache
 def _identifier() -> int:
     library = c.load_library(f"lib{IDENTIFIER}.so")
     return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
@@ -237,24 +199,30 @@ def _identifier() -> int:
 def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     package, kind, short = name.split("/")
-    functions = _Callbacks(
-        f"{package}::{kind}".encode(),
-        short.encode(),
-        _serializer(cls._codec_(NATIVE).bulk),
-        _deserializer(),
-        c.c_function("PyObject_Size"),
-        _unbounded(),
-    )
-    support = c.keep(c.MessageTypeSupport(_identifier(), c.pointer(functions)))
+    support = c.keep(c.MessageTypeSupport(_identifier()))
     answers = {
         IDENTIFIER.encode(): ctypes.addressof(support),
         introspection.IDENTIFIER.encode(): introspection.handle(name, functional=False),
     }
-    support.func = c.resolver(answers)
+    try:
+        functions, apart = _native(answers), True
+    except native.RefusedError:
+        functions, apart = python.functions(answers), False
+    support.data = c.pointer(
+        _Callbacks(
+            f"{package}::{kind}".encode(),
+            short.encode(),
+            functions["serialize"],
+            functions["deserialize"],
+            functions["serialized_size"],
+            functions["maximum_size"],
+        )
+    )
+    support.func = functions["resolve"]
     support.about = about(name)
     return c.MessageSupport(
         ctypes.addressof(support),
-        c.address(PYFUNCTYPE(py_object)(_memory_type(name, cls))),
+        c.address(PYFUNCTYPE(py_object)(_memory_type(name, cls, apart))),
         c.c_function("Py_DecRef"),
         c.c_function("PyNumber_MatrixMultiply"),
         c.c_function("PyNumber_Positive"),

@@ -13,7 +13,7 @@ from functools import cache
 from typing import NamedTuple
 
 from . import typesupport_c as c
-from . import typesupport_native as native
+from . import typesupport_memory as memory
 from .typesupport_descriptions import (
     ARRAY,
     BOUNDED_SEQUENCE,
@@ -110,7 +110,7 @@ def _member(field: Field, offset: int, functional: bool) -> Member:
         member.members = handle(field.nested_type_name, functional)
     if field.shape != SCALAR and functional:
         size = ctypes.sizeof(element_type(field))
-        functions = native.elements(size, native.element_content(field))
+        functions = memory.elements(size, memory.element_content(field))
         if field.shape == ARRAY:
             member.get_function = functions.in_array
         else:
@@ -126,7 +126,7 @@ def members(name: str, functional: bool) -> Members:
     placed = placed_fields(name)
     table = [_member(field, offset, functional) for field, offset in placed]
     size = ctypes.sizeof(structure(name))
-    finish = native.elements(size, native.content(name)).finish if functional else None
+    finish = memory.elements(size, memory.content(name)).finish if functional else None
     package, kind, short = name.split("/")
     return c.keep(
         Members(

@@ -14,6 +14,7 @@ from typing import Any
 from . import typesupport_c as c
 from . import typesupport_callbacks as callbacks
 from . import typesupport_introspection as introspection
+from . import typesupport_memory as memory
 from . import typesupport_native as native
 from . import typesupport_transcode as transcode
 from .cdr import HEADERS, NATIVE
@@ -49,9 +50,16 @@ def _converter(cls: Any, name: str) -> object:
 
 def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
-    size = ctypes.sizeof(structure(name))
-    functions = native.functions(size, native.content(name), _converter(cls, name))
-    handle = introspection.handle(name, functional=True)
+    size, content = ctypes.sizeof(structure(name)), memory.content(name)
+    try:
+        functions = memory.functions(size, content, _converter(cls, name))
+        handle = introspection.handle(name, functional=True)
+    except native.RefusedError as error:
+        raise ImportError(
+            f"idlc's type support for this middleware needs machine code, but {error}: "
+            "set RMW_IMPLEMENTATION to rmw_fastrtps_cpp, or build the interface package "
+            "with colcon"
+        ) from error
     return c.MessageSupport(handle, *functions[:4])
 
 
