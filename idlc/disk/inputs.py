@@ -13,6 +13,7 @@ from idlc.disk.find import InterfaceFile
 from idlc.disk.lock import digest
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import absolute, decode, read_bytes, shown
+from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Report
@@ -46,6 +47,12 @@ class Inputs(msgspec.Struct, frozen=True):
     def digests(self) -> dict[str, str]:
         """The SHA-256 of each file by its name within the package."""
         return {one.file.key: digest(one.data) for one in self.files}
+
+    @property
+    def names(self) -> frozenset[TypeName]:
+        """The names of the interfaces that its files define."""
+        files = (one.file for one in self.files)
+        return frozenset(TypeName(self.package, file.kind, file.name) for file in files)
 
     @property
     def own(self) -> dict[str, tuple[Path, ...]]:

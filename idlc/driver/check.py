@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -11,7 +11,7 @@ from idlc.disk import inputs
 from idlc.disk.facts import facts
 from idlc.disk.find import find
 from idlc.disk.library import Library
-from idlc.driver.stages import compile_package, sources_of, stage
+from idlc.driver.stages import Compiler, stage
 from idlc.text.diagnostics import Diagnostic, Report
 
 if TYPE_CHECKING:
@@ -59,22 +59,13 @@ def _once(options: CheckOptions, report: Report) -> tuple[tuple[str, ...], list[
     packages = inputs.packages(files, options.package, report)
     own = {given.package: given.folders for given in packages}
     everything = Report()
+    library = Library(options.include, everything, own=own)
     texts: list[Source] = []
-    for given in packages:
-        library = Library(options.include, everything, own=own)
-        sources = list(sources_of(given, everything))
-        texts += [source for _, source in sources]
-        model = compile_package(given.package, sources, library, everything)
-        _advise(given, _only(model, {name for name, _ in sources}), library, everything)
+    for given, model in Compiler(library).all(packages, everything):
+        mine = model.only(given.names)
+        texts += [one.source for one in mine.own if one.source]
+        _advise(given, mine, library, everything)
     return tuple(file.shown for file in files), _wanted(everything, texts, options.selection)
-
-
-def _only(model: Model, names: Iterable[object]) -> Model:
-    """Return a model whose own interfaces are those of the given files, without neighbours."""
-    from idlc.model.link import Model
-
-    own = tuple(interface for interface in model.own if interface.name in names)
-    return Model(model.package, own, model.interfaces)
 
 
 def _advise(given: inputs.Inputs, model: Model, library: Library, report: Report) -> None:
