@@ -12,7 +12,7 @@ from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out
 from idlc.disk.statements import statements
 from idlc.driver.stages import models_of, stage
-from idlc.emit.limits import oversized
+from idlc.emit.limits import Extents, oversized
 from idlc.model.changes.allow import Allowance, without_allowed
 from idlc.model.changes.change import LEVELS
 from idlc.model.changes.packages import (
@@ -134,8 +134,9 @@ def _models(
     found = Report()
     models = {model.package: model for model, _ in models_of(given, include, found)}
     if not found.had_errors:
+        extents: Extents = {}
         for model in models.values():
-            found.extend(oversized(model))
+            found.extend(oversized(model, extents))
     report.extend(one for one in found if one.severity is codes.ERROR)
     return models
 

@@ -120,8 +120,8 @@ def models_of(
     own = {given.package: given.folders for given in packages}
     library = Library(include, report, own=own)
     for given, model in Compiler(library).all(packages, report):
-        mine = [one for one in model.own if one.name in given.names]
-        yield model, [name for own in mine for name in derived_names(own)]
+        mine = model.only(given.names).own
+        yield model, [name for one in mine for name in derived_names(one)]
 
 
 def derived_names(interface: ir.Interface) -> list[str]:
