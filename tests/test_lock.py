@@ -1,4 +1,4 @@
-"""An idlc.lock of unknown origin is used, or refused with IDL615, by every command that reads it."""
+"""An idlc.lock of unknown origin is used, or refused with IDL615, by every command."""
 
 import json
 import shutil

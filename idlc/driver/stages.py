@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 from idlc.disk import inputs
 from idlc.disk.library import Library
+from idlc.disk.scope import Scope
 from idlc.model import derive, ir
-from idlc.text.diagnostics import Report
+from idlc.text import codes
+from idlc.text.diagnostics import Report, Severity
 from idlc.text.source import Source
 
 if TYPE_CHECKING:
@@ -113,15 +115,42 @@ def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeNa
             yield ir.TypeName(given.package, one.file.kind, one.file.name), source
 
 
-def models_of(
-    packages: Sequence[inputs.Inputs], include: Sequence[str], report: Report
-) -> Iterator[tuple[Model, list[str]]]:
-    """Yield each package's model and the names of what its files define, derived ones included."""
+def library_for(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> Library:
+    """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
-    library = Library(include, report, own=own)
-    for given, model in Compiler(library).all(packages, report):
-        mine = model.only(given.names).own
-        yield model, [name for one in mine for name in derived_names(one)]
+    return Library(scope.include, report, own=own, exclude=scope.exclude)
+
+
+def models_of(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> Iterator[tuple[inputs.Inputs, Model]]:
+    """Yield each package with its model; all problems are reported."""
+    yield from Compiler(library_for(packages, scope, report)).all(packages, report)
+
+
+def sound_models(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> list[tuple[Model, list[str]]]:
+    """Return each package's model and the names of what its files define, derived ones included.
+
+    Interfaces with errors, and those that hold them, are left out, which is noted.
+    """
+    models = list(models_of(packages, scope, report))
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    broken = {one.where[0] for one in errors}
+    found, left_out = [], []
+    for given, model in models:
+        sound = model.sound(broken) if errors else model
+        if any(one.code == codes.PACKAGE_NAME.id for one in errors):
+            sound = sound.only(())
+        mine = sound.only(given.names).own
+        found.append((sound, [name for one in mine for name in derived_names(one)]))
+        left_out += sorted(given.names - {one.name for one in mine})
+    if left_out:
+        names = ", ".join(f"`{name}`" for name in left_out[:5])
+        more = f" and {len(left_out) - 5} more" if len(left_out) > 5 else ""
+        report.notes.append(f"left out, because of errors: {names}{more}")
+    return found
 
 
 def derived_names(interface: ir.Interface) -> list[str]:

@@ -80,6 +80,26 @@ class Model:
         own = tuple(interface for interface in self.own if interface.name in names)
         return Model(self.package, own, self.interfaces, self._pool)
 
+    def sound(self, broken: Container[str]) -> Model:
+        """Return the model without the interfaces in `broken` files, and those that hold them."""
+        users: dict[ir.TypeName, list[ir.TypeName]] = {}
+        for name in self.interfaces:
+            for _, target in self._pool.references(name) if self._pool else ():
+                users.setdefault(target, []).append(name)
+        bad: set[ir.TypeName] = set()
+        waiting = [
+            name
+            for name, one in self.interfaces.items()
+            if one.source is not None and one.source.path in broken
+        ]
+        while waiting:
+            name = waiting.pop()
+            if name not in bad:
+                bad.add(name)
+                waiting += users.get(name, ())
+        sound = {name: one for name, one in self.interfaces.items() if name not in bad}
+        return Model(self.package, self.only(sound).own, sound, self._pool)
+
 
 def link(
     package: str,

@@ -171,6 +171,7 @@ STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
+DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -191,6 +192,7 @@ USAGE: frozenset[str] = frozenset(
         NO_SUCH_TYPE,
         STRUCTURE_TOO_LARGE,
         NO_REVISION,
+        DUPLICATE_PACKAGE,
     )
 )
 

@@ -67,11 +67,15 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Report:
-    """The problems of one run, one per cause: the same code at the same place counts once."""
+    """The problems of one run, one per cause: the same code at the same place counts once.
+
+    `notes` are no problems: what was assumed or left out, for commands that tell it.
+    """
 
     def __init__(self) -> None:
         self._found: dict[tuple[str, str, int, int, str], Diagnostic] = {}
         self._had_errors = False
+        self.notes: list[str] = []
 
     def add(self, diagnostic: Diagnostic) -> None:
         """Add a problem unless the same code already stands at the same place."""
