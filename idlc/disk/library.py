@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -183,6 +184,16 @@ class Library:
             found = set(catalog.packages()) | set(self._own)
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
+
+    def nearby(self, package: str) -> str | None:
+        """Return which -I finds a package that lies beside one of those being compiled."""
+        for root in (root for roots in self._own.values() for root in roots):
+            declared = manifest(root)
+            beside = (declared.parent if declared else root).parent
+            if _NAME.fullmatch(package) and _has_interfaces(beside / package):
+                folder = os.path.relpath(beside)
+                return f"it is in `{Path(folder, package).as_posix()}`: add `-I {folder}`"
+        return None
 
 
 def _interfaces(root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:

@@ -37,6 +37,9 @@ class Library(Protocol):
     def packages(self) -> Iterable[str]:
         """Return the names of all packages, for suggestions."""
 
+    def nearby(self, package: str) -> str | None:
+        """Return how to have a package looked for where it lies, if that is near."""
+
 
 class Model:
     """A package's interfaces and everything that they refer to.
@@ -166,7 +169,8 @@ class _Unknown:
         written = span.text
         known = self._messages.get(target.package)
         if known is None and "/" in written and not self._library.names(target.package):
-            hint = self._near(target.package, self._library.packages)
+            hint = self._library.nearby(target.package)
+            hint = hint or self._near(target.package, self._library.packages)
             return codes.UNKNOWN_PACKAGE.at(
                 span.at(0, len(target.package)),
                 f"unknown package `{target.package}`",
