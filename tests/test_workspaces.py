@@ -161,6 +161,17 @@ def test_generated_trees_and_names_can_be_used_together(monkeypatch):
     subprocess.run([sys.executable, "-c", script], check=True)
 
 
+def test_of_a_package_in_part_there_is_what_the_others_need(monkeypatch):
+    words = ("gen", "nav_msgs/msg/Path", "geometry_msgs/Point", "std_msgs", "-o", "lib")
+    assert idlc(*words)[0] == 0
+    assert idlc(*words, "--check")[0] == 0
+    assert not Path("lib/geometry_msgs/msg/_twist.py").exists()
+    assert idlc("gen", "builtin_interfaces", "-o", "lib/builtin_interfaces")[0] == 0
+    monkeypatch.chdir("lib")
+    script = "from nav_msgs.msg import Path; Path.deserialize(Path().serialize())"
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 def test_a_dependency_is_noticed_whose_file_is_called_like_an_own_one():
     manifest("src/a", "a")
     manifest("src/b", "b")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
+
+import msgspec
 
 from idlc.disk import inputs
 from idlc.disk.find import InterfaceFile, find
@@ -101,6 +104,22 @@ def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
         (home,) if home else (),
         borrowed=True,
     )
+
+
+def completed(
+    given: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
+) -> list[inputs.Inputs]:
+    """Return packages with the interfaces that others need of those given in part; empty for none.
+
+    What is written beside the others is what they import.
+    """
+    found = []
+    for one in given:
+        missing = {name for name in needed if name.package == one.package} - one.names
+        more = (_borrowed(name, str(name), library) for name in missing if one.borrowed)
+        files = sorted((*one.files, *more), key=lambda each: each.file.key)
+        found.append(msgspec.structs.replace(one, files=tuple(files)))
+    return [] if found == [*given] else found
 
 
 def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:

@@ -11,7 +11,7 @@ from idlc.disk.library import Library
 from idlc.disk.naming import accept_name
 from idlc.disk.scope import Scope
 from idlc.disk.target import Target
-from idlc.disk.wanted import borrowed, targets, wanted
+from idlc.disk.wanted import borrowed, completed, targets, wanted
 from idlc.driver import known
 from idlc.driver.rendered import Package, as_inputs, package_of
 from idlc.driver.stages import Compiler, library_for
@@ -92,6 +92,9 @@ def _made(
             return tuple(one for packages in current for one in packages)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
+    needed = {name for model in models for name in model.interfaces}
+    if not report.had_errors and (more := completed(wanted.values(), needed, library)):
+        return _made(dict(zip(wanted, more, strict=True)), options, report)
     packages = [] if report.had_errors else _planned(models, wanted, compiler, options)
     if options.check:
         for one in packages:
