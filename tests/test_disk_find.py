@@ -82,7 +82,7 @@ def test_a_very_deep_folder_is_no_problem(monkeypatch):
 
 def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple[str, list[str]]:
     report = Report()
-    given = wanted(paths, out, Scope(package), report)
+    given = wanted(paths, (), out, Scope(package), report)
     return given[0].package if given else "", [found.code for found in report]
 
 
