@@ -6,9 +6,11 @@ import json
 import sys
 
 from idlc.cli import terminal
-from idlc.disk.find import find
-from idlc.disk.inputs import one_package
+from idlc.disk import config
+from idlc.disk.find import look
+from idlc.disk.inputs import packages
 from idlc.disk.project import Project
+from idlc.disk.scope import scope
 from idlc.driver.gen import GenOptions, gen
 from idlc.driver.query import describe
 from idlc.scaffold import interface
@@ -24,15 +26,17 @@ def compile_interfaces(package: str) -> None:
     if "--dry-run" in sys.argv:
         return  # colcon asks setup.py for the package's name whatever it is to do, to test as well
     report = Report()
-    given = one_package(find((".",), Report()), package, package, report)
-    if given is None:
+    where = scope(config.load(report), package)
+    found = packages(look((".",), Report(), where.exclude).files, where, report)
+    if not found:
         return
-    gen(GenOptions(paths=(".",), out=package, package=package), report)
+    (given,) = found
+    gen(GenOptions(paths=(".",), out=package, scope=where), report)
     project = Project(".", report)
     files = dict([interface.index(package, given.digests)])
     for one in given.files:
         if not report.had_errors:
-            content = json.dumps(describe(one.file.shown, package, (), report), indent=2)
+            content = json.dumps(describe(one.file.shown, where, report), indent=2)
             files[f"{interface.RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
     planned = None if report.had_errors else project.plan({}, files)
     if planned is not None:

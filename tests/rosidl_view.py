@@ -19,6 +19,7 @@ class Siblings:
 
     names = staticmethod(catalog.names)
     packages = staticmethod(catalog.packages)
+    nearby = staticmethod(catalog.nearby)
 
     def __init__(self, case):
         self.texts = {}

@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from evolution import compile_texts
+from evolution import Evolution, compile_texts
 
 from idlc.cli.main import main
 from idlc.model.changes.packages import Comparison, compare
@@ -63,6 +63,13 @@ def found(old, new):
             {"A": "B b\nint8 c\n", "B": "int8 x\n"},
             {("IDL503", "B.y", "hash source"), ("IDL515", "A.b", "hash wire")},
         ),
+        # what rosidl puts into an empty structure itself
+        ("", "uint8 structure_needs_at_least_one_member\n", set()),
+        (
+            "uint8 structure_needs_at_least_one_member\n",
+            "",
+            {("IDL503", "A.structure_needs_at_least_one_member", "source")},
+        ),
         # removed from the padding before a larger value: nothing moves
         ("int8 a\nint8 b\nint32 c\n", "int8 a\nint32 c\n", {("IDL503", "A.b", "hash source")}),
     ],
@@ -106,8 +113,60 @@ def test_the_next_version(version, part, expected):
 
 def test_the_part_to_raise():
     assert part_to_raise(Comparison(())) is None
-    assert part_to_raise(Comparison((), 0, differs=True)) == "patch"
-    assert part_to_raise(Comparison((), 1, differs=True)) == "minor"
+    assert part_to_raise(Comparison((), (), differs=True)) == "patch"
+    assert part_to_raise(Comparison((), ("message `a/msg/B`",), differs=True)) == "minor"
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_the_hash_is_said_to_change_exactly_when_it_does(seed):
+    history = Evolution(seed)
+    before = compile_texts(history.texts())
+    for _ in range(2):
+        history.edit()
+    after = compile_texts(history.texts())
+    changes = compare(before, after).changes
+    for name in "ABC":
+        full = f"p/msg/{name}"
+        said = any(c.subject.startswith(full) and "hash" in c.levels for c in changes)
+        assert said == (before.describer.hash(full) != after.describer.hash(full)), name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("int8 a\n", "int8 a\r\n", "nothing breaks; the versions are the same"),
+        ("int8 a\n", "int8  a\n", "nothing breaks; raise the patch version"),
+        ("int8 a\n", "int8 a\n\n# the end", "nothing breaks; raise the patch version"),
+        ("int8 a\n", "int8 a  # [m]\n", "nothing breaks; raise the patch version"),
+        (
+            "int8 a\n",
+            "int8 B=1\nint8 a\n",
+            "nothing breaks; added: constant `demo/msg/A.B`; raise the minor version",
+        ),
+    ],
+)
+def test_only_equal_versions_are_called_the_same(old, new, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write("old/demo/msg/A.msg", old)
+    write("new/demo/msg/A.msg", new)
+    assert main(["breaking", "new/demo", "--against", "old/demo"]) == 0
+    assert capsys.readouterr().out == f"{said}\n"
+
+
+def test_a_lock_of_other_texts_is_not_the_same(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write("demo/package.xml", "<package><name>demo</name></package>")
+    write("demo/msg/A.msg", "int8 a\n")
+    assert main(["gen", "demo", "-o", "out/demo"]) == 0
+    capsys.readouterr()
+    assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 0
+    assert capsys.readouterr().out == "nothing breaks; the versions are the same\n"
+    write("demo/msg/A.msg", "int8 a 3\n")
+    assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 0
+    assert capsys.readouterr().out == "nothing breaks; raise the patch version\n"
+    Path("demo/msg/A.msg").unlink()
+    assert main(["breaking", "demo", "--against", "out/demo/idlc.lock"]) == 1
+    assert "error[IDL501]" in capsys.readouterr().out
 
 
 def write(path, text):
@@ -171,6 +230,32 @@ def test_what_was_removed_is_found_in_the_revision(repository, capsys):
 @pytest.mark.parametrize("name", ["nothing", "-h", "--output=x", "v1:src", ""])
 def test_a_revision_that_there_is_not(capsys, name):
     assert run(capsys, "src", "--against", f"git:{name}") == (2, [("IDL630", "src")])
+
+
+@pytest.mark.usefixtures("repository")
+def test_what_is_gone_altogether_was_removed(capsys):
+    Path("src/base/msg/Base.msg").unlink()
+    expected = (1, [("IDL501", "git:v1:src/base/msg/Base.msg")])
+    assert run(capsys, "src/base", "--against", "git:v1") == expected
+
+
+@pytest.mark.usefixtures("repository")
+def test_a_revision_without_its_mark_is_recognised(capsys):
+    assert main(["breaking", "src", "--against", "HEAD"]) == 2
+    assert "hint: the git revision is `--against git:HEAD`" in capsys.readouterr().out
+    assert main(["breaking", "src", "--against", "HEAD~9"]) == 2
+    assert "git:" not in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("repository")
+def test_excluded_files_are_so_in_both_versions(capsys):
+    write("src/base/msg/Base.msg", "int64 x\n")
+    write("pyproject.toml", "[tool.idlc]\nexclude = ['src/base/msg/B*.msg', 'top']\n")
+    write("src/base/msg/Other.msg", "int64 x\n")
+    assert run(capsys, "src", "--against", "git:v1") == (0, [])
+    Path("pyproject.toml").unlink()
+    assert run(capsys, "src", "--against", "git:v1", "--exclude", "base/msg/B*")[0] == 1
+    assert run(capsys, "src/base", "--against", "git:v1", "--exclude", "Base.msg")[0] == 0
 
 
 @pytest.mark.usefixtures("repository")

@@ -316,7 +316,7 @@ def test_ctrl_c_ends_with_the_status_that_shells_expect(monkeypatch, capsys):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("idlc.driver.check.find", interrupt)
+    monkeypatch.setattr("idlc.driver.check.look", interrupt)
     assert main(["check", "."]) == 130
     assert capsys.readouterr().err.strip() == "interrupted"
 

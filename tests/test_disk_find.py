@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from idlc.disk import inputs
 from idlc.disk.find import find
 from idlc.disk.library import Library
 from idlc.disk.lock import meaning
+from idlc.disk.scope import Scope
+from idlc.disk.wanted import wanted
 from idlc.model.ir import TypeName
 from idlc.text.diagnostics import Report
 
@@ -81,13 +82,13 @@ def test_a_very_deep_folder_is_no_problem(monkeypatch):
 
 def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple[str, list[str]]:
     report = Report()
-    given = inputs.one_package(find(paths, report), package, out, report)
-    return given.package if given else "", [found.code for found in report]
+    given = wanted(paths, (), out, Scope(package), report)
+    return given[0].package if given else "", [found.code for found in report]
 
 
 def test_the_package_name_comes_from_the_option_then_package_xml_then_the_folder():
     make("ws/my_pkg/msg/A.msg", "ws/my_pkg/interfaces/B.srv")
-    assert one(["ws/my_pkg"], out="gen/from_out") == ("from_out", ["IDL608"])
+    assert one(["ws/my_pkg"], out="gen/from_out") == ("", ["IDL608"])
     assert one(["ws/my_pkg/msg"], out="gen/from_out") == ("from_out", [])
     manifest("ws/my_pkg/package.xml", "from_xml")
     assert one(["ws/my_pkg"], out="gen/from_out") == ("from_xml", [])

@@ -179,9 +179,12 @@ def test_only_pages_of_an_earlier_run_are_replaced_or_removed(site, capsys):
     assert [path.name for path in Path("other").iterdir()] == ["index.html"]
 
 
-def test_errors_write_nothing(site, capsys):
+def test_what_has_errors_is_left_out_and_the_rest_written(site, capsys):
     write("demo/msg/Wrong.msg", "flot64 a\n")
+    write("demo/msg/Uses.msg", "Wrong[] a\n")
     assert main(["docs", "demo", "-o", "elsewhere"]) == 1
-    assert not Path("elsewhere").exists()
-    assert "[IDL201]" in capsys.readouterr().err
-    assert (site / "index.html").exists()
+    said = capsys.readouterr().err
+    assert "[IDL201]" in said
+    assert "left out, because of errors: `demo/msg/Uses`, `demo/msg/Wrong`" in said
+    pages = {path.name for path in Path("elsewhere").rglob("*.html")}
+    assert pages == {path.name for path in site.rglob("*.html")}

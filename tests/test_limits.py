@@ -10,10 +10,13 @@ import json
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
+import idlc.disk.inputs
+import idlc.model.pool
 from idlc.cli.main import main
 
 #: How much larger input is when there is time, as in `make fuzz`.
@@ -47,7 +50,26 @@ MANY = {
     "comments below": lambda n: {A: "int8 a\n" + "  # x\n" * n},
     "actions": lambda n: {f"action/A{i}.action": "int8 x\n---\n---\n" for i in range(n)},
     "a chain": lambda n: chain(n // 10),
+    "a chain of packages": lambda n: chain_of_packages(n // 4),
+    "tags of package.xml": lambda n: xml(n, "<depend>std_msgs</depend>"),
+    "tags in tags": lambda n: xml(1, "<a>" * n + "</a>" * n),
 }
+
+
+def chain_of_packages(count):
+    """Each package uses the next, so that the first needs all."""
+    files = {}
+    for number in range(count):
+        files[f"p{number}/package.xml"] = f"<package><name>p{number}</name></package>"
+        files[f"p{number}/msg/A.msg"] = f"p{number + 1}/A a\n" if number < count - 1 else "int8 a\n"
+    return files
+
+
+def xml(count, text):
+    manifest = f"<package><name>p</name>{text * count}</package>"
+    return {"package.xml": manifest, A: "int8 x\n"}
+
+
 #: The same, of what idlc complains about.
 MANY_PROBLEMS = {
     "duplicates": lambda n: {A: "int32 x\n" * n},
@@ -118,6 +140,31 @@ def test_checking_is_linear(what):
     assert_linear({**MANY, **MANY_PROBLEMS}[what], lambda folder: ["check", folder])
 
 
+@pytest.mark.parametrize("command", [["check"], ["hash"], ["breaking", "--against", "ws"]])
+def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command, monkeypatch):
+    make(Path("ws"), {**chain_of_packages(30), "q/msg/B.msg": "p0/A a\np7/A b\n"})
+    lowered, read = Counter(), Counter()
+
+    def lower(file, name, report):
+        lowered[file.source.path] += 1
+        return lower_(file, name, report)
+
+    def read_bytes(path, *rest):
+        read[str(path)] += 1
+        return read_bytes_(path, *rest)
+
+    lower_, read_bytes_ = idlc.model.lower.lower, idlc.disk.read.read_bytes
+    for module in ("idlc.model.lower.lower", "idlc.model.pool.lower"):
+        monkeypatch.setattr(module, lower)
+    for module in ("idlc.disk.read.read_bytes", "idlc.disk.inputs.read_bytes"):
+        monkeypatch.setattr(module, read_bytes)
+    assert main([command[0], "ws", *command[1:]]) == 0
+    versions = 2 if command[0] == "breaking" else 1
+    files = [*(f"ws/p{n}/msg/A.msg" for n in range(30)), "ws/q/msg/B.msg"]
+    assert lowered == dict.fromkeys(files, versions)
+    assert {path: n for path, n in read.items() if path.endswith(".msg")} == lowered
+
+
 @pytest.mark.parametrize(
     "what", ["fields", "texts", "messages", "constants", "used files", "actions"]
 )
@@ -138,6 +185,11 @@ def test_laying_out_is_linear(what):
 def test_showing_is_linear(what):
     path = "msg/M0.msg" if what == "a chain" else A
     assert_linear(MANY[what], lambda folder: ["show", f"{folder}/{path}", "--package", "p"])
+
+
+@pytest.mark.parametrize("what", ["files", "used files", "actions"])
+def test_hashing_is_linear(what):
+    assert_linear(MANY[what], lambda folder: ["hash", folder])
 
 
 @pytest.mark.parametrize("what", ["fields", "messages", "constants", "units", "files", "actions"])
@@ -286,6 +338,19 @@ def test_what_is_very_long_is_generated_and_laid_out_soon(here):
     commands += [["show", f"p{number}/{A}"] for number in numbers]
     commands += [["docs", f"p{number}", "-o", f"site/p{number}"] for number in numbers]
     commands += [["fmt", f"p{number}"] for number in numbers]
+    for words, (status, out) in limited(commands).items():
+        assert status == 0, f"{words}: {out[:300]}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["<a>" * 400_000 + "</a>" * 400_000, "<depend>é</depend>" * 100_000],
+    ids=["tags in tags", "statements"],
+)
+def test_a_package_xml_of_many_tags_is_read_soon(text, here):
+    make(here / "pkg", {**xml(1, text), A: "int8 x\n"})
+    commands = [["check", "pkg"], ["gen", "pkg", "-o", "out/p"]]
+    commands += [["breaking", "pkg", "--against", "pkg"]]
     for words, (status, out) in limited(commands).items():
         assert status == 0, f"{words}: {out[:300]}"
 

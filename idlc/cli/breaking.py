@@ -50,6 +50,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 )
 @options.package
 @options.include
+@options.exclude
 @options.report_style
 def command(
     paths: tuple[str, ...],
@@ -57,6 +58,7 @@ def command(
     levels: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
+    exclude: tuple[str, ...],
     style: str,
 ) -> int:
     """Report what a new version of interfaces breaks, and for whom.
@@ -68,6 +70,7 @@ def command(
 
     from idlc.cli import terminal
     from idlc.disk import config, tables
+    from idlc.disk.scope import scope
     from idlc.driver.breaking import BreakingOptions, breaking
     from idlc.text.diagnostics import Report
 
@@ -82,8 +85,7 @@ def command(
         wanted = BreakingOptions(
             paths=paths or settings.paths or (".",),
             against=against,
-            package=package or settings.package,
-            include=(*include, *settings.include),
+            scope=scope(settings, package, include, exclude),
             levels=levels or LEVELS,
             allowed=allowed,
             allowed_in=settings.source.path if settings.source else "",
@@ -96,6 +98,7 @@ def command(
 
 def _show(report: Report, verdict: Verdict | None, style: str) -> None:
     from idlc.cli import reports, terminal
+    from idlc.driver.check import Checked
     from idlc.text.github import notice
 
     if style == "json":
@@ -107,7 +110,7 @@ def _show(report: Report, verdict: Verdict | None, style: str) -> None:
         if verdict:
             sys.stdout.write(f"{_summary(verdict)}\n")
     else:
-        reports.write(report, style, (), 0, sys.stdout, command="breaking")
+        reports.write(report, style, Checked(()), sys.stdout, command="breaking")
         if style == "github" and verdict:
             sys.stdout.write(notice("idlc breaking", _summary(verdict)))
 
@@ -117,6 +120,9 @@ def _summary(verdict: Verdict) -> str:
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
     if verdict.allowed:
         text += f"; allowed: {verdict.allowed}"
+    if verdict.added:
+        more = f" and {len(verdict.added) - 5} more" if len(verdict.added) > 5 else ""
+        text += f"; added: {', '.join(verdict.added[:5])}{more}"
     if verdict.part is None:
         return f"{text}; the versions are the same"
     if verdict.next_version:

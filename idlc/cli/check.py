@@ -29,6 +29,7 @@ Example:
 @click.option("--strict", is_flag=True, help="Fail on warnings as well.")
 @options.package
 @options.include
+@options.exclude
 @options.report_style
 def command(
     paths: tuple[str, ...],
@@ -38,6 +39,7 @@ def command(
     strict: bool,
     package: str | None,
     include: tuple[str, ...],
+    exclude: tuple[str, ...],
     style: str,
 ) -> int:
     """Report every problem of interface files and of the packages around them.
@@ -50,4 +52,5 @@ def command(
     from idlc.cli.checking import Wishes, check_paths
 
     options.check_rules(select, ignore)
-    return check_paths(paths, Wishes(select, ignore, fix, strict, package, include, style))
+    wishes = Wishes(select, ignore, fix, strict, package, include, exclude, style)
+    return check_paths(paths, wishes)

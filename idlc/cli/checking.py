@@ -9,6 +9,7 @@ import msgspec
 from idlc.checks.select import Selection
 from idlc.cli import reports, terminal
 from idlc.disk import config, tables
+from idlc.disk.scope import scope
 from idlc.driver.check import Checked, CheckOptions, check
 from idlc.text.diagnostics import Report
 
@@ -22,6 +23,7 @@ class Wishes(msgspec.Struct, frozen=True):
     strict: bool = False
     package: str | None = None
     include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
     style: str = "text"
 
 
@@ -35,13 +37,12 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     if not report.had_errors:
         wanted = CheckOptions(
             paths=paths or settings.paths or (".",),
-            package=wishes.package or settings.package,
-            include=(*wishes.include, *settings.include),
+            scope=scope(settings, wishes.package, wishes.include, wishes.exclude),
             selection=chosen,
             fix=wishes.fix,
         )
         checked = check(wanted, report)
-    reports.write(report, wishes.style, checked.files, checked.fixed, sys.stdout)
+    reports.write(report, wishes.style, checked, sys.stdout)
     return terminal.status(report) or int(wishes.strict and bool(len(report)))
 
 

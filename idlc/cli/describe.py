@@ -30,12 +30,17 @@ def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:
     import json
 
     from idlc.cli import terminal
+    from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.query import describe
     from idlc.text.diagnostics import Report
 
     report = Report()
-    content = describe(wanted, package, include, report)
+    settings = config.load(report)
+    where = scope(settings, package, include)
+    content = None if report.had_errors else describe(wanted, where, report)
     if content is not None:
         sys.stdout.write(json.dumps(content, indent=2) + "\n")
     terminal.show(report, "text", sys.stderr)
+    terminal.notes(report, sys.stderr)
     return terminal.status(report)

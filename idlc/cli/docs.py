@@ -23,13 +23,21 @@ Example:
 @click.option("-o", "--out", metavar="DIR", required=True, type=click.Path(), help="The site.")
 @options.package
 @options.include
-def command(paths: tuple[str, ...], out: str, package: str | None, include: tuple[str, ...]) -> int:
+@options.exclude
+def command(
+    paths: tuple[str, ...],
+    out: str,
+    package: str | None,
+    include: tuple[str, ...],
+    exclude: tuple[str, ...],
+) -> int:
     """Write a static HTML site about interfaces: links, units, constants, hashes, a search.
 
     It needs no server and loads nothing from elsewhere.
     """
     from idlc.cli import terminal
     from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.docs import docs
     from idlc.text.diagnostics import Report
     from idlc.text.present import counted
@@ -39,9 +47,9 @@ def command(paths: tuple[str, ...], out: str, package: str | None, include: tupl
     pages = 0
     if not report.had_errors:
         paths = paths or settings.paths or (".",)
-        include = (*include, *settings.include)
-        pages = docs(paths, out, package or settings.package, include, report)
+        pages = docs(paths, out, scope(settings, package, include, exclude), report)
     terminal.show(report, "text", sys.stderr)
+    terminal.notes(report, sys.stderr)
     if pages:
         sys.stdout.write(f"{counted(pages, 'page')} in {out}, begin with {out}/index.html\n")
     return terminal.status(report)

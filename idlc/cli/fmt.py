@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from idlc.cli import options
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TextIO
@@ -27,7 +29,8 @@ Example:
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option("--check", is_flag=True, help="Write nothing; fail if a file would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change, and fail if so.")
-def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
+@options.exclude
+def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...]) -> int:
     """Lay interface files out: one space after types, comments in one column.
 
     Words, values and comments stay as they are, and so does the meaning. Files with errors are
@@ -35,6 +38,7 @@ def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
     """
     from idlc.cli import terminal
     from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.fmt import fmt
     from idlc.text.diagnostics import Report
     from idlc.text.present import counted
@@ -45,7 +49,8 @@ def command(paths: tuple[str, ...], check: bool, diff: bool) -> int:
     dry = check or diff
     files: list[Formatted] = []
     if not report.had_errors:
-        for file in fmt(paths or settings.paths or (".",), report, write=not dry):
+        left_out = scope(settings, exclude=exclude).exclude
+        for file in fmt(paths or settings.paths or (".",), left_out, report, write=not dry):
             files.append(file)
             if file.changed and diff:
                 sys.stdout.writelines(_diff(file, sys.stdout))

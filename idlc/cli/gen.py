@@ -27,10 +27,11 @@ All options can be kept in pyproject.toml:
 
 
 @click.command("gen", epilog=EPILOG)
-@click.argument("paths", metavar="PATH...", nargs=-1, type=click.Path())
-@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The package folder to write.")
+@click.argument("paths", metavar="PATH|PACKAGE|TYPE...", nargs=-1, type=click.Path())
+@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
 @options.package
 @options.include
+@options.exclude
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
 @click.option(
@@ -41,10 +42,14 @@ All options can be kept in pyproject.toml:
 def command(style: str, watch: bool, **given: Any) -> int:
     """Compile interface files into a Python package.
 
-    PATH is a package folder, a folder of interface files, or a .msg, .srv or .action file.
+    PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
+    packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
+
+    OUT is the package for one package. Several are written to OUT/NAME each.
     """
     from idlc.cli import generate, terminal
     from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.gen import GenOptions
     from idlc.text.diagnostics import Report
 
@@ -53,7 +58,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
     if report.had_errors:
         terminal.show(report, style, sys.stdout if style == "json" else sys.stderr)
         return terminal.status(report)
-    wanted = generate.completed(GenOptions(**given), settings)
+    words = (given.pop("package"), given.pop("include"), given.pop("exclude"))
+    wanted = generate.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
     if not wanted.paths or not wanted.out:
         missing = "-o OUT" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")

@@ -17,8 +17,6 @@ def completed(wanted: GenOptions, settings: Config) -> GenOptions:
     return wanted._replace(
         paths=wanted.paths or settings.paths,
         out=wanted.out or settings.out or "",
-        package=wanted.package or settings.package,
-        include=(*wanted.include, *settings.include),
         vendor_deps=wanted.vendor_deps or settings.vendor_deps,
     )
 
@@ -34,6 +32,7 @@ def once(wanted: GenOptions, style: str) -> int:
         terminal.fact(sys.stdout, "summary", **terminal.counts(report))
         return terminal.status(report)
     terminal.show(report, style, sys.stderr)
+    terminal.notes(report, sys.stderr)
     if report.had_errors:
         outcome = "" if wanted.check else "; nothing was written"
         sys.stderr.write(f"{summary(report)}{outcome}\n")

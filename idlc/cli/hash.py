@@ -27,17 +27,29 @@ Example:
 )
 @options.package
 @options.include
-def command(wanted: tuple[str, ...], package: str | None, include: tuple[str, ...]) -> int:
+@options.exclude
+def command(
+    wanted: tuple[str, ...],
+    package: str | None,
+    include: tuple[str, ...],
+    exclude: tuple[str, ...],
+) -> int:
     """Print type hashes (RIHS01), derived types of services and actions included.
 
     TYPE is a name such as std_msgs/msg/Header, PATH a file or folder as for `idlc gen`.
     """
     from idlc.cli import terminal
+    from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.query import hashes
     from idlc.text.diagnostics import Report
 
     report = Report()
-    for value, name in hashes(wanted, package, include, report):
-        sys.stdout.write(f"{value}  {name}\n")
+    settings = config.load(report)
+    if not report.had_errors:
+        where = scope(settings, package, include, exclude)
+        for value, name in hashes(wanted, where, report):
+            sys.stdout.write(f"{value}  {name}\n")
     terminal.show(report, "text", sys.stderr)
+    terminal.notes(report, sys.stderr)
     return terminal.status(report)

@@ -18,7 +18,8 @@ def package(command: Command) -> Command:
     return click.option(
         "--package",
         metavar="NAME",
-        help="The package's name. Otherwise that of the nearest package.xml, or the folder's.",
+        help="The package's name. Otherwise that of the nearest package.xml, of the package that "
+        "was generated from the files, or of the folder.",
     )(command)
 
 
@@ -32,6 +33,16 @@ def include(command: Command) -> Command:
         type=click.Path(file_okay=False),
         help="Look for other packages here first: a package, a source tree or an install prefix. "
         "May be repeated.",
+    )(command)
+
+
+def exclude(command: Command) -> Command:
+    """Add --exclude."""
+    return click.option(
+        "--exclude",
+        metavar="PATTERN",
+        multiple=True,
+        help="Leave out files or folders such as `msg/ros1/**` or `*_test`. May be repeated.",
     )(command)
 
 

@@ -79,6 +79,7 @@ class InterfaceItem(pytest.Item):
 
 def _problems(path: Path) -> list[Diagnostic]:
     from idlc.disk import config, tables
+    from idlc.disk.scope import scope
     from idlc.driver.check import CheckOptions, check
     from idlc.text.diagnostics import Report
 
@@ -86,11 +87,5 @@ def _problems(path: Path) -> list[Diagnostic]:
     settings = config.load(report)
     selection = tables.selection(settings, report)
     if not report.had_errors:
-        options = CheckOptions(
-            paths=(str(path),),
-            package=settings.package,
-            include=settings.include,
-            selection=selection,
-        )
-        check(options, report)
+        check(CheckOptions((str(path),), scope(settings), selection), report)
     return list(report)

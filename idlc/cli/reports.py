@@ -2,32 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from idlc import __version__
 from idlc.cli import terminal
 from idlc.text.diagnostics import Report
 from idlc.text.present import counted, summary
 
+if TYPE_CHECKING:
+    from idlc.driver.check import Checked
+
 
 def write(
-    report: Report,
-    style: str,
-    files: Sequence[str],
-    fixed: int,
-    stream: TextIO,
-    *,
-    command: str = "check",
+    report: Report, style: str, checked: Checked, stream: TextIO, *, command: str = "check"
 ) -> None:
-    """Write a report on files that were looked at; formats for machines are one whole document."""
+    """Write a report on what was looked at; formats for machines are one whole document."""
+    files, fixed = checked.files, checked.fixed
     match style:
         case "text":
             terminal.show(report, style, stream)
             mended = f"{counted(fixed, 'problem')} mended, " if fixed else ""
-            rest = (
-                summary(report) if len(report) else f"no problems in {counted(len(files), 'file')}"
-            )
+            what = counted(len(files), "file")
+            if not files and checked.packages:
+                what = f"{counted(checked.packages, 'package')} without interfaces"
+            rest = summary(report) if len(report) else f"no problems in {what}"
             stream.write(f"{mended}{rest}\n")
         case "json":
             terminal.show(report, style, stream)

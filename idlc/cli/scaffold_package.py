@@ -40,7 +40,7 @@ def command(
 
     Interfaces in its msg/, srv/ and action/ folders are compiled whenever it is built.
     """
-    from idlc.disk.inputs import accept_name
+    from idlc.disk.naming import accept_name
     from idlc.driver import scaffold
     from idlc.scaffold.package import Package
     from idlc.text.diagnostics import Report

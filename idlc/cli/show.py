@@ -38,15 +38,20 @@ Example:
 def command(wanted: str, style: str, package: str | None, include: tuple[str, ...]) -> int:
     """Show an interface with the messages in it and all comments."""
     from idlc.cli import terminal
+    from idlc.disk import config
+    from idlc.disk.scope import scope
     from idlc.driver.show import show
     from idlc.text.diagnostics import Report
     from idlc.text.visible import visible
 
     report = Report()
-    texts = show(wanted, style, package, include, report)
+    settings = config.load(report)
+    where = scope(settings, package, include)
+    texts = [] if report.had_errors else show(wanted, style, where, report)
     text = "\n".join(texts)
     if style == "text" or sys.stdout.isatty():  # other formats are for other tools
         text = "\n".join(map(visible, text.split("\n")))
     sys.stdout.write(text)
     terminal.show(report, "text", sys.stderr)
+    terminal.notes(report, sys.stderr)
     return terminal.status(report)

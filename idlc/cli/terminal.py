@@ -7,6 +7,7 @@ from typing import TextIO
 
 from idlc.text import codes, present
 from idlc.text.diagnostics import Report, Severity
+from idlc.text.visible import one_line
 
 
 def colours(stream: TextIO) -> bool:
@@ -26,6 +27,11 @@ def show(report: Report, style: str, stream: TextIO) -> None:
 
 def _spaced(report: Report, stream: TextIO) -> list[str]:
     return [f"{block}\n" for block in present.text(report, colour=colours(stream))]
+
+
+def notes(report: Report, stream: TextIO) -> None:
+    """Write what is worth knowing and no problem."""
+    stream.writelines(f"note: {one_line(note)}\n" for note in dict.fromkeys(report.notes))
 
 
 def fact(stream: TextIO, kind: str, **facts: object) -> None:

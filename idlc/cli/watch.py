@@ -16,14 +16,14 @@ INTERVAL = 0.25
 def run_again(wanted: GenOptions, style: str) -> int:
     """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
     try:
-        seen = snapshot(wanted.paths, wanted.include)
+        seen = snapshot(wanted.paths, wanted.scope.include)
         once(wanted, style)
         sys.stderr.write(f"watching {one_line(', '.join(wanted.paths))}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()
             time.sleep(INTERVAL)
-            now = snapshot(wanted.paths, wanted.include)
+            now = snapshot(wanted.paths, wanted.scope.include)
             if now == seen:
                 continue
             while (later := _after(wanted)) != now:
@@ -38,4 +38,4 @@ def run_again(wanted: GenOptions, style: str) -> int:
 def _after(wanted: GenOptions) -> dict[str, tuple[int, int]]:
     """Return a snapshot from a moment later, so that a burst of changes counts as one."""
     time.sleep(INTERVAL)
-    return snapshot(wanted.paths, wanted.include)
+    return snapshot(wanted.paths, wanted.scope.include)

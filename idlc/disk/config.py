@@ -30,21 +30,24 @@ class Config(msgspec.Struct, frozen=True):
     """The settings found; what is absent is empty or `None`. Paths are as one would type them.
 
     `tables` holds the tables of single commands, which are checked by `idlc.disk.tables`;
-    `source` is the file.
+    `source` is the file, `folder` where it lies; `exclude` is relative to that.
     """
 
     paths: tuple[str, ...] = ()
     out: str | None = None
     package: str | None = None
     include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
     vendor_deps: bool = False
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
+    folder: Path | None = None
 
 
 _SHAPES = {
     "paths": "a list of strings",
     "include": "a list of strings",
+    "exclude": "a list of strings",
     "out": "a string",
     "package": "a string",
     "vendor-deps": "true or false",
@@ -114,9 +117,11 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         out=_typed(folder, found["out"]) if "out" in found else None,
         package=found.get("package"),
         include=tuple(_typed(folder, path) for path in found.get("include", ())),
+        exclude=tuple(found.get("exclude", ())),
         vendor_deps=found.get("vendor-deps", False),
         tables={key: value for key, value in found.items() if _SHAPES[key] == "a table"},
         source=source,
+        folder=folder,
     )
 
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from idlc.checks.facts import Facts, Output
 from idlc.disk import lock
-from idlc.disk.find import CLOSING, KINDS, SKIPPED
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.inputs import Inputs
 from idlc.disk.package import manifest
 from idlc.disk.read import decode, read_bytes, read_source, shown
@@ -28,12 +29,14 @@ _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
 
-def facts(given: Inputs, known: Callable[[], Iterable[str]]) -> Facts | None:
+def facts(
+    given: Inputs, known: Callable[[], Iterable[str]], exclude: Exclusions = NOTHING
+) -> Facts | None:
     """Return what surrounds a package's interfaces; `None` without a package.xml.
 
     `known` tells the names of ROS packages; it is asked only for a package with Python code.
     """
-    path = manifest(given.folders[0]) if given.folders else None
+    path = manifest(next(iter(given.folders), given.home))
     unheard = Report()
     source = read_source(path, shown(path), unheard) if path else None
     if path is None or source is None or not (said := read_statements(source)):
@@ -60,8 +63,9 @@ def facts(given: Inputs, known: Callable[[], Iterable[str]]) -> Facts | None:
         setup_cfg=_optional(folder / "setup.cfg"),
         generates=b"rosidl_generate_interfaces" in (makes or b""),
         native=any(file.suffix in _NATIVE for file in files),
-        whole={one.file.path.resolve() for one in given.files}
-        >= {file.resolve() for file in files if file.suffix in KINDS},
+        whole=bool(given.files)
+        and {one.file.path.resolve() for one in given.files}
+        >= {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)},
         marker=(folder / "resource" / given.package).is_file(),
         outputs=tuple(filter(None, map(_output, locks))),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,

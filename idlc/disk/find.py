@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from idlc.disk.package import manifest
-from idlc.disk.read import kind_of, unreadable
+from idlc.disk.exclude import Exclusions
+from idlc.disk.package import MANIFEST, manifest
+from idlc.disk.read import is_folder, kind_of, unreadable
 from idlc.text import codes
+from idlc.text.diagnostics import Report
 from idlc.text.suggest import closest
 
 if TYPE_CHECKING:
     from idlc.model.ir import Kind
-    from idlc.text.diagnostics import Report
+    from idlc.text.diagnostics import Diagnostic
 
 KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
 KIND_FOLDERS = frozenset(KINDS.values())
@@ -29,6 +31,7 @@ SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
 #: What may be a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
+NOTHING = Exclusions()
 
 
 class InterfaceFile(msgspec.Struct, frozen=True):
@@ -57,42 +60,72 @@ def is_path(text: str) -> bool:
     return not named or os.path.lexists(text)
 
 
-def find(paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
-    """Return the interface files that paths mean, each once, sorted.
+class Found(msgspec.Struct, frozen=True):
+    """What paths mean: interface files, each once, sorted, and the folders of packages.
 
-    A folder means every interface file below it. Reports IDL601, IDL602, IDL605 and IDL606.
+    `empty` are the given folders without interface files.
+    """
+
+    files: tuple[InterfaceFile, ...]
+    packages: tuple[Path, ...]
+    empty: tuple[str, ...]
+
+
+def find(
+    paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING
+) -> tuple[InterfaceFile, ...]:
+    """Return the interface files that paths mean; reports IDL606 for a path that means none."""
+    found = look(paths, report, exclude)
+    report.extend(nothing_in(given, exclude) for given in found.empty)
+    return found.files
+
+
+def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> Diagnostic:
+    """Return the problem with a folder without interface files; `also` is what else is missing."""
+    if exclude is not NOTHING and look((given,), Report()).files:
+        message = f"every interface file in `{given}` is excluded"
+        return codes.NO_INTERFACES.of(given, message, hint="see `exclude` in [tool.idlc]")
+    return codes.NO_INTERFACES.of(
+        given,
+        f"no {also}.msg, .srv or .action file in `{given}`",
+        hint="interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself",
+    )
+
+
+def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) -> Found:
+    """Return what paths mean; a folder means everything below it.
+
+    Reports IDL601, IDL602 and IDL605.
     """
     manifest.cache_clear()
     found: dict[str, InterfaceFile] = {}
+    packages: dict[Path, None] = {}
+    empty: dict[str, None] = {}
     for given in paths:
-        empty = True
+        seen = not is_folder(Path(given))
         for path in _under(given, report):
-            empty = False
-            if path is not None:
-                whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
-                if whole not in found:
-                    found[whole] = _interface(path, whole, given)
-        if empty:
-            report.add(
-                codes.NO_INTERFACES.of(
-                    given,
-                    f"no .msg, .srv or .action file in `{given}`",
-                    hint="interfaces are looked for in msg/, srv/ and action/ folders and in the "
-                    "folder itself",
-                )
-            )
-    return tuple(sorted(found.values(), key=lambda file: (file.shown, file.given)))
+            whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
+            if exclude.has(whole):
+                continue
+            if path.name == MANIFEST:
+                packages.setdefault(Path(whole).parent)
+            else:
+                seen = True
+                found.setdefault(whole, _interface(path, whole, given))
+        if not seen:
+            empty.setdefault(given)
+    files = sorted(found.values(), key=lambda file: (file.shown, file.given))
+    return Found(tuple(files), tuple(sorted(packages)), tuple(empty))
 
 
-def _under(given: str, report: Report) -> Iterator[Path | None]:
-    """Yield the files that one path means; `None` where a problem explains their absence."""
+def _under(given: str, report: Report) -> Iterator[Path]:
+    """Yield the interface and package.xml files that one path means."""
     path = Path(given)
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError) as error:
         problem = unreadable(given, error)
         report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
-        yield None
         return
     if stat.S_ISDIR(mode):
         yield from walk(path, report)
@@ -101,7 +134,6 @@ def _under(given: str, report: Report) -> Iterator[Path | None]:
         report.add(
             codes.NOT_AN_INTERFACE.of(given, f"`{given}` is {what}not a .msg, .srv or .action file")
         )
-        yield None
     else:
         yield path
 
@@ -129,7 +161,7 @@ def _similar(path: Path) -> str | None:
 
 
 def walk(folder: Path, report: Report) -> Iterator[Path]:
-    """Yield each interface file below a folder, in no particular order.
+    """Yield each interface file and package.xml below a folder, in no particular order.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
     one excepted; links to folders are followed, each folder once.
@@ -154,12 +186,13 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
             if _is_folder(entry):
                 if not entry.name.startswith(".") and entry.name not in SKIPPED:
                     waiting.append(here / entry.name)
-            elif not entry.name.startswith(".") and _suffix(entry.name) in KINDS:
+            elif not entry.name.startswith(".") and _is_wanted(entry.name):
                 yield here / entry.name
 
 
-def _suffix(name: str) -> str:
-    return os.path.splitext(name)[1]  # noqa: PTH122 - for every file of a source tree
+def _is_wanted(name: str) -> bool:
+    suffix = os.path.splitext(name)[1]  # noqa: PTH122 - for every file of a source tree
+    return suffix in KINDS or name == MANIFEST
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:

@@ -9,6 +9,7 @@ from idlc.disk import config, inputs
 from idlc.disk.find import find
 from idlc.disk.package import manifest
 from idlc.disk.read import absolute
+from idlc.disk.scope import scope
 from idlc.text.diagnostics import Report
 
 
@@ -35,7 +36,8 @@ def names() -> list[str]:
 def _packages(paths: Sequence[str]) -> dict[str, tuple[Path, ...]]:
     """Return folders by package; what is wrong with files is said when they are compiled."""
     unheard = Report()
+    where = scope(config.load(unheard))
     found: dict[str, tuple[Path, ...]] = {}
-    for one in inputs.packages(find(paths, unheard), config.load(unheard).package, unheard):
+    for one in inputs.packages(find(paths, unheard, where.exclude), where, unheard):
         found.setdefault(one.package, one.folders)
     return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -9,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.disk import surroundings
-from idlc.disk.find import KIND_FOLDERS, KINDS, root_of, walk
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
 from idlc.model import catalog, ir
@@ -48,7 +50,8 @@ class Folder:
 
         unheard = Report()
         found: dict[str, list[Path]] = {}
-        for root in sorted({root_of(str(file.parent)) for file in walk(self._path, unheard)}):
+        files = (path for path in walk(self._path, unheard) if path.suffix in KINDS)
+        for root in sorted({root_of(str(file.parent)) for file in files}):
             declared = manifest(root)
             name = declared_name(declared, "", unheard) if declared else None
             found.setdefault(name or root.name, []).append(root)
@@ -81,7 +84,8 @@ class Library:
     """Interfaces of all packages that can be found, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
-    a single file finds its neighbours. Files that cannot be read are reported.
+    a single file finds its neighbours, unless they are excluded. Files that cannot be read are
+    reported.
     """
 
     def __init__(
@@ -90,6 +94,7 @@ class Library:
         report: Report,
         *,
         own: Mapping[str, Sequence[Path]] | None = None,
+        exclude: Exclusions = NOTHING,
     ) -> None:
         places = [Folder(path) for path in folders]
         for path in folders:
@@ -100,6 +105,7 @@ class Library:
             *map(Prefix, surroundings.ament_prefixes()),
         )
         self._own = own or {}
+        self._exclude = exclude
         self._report = report
         self._known: dict[str, list[Path]] = {}
         self._sources: dict[ir.TypeName, Source | None] = {}
@@ -122,7 +128,12 @@ class Library:
         file = f"{name.name}.{name.kind}"
         places = self._roots(name.package)
         paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
-        return next((Path(path) for path in paths if is_file(path)), None)
+        exclude = self._excluded(name.package)
+        return next((Path(one) for one in paths if is_file(one) and not exclude.has(one)), None)
+
+    def _excluded(self, package: str) -> Exclusions:
+        """Return what is left out of a package: of others than the compiled ones, nothing."""
+        return self._exclude if package in self._own else NOTHING
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if there is none of that name."""
@@ -156,10 +167,12 @@ class Library:
         return known
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
-        own = {one for root in self._own.get(package, ()) for one in _interfaces(root)}
+        exclude = self._excluded(package)
+        own = {one for root in self._own.get(package, ()) for one in _interfaces(root, exclude)}
         if own:
             return sorted(own)
-        return next(filter(None, map(_interfaces, self._roots(package))), [])
+        roots = (_interfaces(root, exclude) for root in self._roots(package))
+        return next(filter(None, roots), [])
 
     def home(self, package: str) -> Path | None:
         """Return the folder that a package's interfaces lie in; `None` if they are built in."""
@@ -172,15 +185,25 @@ class Library:
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
 
+    def nearby(self, package: str) -> str | None:
+        """Return which -I finds a package that lies beside one of those being compiled."""
+        for root in (root for roots in self._own.values() for root in roots):
+            declared = manifest(root)
+            beside = (declared.parent if declared else root).parent
+            if _NAME.fullmatch(package) and _has_interfaces(beside / package):
+                folder = os.path.relpath(beside)
+                return f"it is in `{Path(folder, package).as_posix()}`: add `-I {folder}`"
+        return None
 
-def _interfaces(root: Path) -> list[tuple[ir.Kind, str]]:
+
+def _interfaces(root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
     """Return kind and name of each interface file of a folder and of its folders for kinds."""
     return sorted(
         {
             (KINDS[path.suffix], path.stem)
             for folder in (root, *(root / kind for kind in KIND_FOLDERS))
             for path in _files(folder)
-            if path.suffix in KINDS
+            if path.suffix in KINDS and not exclude.has(path)
         }
     )
 

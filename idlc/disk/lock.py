@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 
 from idlc.disk.read import is_file, read_bytes
+from idlc.disk.tree import may_be_own
 from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
 from idlc.text import codes
@@ -20,10 +21,6 @@ from idlc.text.visible import one_line
 FILE = "idlc.lock"
 #: Raised when an older idlc could not read what a newer one writes.
 FORMAT = 1
-
-
-#: What no part of a path below a folder is.
-_OUTSIDE = frozenset(("", ".", ".."))
 
 
 class _Header(msgspec.Struct):
@@ -104,20 +101,23 @@ def load(out: Path, name: str, report: Report) -> Lock | None:
         return None
     try:
         return decode(data)
-    except (msgspec.MsgspecError, UnicodeDecodeError, ValueError) as error:
+    except ValueError as error:  # msgspec's errors, too
         report.add(_bad(shown, str(error)))
         return None
 
 
 def decode(data: bytes) -> Lock:
     """Return a lock from a file's content; raise ValueError for one that cannot be used."""
-    header = msgspec.json.decode(data, type=_Header)
+    try:
+        header = msgspec.json.decode(data, type=_Header)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
     if header.format > FORMAT:
         raise ValueError(f"it was written by idlc {header.idlc}, which is newer than this one")
     lock = msgspec.json.decode(data, type=Lock)
     for path in lock.outputs:
-        if not _OUTSIDE.isdisjoint(path.split("/")) or "\\" in path or ":" in path:
-            raise ValueError(f"it lists a file outside of its folder: {path}")
+        if not may_be_own(path):
+            raise ValueError(f"it lists a file that idlc cannot have written: {path}")
     names = [*lock.types, *(name.replace(".", "/") + "/X" for name in lock.imports)]
     names += [f"{package}/msg/X" for package in lock.vendored]
     for name in names:

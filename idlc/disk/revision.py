@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,7 +12,8 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.disk.find import CLOSING, KINDS, InterfaceFile, find
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import CLOSING, KINDS, InterfaceFile, look
 from idlc.disk.package import MANIFEST
 from idlc.disk.read import absolute
 from idlc.text import codes
@@ -32,11 +34,13 @@ class Revision(NamedTuple):
         except ValueError:
             return None
 
-    def files(self, paths: Iterable[str], report: Report) -> tuple[InterfaceFile, ...]:
+    def files(
+        self, paths: Iterable[str], exclude: Exclusions, report: Report
+    ) -> tuple[InterfaceFile, ...]:
         """Return the interface files that paths of the working tree meant; there may be none."""
         there = [place for path in paths if (place := self.counterpart(path))]
-        found = find([place for place in there if Path(place).exists()], unheard := Report())
-        report.extend(one for one in unheard if one.code != codes.NO_INTERFACES.id)
+        places = [place for place in there if Path(place).exists()]
+        found = look(places, report, exclude.seen_from(self.root, self.top)).files
         return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
 
     def _shown(self, path: Path) -> str:
@@ -50,12 +54,8 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
 
     Nothing in the repository is touched.
     """
-    folder = absolute(path)
-    folder = folder if folder.is_dir() else folder.parent
-    top = _git(folder, ["rev-parse", "--show-toplevel"])
-    commit = None
-    if top and not name.startswith("-"):
-        commit = _git(folder, ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"])
+    top = _git(_folder(path), ["rev-parse", "--show-toplevel"])
+    commit = _commit(name, path) if top else None
     if not top or not commit:
         what = "no such revision" if top else "not in a git repository"
         hint = "in CI, fetch it first; a shallow clone lacks older revisions" if top else None
@@ -67,6 +67,22 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
         (root / ".git").mkdir()  # what is above is not part of the repository
         _extract(Path(_text(top)), _text(commit), root)
         yield Revision(name, Path(_text(top)).resolve(), root)
+
+
+def is_revision(name: str, path: str) -> bool:
+    """Return whether a name means a revision of the repository that holds `path`, and no file."""
+    return not os.path.lexists(name) and _commit(name, path) is not None
+
+
+def _commit(name: str, path: str) -> bytes | None:
+    if not name or name.startswith("-"):
+        return None
+    return _git(_folder(path), ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"])
+
+
+def _folder(path: str) -> Path:
+    folder = absolute(path)
+    return folder if folder.is_dir() else folder.parent
 
 
 def _text(output: bytes) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from idlc.disk.alone import alone
 from idlc.disk.lock import digest
 from idlc.disk.plan import Change, Plan
 from idlc.disk.read import absolute
-from idlc.disk.tree import Obstacle, Tree
+from idlc.disk.tree import Obstacle, Tree, may_be_own
 from idlc.disk.write import apply_changes, journals, sweep
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
@@ -71,11 +71,9 @@ def _listed(folder: Path, tree: Tree) -> set[tuple[str, str]]:
         except (ValueError, RecursionError):
             continue
         if isinstance(listed, dict):
-            found |= {(path, one) for path, one in listed.items() if _is_page(path, one)}
+            found |= {
+                (path, one)
+                for path, one in listed.items()
+                if may_be_own(path) and isinstance(one, str)
+            }
     return found
-
-
-def _is_page(path: str, one: object) -> bool:
-    parts = PurePosixPath(path).parts
-    plain = path.isascii() and path.isprintable() and path == "/".join(parts)
-    return plain and bool(parts) and ".." not in parts and isinstance(one, str)

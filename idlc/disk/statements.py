@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
@@ -12,6 +13,9 @@ from idlc.text.source import Source, Span
 
 if TYPE_CHECKING:
     from idlc.text.diagnostics import Report
+
+#: The elements whose children are statements.
+_PARENTS = (["package"], ["package", "export"])
 
 
 def statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
@@ -25,23 +29,21 @@ def read_statements(source: Source) -> tuple[Statement, ...]:
     data = source.text.encode("utf-8")
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
-    stack: list[str] = []
+    above: list[str] = []
     texts: list[str] = []
-    begun = 0
-    found: list[Statement] = []
+    begun: list[int] = []
+    found: list[tuple[str, str, int]] = []
 
     def start(tag: str, _: dict[str, str]) -> None:
-        nonlocal begun
-        stack.append(tag)
-        begun = parser.CurrentByteIndex
+        above.append(tag)
+        begun.append(parser.CurrentByteIndex)
         texts.clear()
 
     def end(tag: str) -> None:
-        if stack[:-1] in (["package"], ["package", "export"]):
-            at = len(data[:begun].decode("utf-8"))
-            length = len(tag) + 2
-            found.append(Statement(tag, "".join(texts).strip(), Span(source, at, at + length)))
-        stack.pop()
+        del above[-1]
+        at = begun.pop()
+        if above in _PARENTS:
+            found.append((tag, "".join(texts).strip(), at))
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -50,4 +52,16 @@ def read_statements(source: Source) -> tuple[Statement, ...]:
         parser.Parse(data, True)
     except (expat.ExpatError, ValueError):
         return ()
-    return tuple(found)
+    return tuple(_placed(found, source, data))
+
+
+def _placed(
+    found: Iterable[tuple[str, str, int]], source: Source, data: bytes
+) -> Iterator[Statement]:
+    """Yield elements with their places, which expat counts in bytes."""
+    at = characters = 0
+    for tag, text, begun in sorted(found, key=lambda one: one[2]):
+        characters += len(data[at:begun].decode("utf-8"))
+        at = begun
+        span = Span(source, characters, characters + len(tag) + 2)
+        yield Statement(tag, text, span)

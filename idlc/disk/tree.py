@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import os
+import re
 import stat
 from pathlib import Path
 from typing import NamedTuple
 
 from idlc.disk.read import kind_of, reason
+
+#: A path of a file that idlc may have written below a folder: a few plain names.
+_OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
+
+
+def may_be_own(path: str) -> bool:
+    """Return whether idlc may have written a file of this path, as a record of unknown origin says.
+
+    Such a path stays below its folder.
+    """
+    return len(path) < 1000 and _OWN.fullmatch(path) is not None
 
 
 class Obstacle(NamedTuple):

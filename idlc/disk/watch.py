@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from idlc.disk.find import find
+from idlc.disk.find import look
 from idlc.disk.package import MANIFEST
 from idlc.text.diagnostics import Report
 
 
 def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[int, int]]:
     """Return time and size of each input file, of its package.xml and of files along -I."""
-    files = [file.path for file in find((*paths, *include), Report())]
+    files = [file.path for file in look((*paths, *include), Report()).files]
     manifests = {path.parent.parent / MANIFEST for path in files}
     found = {}
     for path in (*files, *sorted(manifests)):

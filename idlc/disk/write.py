@@ -14,8 +14,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
-
 from idlc.disk import lock
 from idlc.disk.alone import alone, uninterrupted
 from idlc.disk.plan import Change, Plan, emptied
@@ -34,7 +32,7 @@ def owned(out: Path, known: lock.Lock | None) -> dict[str, frozenset[str]]:
     """Return the files that idlc wrote below `out`, each with the digests that it may have."""
     found = {path: frozenset((one,)) for path, one in (known.outputs if known else {}).items()}
     for journal in journals(out):
-        with contextlib.suppress(ValueError, msgspec.MsgspecError):
+        with contextlib.suppress(ValueError):
             for path, one in lock.decode(journal).outputs.items():
                 found[path] = found.get(path, frozenset()) | {one}
     return found

@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import msgspec
 
 from idlc.disk import inputs, lock
-from idlc.disk.find import InterfaceFile, find
+from idlc.disk.find import InterfaceFile, find, look, nothing_in
 from idlc.disk.package import manifest
 from idlc.disk.read import absolute
-from idlc.disk.revision import Revision, checked_out
+from idlc.disk.revision import Revision, checked_out, is_revision
+from idlc.disk.scope import Scope
 from idlc.disk.statements import statements
 from idlc.driver.stages import models_of, stage
-from idlc.emit.limits import oversized
+from idlc.emit.limits import Extents, oversized
 from idlc.model.changes.allow import Allowance, without_allowed
 from idlc.model.changes.change import LEVELS
 from idlc.model.changes.packages import (
     Comparison,
+    added_package,
     compare,
     compare_hashes,
     removed_package,
     together,
 )
 from idlc.model.changes.version import part_to_raise, raised
+from idlc.model.link import Model
 from idlc.text import codes
 from idlc.text.diagnostics import Report
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
 
 GIT = "git:"
 
@@ -37,8 +39,7 @@ class BreakingOptions(NamedTuple):
 
     paths: tuple[str, ...]
     against: str
-    package: str | None = None
-    include: tuple[str, ...] = ()
+    scope: Scope = Scope()
     levels: tuple[str, ...] = LEVELS
     allowed: tuple[Allowance, ...] = ()
     allowed_in: str = ""
@@ -46,19 +47,27 @@ class BreakingOptions(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What came out: how many changes break each level, and the version part to raise."""
+    """What came out: how many changes break each level, and the version part to raise.
+
+    `added` breaks nothing.
+    """
 
     levels: dict[str, int]
     allowed: int
     part: str | None
     version: str | None
     next_version: str | None
+    added: tuple[str, ...] = ()
 
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     """Report each change that breaks something; `None` if a version could not be compiled."""
-    given = inputs.packages(find(options.paths, report), options.package, report)
+    there = look(options.paths, report, options.scope.exclude)
+    given = inputs.packages(there.files, options.scope, report)
     comparison = None if report.had_errors else _against(options, given, report)
+    if comparison is not None and not comparison.differs:
+        # of what was removed, there is something to compare with
+        report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
     if comparison is None or report.had_errors:
         return None
     changes = without_allowed(
@@ -74,6 +83,7 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         part,
         version,
         raised(version, part) if version and part else None,
+        comparison.additions,
     )
 
 
@@ -86,6 +96,15 @@ def _against(
             return None if revision is None else _compare(options, given, revision, report)
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, given, report)
+    if is_revision(options.against, options.paths[0]):
+        report.add(
+            codes.NO_SUCH_PATH.of(
+                options.against,
+                f"no such file or folder: `{options.against}`",
+                hint=f"the git revision is `--against {GIT}{options.against}`",
+            )
+        )
+        return None
     return _compare(options, given, None, report)
 
 
@@ -95,28 +114,34 @@ def _compare(
     revision: Revision | None,
     report: Report,
 ) -> Comparison | None:
-    include = list(options.include)
+    scope = options.scope
     if revision is None:
-        files = find([options.against], report)
+        files = find([options.against], report, scope.exclude)
     else:
-        files = revision.files(options.paths, report)
-        include = [revision.counterpart(path) or path for path in include]
-    old = _named_alike(inputs.packages(files, options.package, report), given, files, report)
-    after = _models(given, options.include, report)
-    before = _models(old, include, report)
+        files = revision.files(options.paths, scope.exclude, report)
+        include = tuple(revision.counterpart(path) or path for path in scope.include)
+        scope = msgspec.structs.replace(
+            scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
+        )
+    old = _named_alike(inputs.packages(files, scope, report), given, files, scope, report)
+    after = _models(given, options.scope, report)
+    before = _models(old, scope, report)
     if report.had_errors:
         return None
     with stage("compare", options.against):
-        return together(
+        found = [
             compare(model, after[package]) if package in after else removed_package(model)
             for package, model in before.items()
-        )
+        ]
+        new = (model for package, model in after.items() if package not in before)
+        return together([*found, *map(added_package, new)])
 
 
 def _named_alike(
     old: tuple[inputs.Inputs, ...],
     new: tuple[inputs.Inputs, ...],
     files: tuple[InterfaceFile, ...],
+    scope: Scope,
     report: Report,
 ) -> tuple[inputs.Inputs, ...]:
     """Give two single packages one name, unless both are named by a package.xml."""
@@ -124,18 +149,17 @@ def _named_alike(
         return old
     if all(manifest(one.folders[0]) for one in (old[0], new[0]) if one.folders):
         return old
-    return inputs.packages(files, new[0].package, report)
+    return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
 
-def _models(
-    given: Sequence[inputs.Inputs], include: Sequence[str], report: Report
-) -> dict[str, Model]:
+def _models(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Model]:
     """Return the packages' models; only errors are reported, warnings are `check`'s."""
     found = Report()
-    models = {model.package: model for model, _ in models_of(given, include, found)}
+    models = {model.package: model for _, model in models_of(given, scope, found)}
     if not found.had_errors:
+        extents: Extents = {}
         for model in models.values():
-            found.extend(oversized(model))
+            found.extend(oversized(model, extents))
     report.extend(one for one in found if one.severity is codes.ERROR)
     return models
 
@@ -151,12 +175,17 @@ def _compare_with_lock(
         return None
     mine = [one for one in given if one.package == known.package]
     if len(given) == 1 and not mine:
-        mine = list(inputs.packages(find(options.paths, report), known.package, report))
-    models = _models(mine, options.include, report)
-    if report.had_errors or known.package not in models:
-        return None if report.had_errors else Comparison(())
+        named = msgspec.structs.replace(options.scope, package=known.package)
+        files = find(options.paths, report, named.exclude)
+        mine = list(inputs.packages(files, named, report))
+    models = _models(mine, options.scope, report)
+    if report.had_errors:
+        return None
+    model = models.get(known.package) or Model(known.package, (), {})
+    same = bool(mine) and mine[0].digests == known.inputs
     with stage("compare", options.against):
-        return compare_hashes(known.types, models[known.package])
+        found = compare_hashes(known.types, model)
+        return found._replace(differs=found.differs or not same)
 
 
 def _version(given: tuple[inputs.Inputs, ...], report: Report) -> str | None:

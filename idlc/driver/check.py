@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.disk import inputs
+from idlc.disk.exclude import Exclusions
 from idlc.disk.facts import facts
-from idlc.disk.find import find
+from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
-from idlc.driver.stages import compile_package, sources_of, stage
+from idlc.disk.read import absolute
+from idlc.disk.scope import Scope
+from idlc.driver.stages import Compiler, library_for, stage
 from idlc.text.diagnostics import Diagnostic, Report
 
 if TYPE_CHECKING:
@@ -24,16 +27,16 @@ class CheckOptions(msgspec.Struct, frozen=True):
     """What `idlc check` was asked to do."""
 
     paths: tuple[str, ...]
-    package: str | None = None
-    include: tuple[str, ...] = ()
+    scope: Scope = Scope()
     selection: Selection | None = None
     fix: bool = False
 
 
 class Checked(msgspec.Struct, frozen=True):
-    """The files that were looked at, and how many edits were made."""
+    """The files and packages that were looked at, and how many edits were made."""
 
     files: tuple[str, ...]
+    packages: int = 0
     fixed: int = 0
 
 
@@ -46,45 +49,42 @@ def check(options: CheckOptions, report: Report) -> Checked:
     if options.fix:
         from idlc.disk.rewrite import mend
 
-        found = list(_once(options, report)[1])
+        found = _once(options, report)[1]
         if not report.had_errors:
             fixed = mend((edit for one in found for edit in one.edits), report)
-    files, found = _once(options, report)
+    checked, found = _once(options, report)
     report.extend(found)
-    return Checked(files, fixed)
+    return msgspec.structs.replace(checked, fixed=fixed)
 
 
-def _once(options: CheckOptions, report: Report) -> tuple[tuple[str, ...], list[Diagnostic]]:
-    files = find(options.paths, report)
-    packages = inputs.packages(files, options.package, report)
-    own = {given.package: given.folders for given in packages}
+def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
+    scope = options.scope
+    there = look(options.paths, report, scope.exclude)
+    packages = inputs.packages(there.files, scope, report, there.packages)
+    for path in there.empty:
+        if not any(one.home.is_relative_to(absolute(path)) for one in packages):
+            report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
     everything = Report()
+    library = library_for(packages, scope, everything)
     texts: list[Source] = []
-    for given in packages:
-        library = Library(options.include, everything, own=own)
-        sources = list(sources_of(given, everything))
-        texts += [source for _, source in sources]
-        model = compile_package(given.package, sources, library, everything)
-        _advise(given, _only(model, {name for name, _ in sources}), library, everything)
-    return tuple(file.shown for file in files), _wanted(everything, texts, options.selection)
+    for given, model in Compiler(library).all(packages, everything):
+        mine = model.only(given.names)
+        texts += [one.source for one in mine.own if one.source]
+        _advise(given, mine, library, scope.exclude, everything)
+    files = tuple(file.shown for file in there.files)
+    return Checked(files, len(packages)), _wanted(everything, texts, options.selection)
 
 
-def _only(model: Model, names: Iterable[object]) -> Model:
-    """Return a model whose own interfaces are those of the given files, without neighbours."""
-    from idlc.model.link import Model
-
-    own = tuple(interface for interface in model.own if interface.name in names)
-    return Model(model.package, own, model.interfaces)
-
-
-def _advise(given: inputs.Inputs, model: Model, library: Library, report: Report) -> None:
+def _advise(
+    given: inputs.Inputs, model: Model, library: Library, exclude: Exclusions, report: Report
+) -> None:
     """Report what only `check` looks at: style, portability and the package around."""
     from idlc.checks.lint import lint
     from idlc.checks.package import check_package
 
     with stage("lint", given.package):
         lint(model, report)
-    surroundings = facts(given, library.packages)
+    surroundings = facts(given, library.packages, exclude)
     if surroundings is not None:
         with stage("check package", given.package):
             check_package(surroundings, model, report)

@@ -8,31 +8,36 @@ from typing import TYPE_CHECKING
 from idlc.disk import inputs
 from idlc.disk.find import find
 from idlc.disk.package import manifest
+from idlc.disk.scope import Scope
 from idlc.disk.site import write
 from idlc.disk.statements import statements
-from idlc.driver.stages import models_of, stage
+from idlc.driver.stages import sound_models, stage
 from idlc.text.diagnostics import Report
 
 if TYPE_CHECKING:
     from idlc.emit.site.pages import About
 
 
-def docs(
-    paths: Sequence[str], out: str, package: str | None, include: Sequence[str], report: Report
-) -> int:
-    """Write a site about the interfaces that paths mean; return how many pages it has."""
-    given = inputs.packages(find(paths, report), package, report)
-    models = [model for model, _ in models_of(given, include, report)]
+def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
+    """Write a site about the interfaces that paths mean; return how many pages it has.
+
+    Interfaces with errors, and those that hold them, are left out.
+    """
+    given = inputs.packages(find(paths, report, scope.exclude), scope, report)
     if report.had_errors:
+        return 0
+    models = [model for model, _ in sound_models(given, scope, report) if model.own]
+    if not models:
         return 0
     from idlc.emit.site.pages import site
 
     about = {one.package: _about(one) for one in given}
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
-    if not write(out, files, report):
-        return 0
-    return sum(path.endswith(".html") for path in files)
+    written = Report()
+    done = write(out, files, written)
+    report.extend(written)
+    return sum(path.endswith(".html") for path in files) if done else 0
 
 
 def _about(given: inputs.Inputs) -> About:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from idlc.disk.exclude import Exclusions
 from idlc.disk.find import InterfaceFile, find
 from idlc.disk.read import read_source
 from idlc.disk.rewrite import replace
@@ -29,12 +30,14 @@ class Formatted(NamedTuple):
         return self.old != self.new
 
 
-def fmt(paths: Sequence[str], report: Report, *, write: bool) -> Iterator[Formatted]:
+def fmt(
+    paths: Sequence[str], exclude: Exclusions, report: Report, *, write: bool
+) -> Iterator[Formatted]:
     """Yield each file that paths mean, laid out; with `write`, after writing it.
 
     Files with errors are reported and left alone.
     """
-    for file in find(paths, report):
+    for file in find(paths, report, exclude):
         source = read_source(file.path, file.shown, report)
         if source is None:
             continue

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from symtable import symtable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from idlc import __version__
-from idlc.disk import inputs, lock
-from idlc.disk.find import find
-from idlc.disk.fresh import dependencies
+from idlc.disk import inputs
+from idlc.disk.find import is_path
 from idlc.disk.library import Library
-from idlc.disk.plan import Plan
+from idlc.disk.naming import accept_name
+from idlc.disk.scope import Scope
 from idlc.disk.target import Target
-from idlc.driver.stages import compile_package, derived_names, sources_of, stage
+from idlc.disk.wanted import borrowed, completed, targets, wanted
+from idlc.driver import known
+from idlc.driver.rendered import Package, as_inputs, package_of
+from idlc.driver.stages import Compiler, library_for
 from idlc.model import derive, ir
 from idlc.text import codes
 from idlc.text.diagnostics import Report, Severity
@@ -27,8 +28,7 @@ class GenOptions(NamedTuple):
 
     paths: tuple[str, ...]
     out: str
-    package: str | None = None
-    include: tuple[str, ...] = ()
+    scope: Scope = Scope()
     check: bool = False
     vendor_deps: bool = False
     force: bool = False
@@ -45,56 +45,118 @@ class Generated(NamedTuple):
     removed: int = 0
 
 
-class Package(NamedTuple):
-    """A package ready to be written."""
-
-    target: Target
-    plan: Plan
-    lock: lock.Lock
-
-
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    """Write, or with `check` compare, a package and what it vendors; empty after an error."""
-    files = find(options.paths, report)
-    given = inputs.one_package(files, options.package, options.out, report)
-    if given is None:
+    """Write, or with `check` compare, packages and what they vendor; empty after an error."""
+    paths = [word for word in options.paths if not _is_name(word)]
+    named = _named([word for word in options.paths if _is_name(word)], options.scope, report)
+    if report.had_errors:
         return ()
-    target = Target(options.out, given.package, report, force=options.force)
-    if not target.usable():
+    given = wanted(paths, named, options.out, options.scope, report)
+    found = targets(given, options.out, report, force=options.force) if given else ()
+    if not found:
         return ()
-    with target.alone(beside=options.vendor_deps):
-        return _made(target, given, options, report)
+    with found[0].alone(beside=options.vendor_deps or len(found) > 1):
+        return _made(dict(zip(found, given, strict=True)), options, report)
+
+
+def _is_name(word: str) -> bool:
+    """Return whether a word means a type, or a package, rather than a path that is not there."""
+    last = word.rpartition("/")[2]
+    return not is_path(word) and ("/" not in word or not last[:1].islower())
+
+
+def _named(words: Sequence[str], scope: Scope, report: Report) -> list[inputs.Inputs]:
+    """Return the packages that names mean, with those of their interfaces that are meant."""
+    chosen: dict[str, set[ir.TypeName]] = {}
+    found = []
+    for word in words:
+        library, meant = known.resolve(word, scope.include, report)
+        for one in meant:
+            chosen.setdefault(one.interface.package, set()).add(one.interface)
+        found += [(library, package) for package in {one.interface.package for one in meant}]
+    libraries = {package: library for library, package in found}
+    return [borrowed(types, libraries[package]) for package, types in sorted(chosen.items())]
 
 
 def _made(
-    target: Target, given: inputs.Inputs, options: GenOptions, report: Report
+    wanted: Mapping[Target, inputs.Inputs], options: GenOptions, report: Report
 ) -> tuple[Generated, ...]:
-    library = Library(options.include, report, own=given.own)
+    library = library_for(tuple(wanted.values()), options.scope, report)
     if not (options.check or report.had_errors):
-        current = _current(target, given.digests, library, options.vendor_deps)
-        if current:
-            _note_missing(target, report)
-            return current
-    model = compile_package(given.package, sources_of(given, report), library, report)
-    packages = [] if report.had_errors else _planned(model, target, given, library, options)
+        current = [
+            _current(target, given.digests, library, options.vendor_deps)
+            for target, given in wanted.items()
+        ]
+        if all(current):
+            _note_missing(wanted, report)
+            return tuple(one for packages in current for one in packages)
+    compiler = Compiler(library)
+    models = [model for _, model in compiler.all(wanted.values(), report)]
+    needed = {name for model in models for name in model.interfaces}
+    if not report.had_errors and (more := completed(wanted.values(), needed, library)):
+        return _made(dict(zip(wanted, more, strict=True)), options, report)
+    packages = [] if report.had_errors else _planned(models, wanted, compiler, options)
     if options.check:
         for one in packages:
             one.target.drift(one.plan, one.lock)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     if packages:
-        _note_missing(target, report)
+        _note_missing(wanted, report)
     return tuple(_generated(one) for one in packages)
 
 
 def _planned(
-    model: Model, target: Target, given: inputs.Inputs, library: Library, options: GenOptions
+    models: Sequence[Model],
+    wanted: Mapping[Target, inputs.Inputs],
+    compiler: Compiler,
+    options: GenOptions,
 ) -> list[Package]:
-    """Return a sound model, and what it vendors, ready to be written; empty if any must not be."""
-    vendored = _vendored(model, target, library, options) if options.vendor_deps else []
-    own = _package(model, target, given.digests, library, options, vendored)
-    found = [own, *vendored]
+    """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
+    vendor = _Vendor({model.package for model in models}, compiler, options)
+    found: list[Package | None] = []
+    for model, (target, given) in zip(models, wanted.items(), strict=True):
+        names = vendor.add(model, target) if options.vendor_deps else None
+        library, check = compiler.library, options.check
+        found.append(package_of(model, target, given.digests, library, check=check, vendored=names))
+    found += [vendor.packages[name] for name in sorted(vendor.packages)]
     return [] if None in found else [one for one in found if one]
+
+
+class _Vendor:
+    """The packages that others depend on, whole, to be written beside them."""
+
+    def __init__(self, own: set[str], compiler: Compiler, options: GenOptions) -> None:
+        self._own = own
+        self._compiler = compiler
+        self._options = options
+        self._needed: dict[str, set[str]] = {}
+        #: Each ready to be written, `None` for one that must not be.
+        self.packages: dict[str, Package | None] = {}
+
+    def add(self, model: Model, target: Target) -> list[str]:
+        """Add what a model depends on, and return the names."""
+        names: set[str] = set()
+        waiting = _needed(model) - self._own
+        while waiting:
+            package = waiting.pop()
+            names.add(package)
+            if package not in self.packages:
+                self.packages[package] = self._whole(package, target)
+            waiting |= self._needed[package] - self._own - names
+        return sorted(names)
+
+    def _whole(self, package: str, target: Target) -> Package | None:
+        library, report = self._compiler.library, Report()
+        names = library.interfaces(package)
+        sources = [(name, source) for name in names if (source := library.source(name))]
+        whole = self._compiler.model(package, self._compiler.add(sources, report), report)
+        target.report.extend(one for one in report if one.severity is Severity.ERROR)
+        self._needed[package] = _needed(whole)
+        if not accept_name(package, "what is depended on", target.report) or report.had_errors:
+            return None
+        beside, digests = target.beside(package), as_inputs(names, library)
+        return package_of(whole, beside, digests, library, check=self._options.check)
 
 
 def _current(
@@ -107,7 +169,7 @@ def _current(
     for package in target.lock.vendored:
         found.append(target.beside(package))
         names = library.interfaces(package)
-        if not found[-1].unchanged(_as_inputs(names, library), library):
+        if not found[-1].unchanged(as_inputs(names, library), library):
             return ()
     return tuple(
         Generated(one.package, one.name, len(one.lock.inputs), len(one.lock.outputs))
@@ -116,110 +178,18 @@ def _current(
     )
 
 
-def _as_inputs(names: Iterable[ir.TypeName], library: Library) -> dict[str, str]:
-    """Return the digests of a library's interfaces as those of input files are recorded."""
-    digests = dependencies(names, library)
-    return {f"{n.kind}/{n.name}.{n.kind}": digests[str(n)] for n in names}
-
-
-def _package(
-    model: Model,
-    target: Target,
-    digests: dict[str, str],
-    library: Library,
-    options: GenOptions,
-    vendored: Sequence[Package | None] | None = None,
-) -> Package | None:
-    """Return a sound model rendered and compared with what is on disk."""
-    from idlc.emit.limits import oversized
-    from idlc.emit.render import render_package
-
-    refused = list(oversized(model))
-    if refused:
-        target.report.extend(refused)
-        return None
-    with stage("render", model.package):
-        files = {file.path: file.text for file in render_package(model)}
-    plan = target.plan(files, check=options.check)
-    if plan is None:
-        return None
-    _check_syntax(plan, target)
-    others = [n for n in model.interfaces if f"{n.kind}/{n.name}.{n.kind}" not in digests]
-    return Package(
-        target,
-        plan,
-        lock.Lock(
-            idlc=__version__,
-            package=model.package,
-            vendor_deps=options.vendor_deps and vendored is not None,
-            vendored=tuple(one.target.package for one in vendored or () if one),
-            imports=_imports(model),
-            inputs=digests,
-            dependencies=dependencies(others, library),
-            types={n: model.describer.hash(n) for own in model.own for n in derived_names(own)},
-            outputs=plan.outputs,
-        ),
-    )
-
-
-def _check_syntax(plan: Plan, target: Target) -> None:
-    """Fail on rendered code that Python cannot read, which would be idlc's own fault.
-
-    Only text from an interface file can have that effect, and text that could has a backslash in
-    front of it; modules without one are like those that the tests read.
-    """
-    for change in plan.changes:
-        rendered = change.path.endswith(".py") and not change.path.startswith("_idlc/")
-        if rendered and change.new and b"\\" in change.new:
-            with stage("compile", f"{target.name}/{change.path}"):
-                # parses, and resolves names, without the cost of making bytecode
-                symtable(change.new.decode("utf-8"), change.path, "exec")
-
-
-def _imports(model: Model) -> tuple[str, ...]:
-    """Return the modules of other packages that the package's own files refer to."""
-    targets = {
-        element.target
-        for own in model.own
-        for part in derive.sections(own)
-        for field in part.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
-    return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))
-
-
-def _vendored(
-    model: Model, target: Target, library: Library, options: GenOptions
-) -> list[Package | None]:
-    """Return every package that a model depends on, whole, to be written beside it."""
-    found: dict[str, Package | None] = {}
-    waiting = _needed(model)
-    while waiting := waiting - found.keys() - {model.package}:
-        package = min(waiting)
-        names = library.interfaces(package)
-        sources = [(name, source) for name in names if (source := library.source(name))]
-        report = Report()
-        whole = compile_package(package, sources, library, report)
-        target.report.extend(one for one in report if one.severity is Severity.ERROR)
-        digests = _as_inputs(names, library)
-        beside = target.beside(package)
-        if report.had_errors:
-            return [None]
-        found[package] = _package(whole, beside, digests, library, options)
-        waiting |= _needed(whole)
-    return [found[package] for package in sorted(found)]
-
-
 def _needed(model: Model) -> set[str]:
     """Return the packages that a model's generated code may import, its own included."""
     implied = {package for own in model.own for package in derive.IMPLICIT_PACKAGES[own.name.kind]}
     return implied | {name.package for name in model.interfaces}
 
 
-def _note_missing(target: Target, report: Report) -> None:
-    """Report IDL617 if the generated package needs others that cannot be imported here."""
-    missing = target.missing()
-    if missing:
+def _note_missing(targets: Iterable[Target], report: Report) -> None:
+    """Report IDL617 for generated packages that need others that cannot be imported here."""
+    for target in targets:
+        missing = target.missing()
+        if not missing:
+            continue
         names = ", ".join(f"`{name}`" for name in missing)
         wheels = " ".join(f"ros-jazzy-{name.replace('_', '-')}" for name in missing)
         report.add(

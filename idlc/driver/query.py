@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from idlc.disk import inputs
 from idlc.disk.find import find, is_path
+from idlc.disk.scope import Scope
 from idlc.driver import known
-from idlc.driver.stages import compile_package, derived_names, models_of, stage
+from idlc.driver.stages import compile_package, derived_names, sound_models, stage
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 
@@ -16,22 +17,18 @@ if TYPE_CHECKING:
     from idlc.model.link import Model
 
 
-def hashes(
-    wanted: Sequence[str], package: str | None, include: Sequence[str], report: Report
-) -> list[tuple[str, str]]:
+def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
     """Return type hash and full name of what paths and type names mean, derived types included."""
     found: list[tuple[str, str]] = []
-    for model, names in wanted_models(wanted, package, include, report):
+    for model, names in wanted_models(wanted, scope, report):
         with stage("describe", model.package):
             found += [(model.describer.hash(name), name) for name in names]
     return list(dict.fromkeys(found))
 
 
-def describe(
-    wanted: str, package: str | None, include: Sequence[str], report: Report
-) -> dict[str, object] | None:
+def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
-    found = list(wanted_models((wanted,), package, include, report))
+    found = list(wanted_models((wanted,), scope, report))
     if report.had_errors or not found:
         return None
     (model, names) = found[0]
@@ -46,20 +43,25 @@ def describe(
 
 
 def wanted_models(
-    wanted: Sequence[str], package: str | None, include: Sequence[str], report: Report
+    wanted: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
-    """Yield, for paths and type names, sound models and the names in them that are meant."""
+    """Yield, for paths and names, sound models and the names in them that are meant.
+
+    What has errors is left out.
+    """
     paths = [one for one in wanted if is_path(one)]
     for one in wanted:
         if one not in paths:
             found = Report()
-            yield from _named(one, include, found)
+            yield from _named(one, scope.include, found)
             report.extend(found)
     if paths:
-        files = find(paths, report)
-        for model, names in models_of(inputs.packages(files, package, report), include, report):
-            if not report.had_errors:
-                yield model, names
+        there = Report()
+        given = inputs.packages(find(paths, there, scope.exclude), scope, there)
+        report.extend(there)
+        report.notes += there.notes
+        if not there.had_errors:
+            yield from sound_models(given, scope, report)
 
 
 def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[Model, list[str]]]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from idlc.disk.scope import Scope
 from idlc.driver.query import wanted_models
 from idlc.driver.stages import stage
 from idlc.text import codes
@@ -16,13 +17,11 @@ if TYPE_CHECKING:
     from idlc.model.link import Model
 
 
-def show(
-    wanted: str, style: str, package: str | None, include: Sequence[str], report: Report
-) -> list[str]:
+def show(wanted: str, style: str, scope: Scope, report: Report) -> list[str]:
     """Return the interfaces that a type name or path means, each as text in a format."""
     texts = []
     wholes: list[ir.TypeName] = []
-    for model, names in list(wanted_models((wanted,), package, include, report)):
+    for model, names in list(wanted_models((wanted,), scope, report)):
         for own in model.own:
             wholes.append(own.name)
             if str(own.name) in names:

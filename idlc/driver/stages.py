@@ -7,16 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from idlc.disk import inputs
 from idlc.disk.library import Library
+from idlc.disk.scope import Scope
 from idlc.model import derive, ir
-from idlc.text.diagnostics import Report
+from idlc.text import codes
+from idlc.text.diagnostics import Report, Severity
 from idlc.text.source import Source
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
+    from idlc.model.pool import Pool
 
 
 class InternalError(Exception):
@@ -39,29 +43,68 @@ def stage(name: str, subject: str) -> Iterator[None]:
         raise InternalError(name, subject) from error
 
 
+class Compiler:
+    """Compiles the packages of one run; what several of them use is read and lowered once."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+
+    @cached_property
+    def _pool(self) -> Pool:
+        from idlc.model.pool import Pool
+
+        return Pool(self.library)
+
+    def add(
+        self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
+    ) -> tuple[ir.Interface, ...]:
+        """Return what texts define; from now on, references to their names mean these."""
+        from idlc.model.lower import lower
+        from idlc.syntax.parse import parse
+
+        own = []
+        for name, source in sources:
+            with stage("parse", source.path):
+                tree = parse(source)
+            with stage("lower", source.path):
+                found = Report()
+                own.append(lower(tree, name, found))
+                self._pool.add(own[-1], found)
+                report.extend(found)
+        return tuple(own)
+
+    def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
+        """Return the linked and checked model of a package; every problem is reported."""
+        from idlc.checks import check as run_checks
+        from idlc.model.link import link
+
+        with stage("link", package):
+            model = link(package, own, self.library, report, self._pool)
+        with stage("check", package):
+            run_checks(model, report)
+        return model
+
+    def all(
+        self, packages: Iterable[inputs.Inputs], report: Report
+    ) -> Iterator[tuple[inputs.Inputs, Model]]:
+        """Yield the model of each package; all of them see each other."""
+        from idlc.model.pool import check_packages
+
+        added = [(one, self.add(sources_of(one, report), report)) for one in packages]
+        for given, own in added:
+            yield given, self.model(given.package, own, report)
+        check_packages(self._pool, report)
+
+
 def compile_package(
     package: str,
     sources: Iterable[tuple[ir.TypeName, Source]],
     library: Library,
     report: Report,
 ) -> Model:
-    """Return the linked and checked model of a package's files; every problem is reported."""
-    from idlc.checks import check as run_checks
-    from idlc.model.link import link
-    from idlc.model.lower import lower
-    from idlc.syntax.parse import parse
-
-    own = []
-    for name, source in sources:
-        with stage("parse", source.path):
-            tree = parse(source)
-        with stage("lower", source.path):
-            own.append(lower(tree, name, report))
-    with stage("link", package):
-        model = link(package, own, library, report)
-    with stage("check", package):
-        run_checks(model, report)
-    return model
+    """Return the linked and checked model of one package; every problem is reported."""
+    compiler = Compiler(library)
+    return compiler.model(package, compiler.add(sources, report), report)
 
 
 def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeName, Source]]:
@@ -72,17 +115,42 @@ def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeNa
             yield ir.TypeName(given.package, one.file.kind, one.file.name), source
 
 
-def models_of(
-    packages: Sequence[inputs.Inputs], include: Sequence[str], report: Report
-) -> Iterator[tuple[Model, list[str]]]:
-    """Yield each package's model and the names of what its files define, derived ones included."""
+def library_for(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> Library:
+    """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
-    library = Library(include, report, own=own)
-    for given in packages:
-        sources = list(sources_of(given, report))
-        model = compile_package(given.package, sources, library, report)
-        names = {name for name, _ in sources}
-        yield model, [n for own in model.own if own.name in names for n in derived_names(own)]
+    return Library(scope.include, report, own=own, exclude=scope.exclude)
+
+
+def models_of(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> Iterator[tuple[inputs.Inputs, Model]]:
+    """Yield each package with its model; all problems are reported."""
+    yield from Compiler(library_for(packages, scope, report)).all(packages, report)
+
+
+def sound_models(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> list[tuple[Model, list[str]]]:
+    """Return each package's model and the names of what its files define, derived ones included.
+
+    Interfaces with errors, and those that hold them, are left out, which is noted.
+    """
+    models = list(models_of(packages, scope, report))
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    broken = {one.where[0] for one in errors}
+    found, left_out = [], []
+    for given, model in models:
+        sound = model.sound(broken) if errors else model
+        if any(one.code == codes.PACKAGE_NAME.id for one in errors):
+            sound = sound.only(())
+        mine = sound.only(given.names).own
+        found.append((sound, [name for one in mine for name in derived_names(one)]))
+        left_out += sorted(given.names - {one.name for one in mine})
+    if left_out:
+        names = ", ".join(f"`{name}`" for name in left_out[:5])
+        more = f" and {len(left_out) - 5} more" if len(left_out) > 5 else ""
+        report.notes.append(f"left out, because of errors: {names}{more}")
+    return found
 
 
 def derived_names(interface: ir.Interface) -> list[str]:

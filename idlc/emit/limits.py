@@ -7,7 +7,7 @@ million lines. ROS 2 accepts such types; nobody can use them. They are refused b
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from idlc.model import derive, ir
 from idlc.model.link import Model
@@ -27,9 +27,17 @@ class _Extent(NamedTuple):
     depth: int
 
 
-def oversized(model: Model) -> Iterator[Diagnostic]:
-    """Yield a problem for each of the model's own interfaces that is over a limit, or for all."""
-    extents = _extents(model)
+Extents: TypeAlias = dict[ir.TypeName, _Extent]
+
+
+def oversized(model: Model, extents: Extents | None = None) -> Iterator[Diagnostic]:
+    """Yield a problem for each of the model's own interfaces that is over a limit, or for all.
+
+    Packages that were compiled together share `extents`, so that each structure is measured once.
+    """
+    extents = {} if extents is None else extents
+    for interface in model.own:
+        _measure(interface, model, extents)
     total, refused = 0, False
     for interface in model.own:
         worst = [extents[message.name] for message in derive.messages(interface)]
@@ -53,24 +61,24 @@ def oversized(model: Model) -> Iterator[Diagnostic]:
         yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
 
 
-def _extents(model: Model) -> dict[ir.TypeName, _Extent]:
-    """Measure every structure after those that it holds; with a stack, so depth is no limit."""
-    found: dict[ir.TypeName, _Extent] = {}
-    for root in model.messages:
-        waiting = [root]
-        while waiting:
-            held = _held(model.messages[waiting[-1]])
-            missing = [name for name in held if name not in found]
-            if missing:
-                waiting += missing
-                continue
-            name = waiting.pop()
-            parts = [found[one] for one in held]
-            found[name] = _Extent(
-                len(model.messages[name].wire_fields) + sum(part.fields for part in parts),
-                1 + max((part.depth for part in parts), default=0),
-            )
-    return found
+def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
+    """Measure structures after those that they hold; with a stack, so depth is no limit."""
+    parts = {message.name: message for message in derive.messages(interface)}
+    waiting = list(parts)
+    while waiting:
+        name = waiting[-1]
+        message = parts[name] if name in parts else model.interfaces[name]
+        assert isinstance(message, ir.Message)
+        held = _held(message)
+        missing = [one for one in held if one not in found]
+        if missing:
+            waiting += missing
+            continue
+        del waiting[-1]
+        found[name] = _Extent(
+            len(message.wire_fields) + sum(found[one].fields for one in held),
+            1 + max((found[one].depth for one in held), default=0),
+        )
 
 
 def _held(message: ir.Message) -> list[ir.TypeName]:

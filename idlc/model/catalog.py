@@ -59,6 +59,11 @@ def packages() -> Iterable[str]:
     return _messages()
 
 
+def nearby(_: str) -> str | None:
+    """Return `None`: what is not built in is not near either."""
+    return None
+
+
 def _section(section: dict[str, list[list[Any]]]) -> str:
     constants = [f"{type_} {name}={_literal(v)}" for type_, name, v in section["constants"]]
     fields = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cached_property
 from typing import TypedDict
 
 from idlc.model import derive, ir
@@ -118,30 +117,25 @@ class Describer:
     """
 
     def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
-        self._interfaces = interfaces
+        self._known: set[ir.TypeName] = set()
+        self._individuals: dict[str, IndividualDict] = {}
+        self._direct: dict[str, frozenset[str]] = {}
         self._closures: dict[str, list[str]] = {}
         self._hashes: dict[str, str] = {}
         self._texts: dict[str, str] = {}
+        self.add(interfaces)
 
-    @cached_property
-    def _individuals(self) -> dict[str, IndividualDict]:
-        found = {}
-        for interface in self._interfaces.values():
-            for message in (
-                *derive.messages(interface),
-                *derive.pseudo_structures(interface),
-            ):
-                found[str(message.name)] = individual(message)
-        return found
-
-    @cached_property
-    def _direct(self) -> dict[str, frozenset[str]]:
-        return {
-            name: frozenset(
-                nested for f in own["fields"] if (nested := f["type"]["nested_type_name"])
-            )
-            for name, own in self._individuals.items()
-        }
+    def add(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
+        """Describe more interfaces; together they must be a closed set again."""
+        new = interfaces.keys() - self._known
+        self._known |= new
+        for name in new:
+            interface = interfaces[name]
+            for message in (*derive.messages(interface), *derive.pseudo_structures(interface)):
+                own = individual(message)
+                nested = (field["type"]["nested_type_name"] for field in own["fields"])
+                self._individuals[own["type_name"]] = own
+                self._direct[own["type_name"]] = frozenset(filter(None, nested))
 
     def _closure(self, name: str) -> list[str]:
         """Return all names that `name` refers to, itself excluded, in code-point order."""

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Container, Iterable, Mapping, MutableMapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 from idlc.model import derive, ir
-from idlc.model.lower import lower
+from idlc.model.circles import circles
+from idlc.model.pool import Pool
 from idlc.model.types import STRINGS
-from idlc.syntax.parse import parse
 from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report, Severity
+from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.source import Source, Span
 from idlc.text.suggest import did_you_mean
 
@@ -37,6 +37,9 @@ class Library(Protocol):
     def packages(self) -> Iterable[str]:
         """Return the names of all packages, for suggestions."""
 
+    def nearby(self, package: str) -> str | None:
+        """Return how to have a package looked for where it lies, if that is near."""
+
 
 class Model:
     """A package's interfaces and everything that they refer to.
@@ -50,10 +53,12 @@ class Model:
         package: str,
         own: tuple[ir.Interface, ...],
         interfaces: Mapping[ir.TypeName, ir.Interface],
+        pool: Pool | None = None,
     ) -> None:
         self.package = package
         self.own = own
         self.interfaces = interfaces
+        self._pool = pool
 
     @cached_property
     def messages(self) -> Mapping[ir.TypeName, ir.Message]:
@@ -66,55 +71,81 @@ class Model:
 
     @cached_property
     def describer(self) -> Describer:
-        """Type descriptions and hashes of everything in the model."""
+        """Type descriptions and hashes of everything in the model, shared with its pool."""
         from idlc.model.describe import Describer
 
-        return Describer(self.interfaces)
+        describer = self._pool.describer if self._pool else Describer({})
+        describer.add(self.interfaces)
+        return describer
+
+    def only(self, names: Container[ir.TypeName]) -> Model:
+        """Return the model with those of its own interfaces that have one of these names."""
+        own = tuple(interface for interface in self.own if interface.name in names)
+        return Model(self.package, own, self.interfaces, self._pool)
+
+    def sound(self, broken: Container[str]) -> Model:
+        """Return the model without the interfaces in `broken` files, and those that hold them."""
+        users: dict[ir.TypeName, list[ir.TypeName]] = {}
+        for name in self.interfaces:
+            for _, target in self._pool.references(name) if self._pool else ():
+                users.setdefault(target, []).append(name)
+        bad: set[ir.TypeName] = set()
+        waiting = [
+            name
+            for name, one in self.interfaces.items()
+            if one.source is not None and one.source.path in broken
+        ]
+        while waiting:
+            name = waiting.pop()
+            if name not in bad:
+                bad.add(name)
+                waiting += users.get(name, ())
+        sound = {name: one for name, one in self.interfaces.items() if name not in bad}
+        return Model(self.package, self.only(sound).own, sound, self._pool)
 
 
-def link(package: str, own: Iterable[ir.Interface], library: Library, report: Report) -> Model:
+def link(
+    package: str,
+    own: Iterable[ir.Interface],
+    library: Library,
+    report: Report,
+    pool: Pool | None = None,
+) -> Model:
     """Return the model of a package's interfaces and of all that they refer to.
 
     Reports unknown and recursive types. Messages of the package itself that are referred to but
     not among `own` are taken from the library and become part of `own`. A model with errors
-    has gaps: only after a report without errors is it safe to describe or emit.
+    has gaps: only after a report without errors is it safe to describe or emit. Packages that are
+    linked in one run share a `pool`.
     """
+    pool = pool or Pool(library)
     interfaces = {interface.name: interface for interface in own}
-    _load_references(interfaces, library, report)
-    _check_recursion(interfaces, report)
+    for interface in interfaces.values():
+        pool.add(interface)
+    _load_references(interfaces, pool)
+    _check_recursion(interfaces, pool)
+    for name in interfaces:
+        if errors := pool[name].errors:
+            report.extend(errors)
     mine = sorted(name for name in interfaces if name.package == package)
-    return Model(package, tuple(interfaces[name] for name in mine), interfaces)
+    return Model(package, tuple(interfaces[name] for name in mine), interfaces, pool)
 
 
-def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
-    """Yield the fields that hold messages of other files, derived structures' included."""
-    for message in derive.messages(interface):
-        for field in message.fields:
-            element = ir.element_of(field.type)
-            if isinstance(element, ir.Ref) and element.target.kind == "msg":
-                yield field, element.target
-
-
-def _load_references(
-    interfaces: MutableMapping[ir.TypeName, ir.Interface], library: Library, report: Report
-) -> None:
-    """Add every interface that is reached and not there yet; report those that do not exist."""
-    unknown = _Unknown(interfaces, library)
-    queue = list(interfaces.values())
+def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool: Pool) -> None:
+    """Add every interface that is reached and not there yet; note those that do not exist."""
+    unknown = _Unknown(interfaces, pool.library)
+    queue = list(interfaces)
     while queue:
-        for field, target in _references(queue.pop()):
+        entry = pool[queue.pop()]
+        for field, target in entry.references:
             if target in interfaces:
                 continue
-            source = library.source(target)
-            if source is None:
-                if field.type_span is not None:
-                    report.add(unknown.problem(target, field.type_span))
-                continue
-            found = Report()
-            interface = lower(parse(source), target, found)
-            report.extend(d for d in found if d.severity is Severity.ERROR)
-            interfaces[target] = interface
-            queue.append(interface)
+            if found := pool.get(target):
+                interfaces[target] = found.interface
+                queue.append(target)
+            elif field.type_span is not None and not entry.linked:
+                entry.errors.append(unknown.problem(target, field.type_span))
+        entry.linked = True
 
 
 class _Unknown:
@@ -138,7 +169,8 @@ class _Unknown:
         written = span.text
         known = self._messages.get(target.package)
         if known is None and "/" in written and not self._library.names(target.package):
-            hint = self._near(target.package, self._library.packages)
+            hint = self._library.nearby(target.package)
+            hint = hint or self._near(target.package, self._library.packages)
             return codes.UNKNOWN_PACKAGE.at(
                 span.at(0, len(target.package)),
                 f"unknown package `{target.package}`",
@@ -176,45 +208,21 @@ class _Unknown:
         return None
 
 
-def _check_recursion(interfaces: Mapping[ir.TypeName, ir.Interface], report: Report) -> None:
-    """Report each field that closes a circle; walks with its own stack, so depth is no limit."""
-    edges = {name: tuple(_references(interface)) for name, interface in interfaces.items()}
-    done: set[ir.TypeName] = set()
-    for root in interfaces:
-        path: list[ir.TypeName] = []
-        rest: list[Iterator[tuple[ir.Field, ir.TypeName]]] = []
-        places: dict[ir.TypeName, int] = {}
-        enter: ir.TypeName | None = None if root in done else root
-        while enter or path:
-            if enter:
-                places[enter] = len(path)
-                path.append(enter)
-                rest.append(iter(edges[enter]))
-            step = next(rest[-1], None)
-            enter = None
-            if step is None:
-                done.add(path[-1])
-                del rest[-1], places[path.pop()]
-            elif step[1] in places:
-                _report_circle(path, places[step[1]], *step, report)
-            elif step[1] in edges and step[1] not in done:
-                enter = step[1]
+def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
+    """Note each field that closes a circle."""
+    for path, field in circles(interfaces, pool.references, pool.searched):
+        if field.type_span is not None:
+            pool[path[-1]].errors.append(_circle(path, field.type_span))
 
 
-def _report_circle(
-    path: list[ir.TypeName], start: int, field: ir.Field, target: ir.TypeName, report: Report
-) -> None:
-    """Report a circle of the messages on `path` from `start` on, and `target` again."""
-    if field.type_span is None:
-        return
-    left_out = len(path) - start - NAMED
-    shown = [name.name for name in path[start : start + NAMED]]
+def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
+    """Return the problem with a circle of the messages on `path`."""
+    left_out = len(path) - NAMED
+    shown = [name.name for name in path[:NAMED]]
     shown += [f"{left_out} more"] if left_out > 0 else []
-    names = " → ".join((*shown, target.name))
-    report.add(
-        codes.RECURSIVE_TYPE.at(
-            field.type_span,
-            f"`{target.name}` contains itself: {names}",
-            hint="ROS 2 has no recursive types; refer to the other message by an id",
-        )
+    names = " → ".join((*shown, path[0].name))
+    return codes.RECURSIVE_TYPE.at(
+        span,
+        f"`{path[0].name}` contains itself: {names}",
+        hint="ROS 2 has no recursive types; refer to the other message by an id",
     )

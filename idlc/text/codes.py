@@ -73,6 +73,7 @@ DUPLICATE_FIELD = Code("IDL208", "duplicate-field", ERROR)
 DUPLICATE_CONSTANT = Code("IDL209", "duplicate-constant", ERROR)
 RECURSIVE_TYPE = Code("IDL210", "recursive-type", ERROR)
 ROS1_TYPE = Code("IDL211", "ros1-type", ERROR)
+PACKAGE_CIRCLE = Code("IDL212", "package-circle", ERROR)
 BREAKS_PYTHON = Code("IDL220", "breaks-rosidl-python", WARNING)
 BREAKS_C = Code("IDL221", "breaks-c", WARNING)
 BREAKS_CPP = Code("IDL222", "breaks-cpp", WARNING)
@@ -170,6 +171,7 @@ STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
+DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -190,6 +192,7 @@ USAGE: frozenset[str] = frozenset(
         NO_SUCH_TYPE,
         STRUCTURE_TOO_LARGE,
         NO_REVISION,
+        DUPLICATE_PACKAGE,
     )
 )
 

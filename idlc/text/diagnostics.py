@@ -67,10 +67,15 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Report:
-    """The problems of one run, one per cause: the same code at the same place counts once."""
+    """The problems of one run, one per cause: the same code at the same place counts once.
+
+    `notes` are no problems: what was assumed or left out, for commands that tell it.
+    """
 
     def __init__(self) -> None:
         self._found: dict[tuple[str, str, int, int, str], Diagnostic] = {}
+        self._had_errors = False
+        self.notes: list[str] = []
 
     def add(self, diagnostic: Diagnostic) -> None:
         """Add a problem unless the same code already stands at the same place."""
@@ -79,6 +84,7 @@ class Report:
         # what is gone has no place of its own
         about = "" if diagnostic.span and not diagnostic.levels else diagnostic.message
         self._found.setdefault((path, diagnostic.code, start, end, about), diagnostic)
+        self._had_errors = self._had_errors or diagnostic.severity is Severity.ERROR
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
         """Add several problems."""
@@ -95,4 +101,4 @@ class Report:
     @property
     def had_errors(self) -> bool:
         """Whether any problem rejects its file."""
-        return any(found.severity is Severity.ERROR for found in self._found.values())
+        return self._had_errors

@@ -27,9 +27,10 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
             yield _value(sides, old, new)
 
 
-def added(sides: Sides) -> int:
-    """Return how many constants the new version has that the old one had not."""
-    return len(pair(sides.old.constants, sides.new.constants, _content).added)
+def added(sides: Sides) -> Iterator[str]:
+    """Yield the constants that the new version has and the old one had not."""
+    for constant in pair(sides.old.constants, sides.new.constants, _content).added:
+        yield f"constant `{sides.subject(constant.name)}`"
 
 
 def _content(constant: ir.Constant) -> Hashable:

@@ -50,7 +50,14 @@ def field_changes(sides: Sides) -> Iterator[Change]:
             change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
             for change in found
         ]
+    if any("hash" in change.levels for change in found) and _same_hash(sides):
+        found = [change.without("hash") for change in found]
     yield from (change for change in found if change.levels)
+
+
+def _same_hash(sides: Sides) -> bool:
+    name = str(sides.new.name)
+    return sides.before.describer.hash(name) == sides.after.describer.hash(name)
 
 
 def _changes(sides: Sides) -> Iterator[Change]:

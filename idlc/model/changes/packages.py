@@ -19,13 +19,13 @@ CANDIDATES = 50
 
 
 class Comparison(NamedTuple):
-    """What breaks something, and how many things were added that break nothing.
+    """What breaks something, and what was added and breaks nothing.
 
     `differs` is whether anything at all is different, comments included.
     """
 
     changes: tuple[Change, ...]
-    additions: int = 0
+    additions: tuple[str, ...] = ()
     differs: bool = False
 
 
@@ -34,7 +34,7 @@ def together(comparisons: Iterable[Comparison]) -> Comparison:
     found = list(comparisons)
     return Comparison(
         tuple(change for one in found for change in one.changes),
-        sum(one.additions for one in found),
+        tuple(name for one in found for name in one.additions),
         any(one.differs for one in found),
     )
 
@@ -48,14 +48,15 @@ def compare(before: Model, after: Model) -> Comparison:
     renamed = dict(_renamed(gone, come))
     changes = [_removed(one) for one in gone if one.name not in renamed]
     changes += [_called(one, renamed[one.name]) for one in gone if one.name in renamed]
-    additions = len(come) - len(renamed)
+    found = {new.name for new in renamed.values()}
+    additions = [_added(one) for one in come if one.name not in found]
     differs = bool(gone or come)
     for name in sorted(old.keys() & new.keys()):
-        differs = differs or meaning(old[name]) != meaning(new[name])
+        differs = differs or _differ(old[name], new[name])
         for sides in _sides(old[name], new[name], before, after):
             changes += [*field_changes(sides), *constant_changes(sides)]
             additions += added(sides)
-    return Comparison(tuple(changes), additions, differs or bool(changes))
+    return Comparison(tuple(changes), tuple(additions), differs or bool(changes))
 
 
 def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
@@ -65,7 +66,18 @@ def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) ->
 
 def removed_package(before: Model) -> Comparison:
     """Return the changes when a package is no longer there."""
-    return Comparison(tuple(map(_removed, before.own)), 0, bool(before.own))
+    return Comparison(tuple(map(_removed, before.own)), (), bool(before.own))
+
+
+def added_package(after: Model) -> Comparison:
+    """Return what a package adds that was not there before."""
+    return Comparison((), tuple(map(_added, after.own)), bool(after.own))
+
+
+def _differ(old: ir.Interface, new: ir.Interface) -> bool:
+    """Return whether two versions of an interface are not the same, line ends apart."""
+    texts = [one.source.text.splitlines() if one.source else None for one in (old, new)]
+    return texts[0] != texts[1] or meaning(old) != meaning(new)
 
 
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
@@ -92,7 +104,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
                     hint="compare with a folder or a git revision to see what did it",
                 )
             )
-    come = sum(name not in recorded for name in sources)
+    come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
     return Comparison(tuple(changes), come, bool(changes or come))
 
 
@@ -117,6 +129,10 @@ def _removed(interface: ir.Interface) -> Change:
         frozenset(LEVELS[:3]),
         path=_path(interface),
     )
+
+
+def _added(interface: ir.Interface) -> str:
+    return f"{_what(interface.name.kind)} `{interface.name}`"
 
 
 def _called(old: ir.Interface, new: ir.Interface) -> Change:

@@ -1,0 +1,121 @@
+"""The interfaces of one run: each is read and lowered once, whichever packages refer to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from idlc.model import derive, ir
+from idlc.model.circles import circles
+from idlc.model.lower import lower
+from idlc.syntax.parse import parse
+from idlc.text import codes
+from idlc.text.diagnostics import Diagnostic, Report, Severity
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from idlc.model.describe import Describer
+    from idlc.model.link import Library
+    from idlc.text.source import Span
+
+
+class Entry(msgspec.Struct):
+    """An interface, the fields of it that hold messages of other files, and its errors.
+
+    `linked` is whether its references were looked up.
+    """
+
+    interface: ir.Interface
+    references: tuple[tuple[ir.Field, ir.TypeName], ...]
+    errors: list[Diagnostic]
+    linked: bool = False
+
+
+class Pool:
+    """Interfaces by name: those that were added, and those that a library has."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+        self._entries: dict[ir.TypeName, Entry | None] = {}
+        #: The interfaces that were searched for circles.
+        self.searched: set[ir.TypeName] = set()
+
+    def add(self, interface: ir.Interface, problems: Iterable[Diagnostic] = ()) -> Entry:
+        """Add an interface with what is wrong in its file, unless it is there already."""
+        known = self._entries.get(interface.name)
+        if known is None or known.interface is not interface:
+            errors = [one for one in problems if one.severity is Severity.ERROR]
+            known = Entry(interface, tuple(_references(interface)), errors)
+            self._entries[interface.name] = known
+        return known
+
+    def get(self, name: ir.TypeName) -> Entry | None:
+        """Return an interface by name; `None` if there is none."""
+        if name not in self._entries:
+            source = self.library.source(name)
+            self._entries[name] = None
+            if source is not None:
+                found = Report()
+                self.add(lower(parse(source), name, found), found)
+        return self._entries[name]
+
+    def __getitem__(self, name: ir.TypeName) -> Entry:
+        """Return an interface that was found before."""
+        entry = self._entries[name]
+        if entry is None:
+            raise KeyError(name)
+        return entry
+
+    def references(self, name: ir.TypeName) -> Iterator[tuple[ir.Field, ir.TypeName]]:
+        """Yield the references of an interface to others that were found."""
+        entry = self._entries.get(name)
+        for field, target in entry.references if entry else ():
+            if self._entries.get(target):
+                yield field, target
+
+    def crossings(self) -> Iterator[tuple[str, str, Span]]:
+        """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
+        for entry in filter(None, self._entries.values()):
+            own = entry.interface.name.package
+            for field, target in entry.references:
+                if target.package != own and field.type_span is not None:
+                    yield own, target.package, field.type_span
+
+    @cached_property
+    def describer(self) -> Describer:
+        """Type descriptions and hashes, each made once."""
+        from idlc.model.describe import Describer
+
+        return Describer({})
+
+
+def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
+    """Yield the fields that hold messages of other files, derived structures' included."""
+    for message in derive.messages(interface):
+        for field in message.fields:
+            element = ir.element_of(field.type)
+            if isinstance(element, ir.Ref) and element.target.kind == "msg":
+                yield field, element.target
+
+
+def check_packages(pool: Pool, report: Report) -> None:
+    """Report each circle of packages, which no build tool could put into an order."""
+    edges: dict[str, dict[str, Span]] = {}
+    for package, target, span in pool.crossings():
+        edges.setdefault(package, {}).setdefault(target, span)
+    found = circles(
+        sorted(edges), lambda one: ((at, to) for to, at in edges.get(one, {}).items()), set()
+    )
+    for packages, span in found:
+        names = " → ".join((*packages, packages[0]))
+        report.add(
+            codes.PACKAGE_CIRCLE.at(
+                span,
+                f"packages that need each other cannot be built: {names}",
+                hint="move the messages that both use to a package of their own",
+            )
+        )
