@@ -112,6 +112,7 @@ def _edits(project: Project, planned: Plan, added: dict[str, str]) -> list[tuple
     }
     edits = [console_script.add_script(texts, Script(name, f"{own}.{name}:main"))]
     tests = ["python3-pytest", *(["lifecycle_msgs"] if planned.node.lifecycle else [])]
+    tests += ["rcl_interfaces"] if planned.node.parameters else []
     edits += manifest_edit(project, planned.packages, tests, group=False)
     launch = _launch_file(project, own)
     text = project.text(launch)
