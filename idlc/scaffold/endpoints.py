@@ -288,5 +288,5 @@ def _said(topic: str, variable: str, message: ir.Message) -> list[str]:
     short = [f for f in message.fields if isinstance(f.type, (ir.Primitive, ir.String))]
     parts = [f"{f.name}={{{variable}.{pynames.field(f.name)}!r}}" for f in short[:LOGGED]]
     if not parts:
-        parts = [f"{{{variable}}}"] if message.fields else [f"{variable} received"]
+        parts = [f"{variable}={{{variable}}}"] if message.fields else [f"{variable} received"]
     return [f"{topic}:", *parts]
