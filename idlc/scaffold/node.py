@@ -93,7 +93,7 @@ def render(planned: Plan) -> str:
 def view(planned: Plan) -> NodeView:
     """Return the lines of a node's module."""
     node = planned.node
-    page = Page(planned.messages, clock=CLOCK, taken=_OWN)
+    page = Page(planned.messages, clock=CLOCK, taken=_OWN, own=node.package)
     endpoints = Endpoints(page, lifecycle=node.lifecycle)
     triples = zip(node.endpoints, planned.words, planned.interfaces, strict=True)
     parts = tuple(endpoints.part(*one) for one in triples)
