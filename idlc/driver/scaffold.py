@@ -12,7 +12,7 @@ from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.scaffold import cmake, package_xml
+from idlc.scaffold import cmake, data_files, package_xml
 from idlc.scaffold import interface as interface_text
 from idlc.scaffold import package as package_files
 from idlc.scaffold.edit import Edited, Outcome
@@ -98,6 +98,11 @@ def interface(
     lists = project.text("CMakeLists.txt")
     if lists is not None:
         edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
+    setup = project.text("setup.py")
+    if setup is not None and lists is None:
+        kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
+        packages = [own, f"{own}._idlc", *(f"{own}.{one}" for one in sorted(kinds))]
+        edits.append(("setup.py", data_files.add_packages(setup, packages)))
     edited = accepted(project, edits, report)
     if edited is None:
         return None
