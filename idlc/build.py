@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from collections.abc import Iterable
+from pathlib import Path
 
 from idlc.cli import terminal
 from idlc.disk import config
@@ -20,16 +23,40 @@ from idlc.text.diagnostics import Report
 def compile_interfaces(package: str) -> None:
     """Bring the package's classes, and what ROS 2 installs beside interfaces, up to date.
 
-    Works in the working folder, and writes nothing where nothing changed. A rejected interface ends
-    the build with a report.
+    Works in the folder of the setup.py that is run, and writes nothing where nothing changed. A
+    rejected interface ends the build with a report.
     """
     if "--dry-run" in sys.argv:
         return  # colcon asks setup.py for the package's name whatever it is to do, to test as well
+    here, source = Path.cwd(), Path("setup.py").resolve().parent
+    os.chdir(source)
+    try:
+        installed = _compile(package)
+    finally:
+        os.chdir(here)
+    if source != here:
+        _link(installed, source, here)
+
+
+def _link(paths: Iterable[str], source: Path, here: Path) -> None:
+    """Link to files of the source where colcon builds: with --symlink-install, among links.
+
+    Those links it makes before there are any compiled files.
+    """
+    for path in paths:
+        if not (here / path).exists():
+            (here / path).unlink(missing_ok=True)
+            (here / path).parent.mkdir(parents=True, exist_ok=True)
+            (here / path).symlink_to(source / path)
+
+
+def _compile(package: str) -> Iterable[str]:
+    """Compile the package in the working folder; return the files that ROS 2's tools read."""
     report = Report()
     where = scope(config.load(report), package)
     found = packages(look((".",), Report(), where.exclude).files, where, report)
     if not found:
-        return
+        return ()
     (given,) = found
     gen(GenOptions(paths=(".",), out=package, scope=where), report)
     project = Project(".", report)
@@ -44,3 +71,4 @@ def compile_interfaces(package: str) -> None:
     terminal.show(report, "text", sys.stderr)
     if report.had_errors:
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
+    return files

@@ -1,6 +1,8 @@
 """Packages generated for a test, and imported as if nothing else were installed."""
 
+import ast
 import importlib
+import json
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -53,6 +55,14 @@ def write_package(folder, package, files):
         target = folder / package / file.path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(file.text, encoding="utf-8")
+
+
+def type_data(package):
+    """Return what a generated package says of its types, read without importing it."""
+    text = (package / "_idlc" / "type_data.py").read_text(encoding="utf-8")
+    docstring, data = ast.parse(text).body  # there is nothing else
+    assert isinstance(ast.literal_eval(docstring.value), str)
+    return json.loads(ast.literal_eval(data.value))
 
 
 @contextmanager

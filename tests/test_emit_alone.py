@@ -8,6 +8,8 @@ import sys
 import generated
 import pytest
 
+from idlc.emit.render import render_package
+
 PLAIN = {
     "msg/Plain.msg": "float64 x\nint32[] numbers\nstring[] names\nInner inner\n",
     "msg/Inner.msg": "bool[3] flags\nwstring wide\n",
@@ -107,3 +109,9 @@ def test_it_may_be_part_of_another_package(folder, tmp_path):
         "print(Plain.from_dict({'inner': {'wide': 'x'}}).inner.wide)",
     )
     assert (result.stdout, result.stderr) == ("x\n", "")
+
+
+def test_no_build_can_leave_out_what_it_needs():
+    """A setup.py without `package_data` installs modules, and py.typed is for checkers only."""
+    files = render_package(generated.model_of("plain_msgs", PLAIN))
+    assert {file.path for file in files if not file.path.endswith(".py")} == {"py.typed"}

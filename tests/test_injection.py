@@ -10,6 +10,7 @@ import unicodedata
 from pathlib import Path
 from xml.etree import ElementTree
 
+import generated
 import pytest
 from hostile import (
     OTHER_LINE_ENDS,
@@ -175,7 +176,7 @@ def test_values_arrive_as_they_were_written(payload, attacked):
 @pytest.mark.parametrize("payload", PAYLOADS)
 def test_the_source_text_for_type_descriptions_is_the_files(payload, attacked):
     folder, _, _, used, _ = attacked
-    types = json.loads((folder / "out/attack/_idlc/types.json").read_text(encoding="utf-8"))
+    types = generated.type_data(folder / "out/attack")
     for place in PLACES:
         name, _ = names_of(place, payload)
         if name in used:

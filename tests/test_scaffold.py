@@ -4,6 +4,7 @@
 match, and fails, so that the changes are looked at.
 """
 
+import os
 import shlex
 import shutil
 import subprocess
@@ -40,7 +41,9 @@ def carry_out(commands: str, monkeypatch) -> None:
 
 @pytest.fixture(autouse=True)
 def nothing_installed(monkeypatch):
-    """Types come from the catalogue, so that every machine writes the same."""
+    """Types come from the catalogue and no name from git, so that every machine writes the same."""
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
+    monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
     monkeypatch.setattr("idlc.disk.surroundings.ament_prefixes", lambda: ())
 
 
@@ -171,8 +174,13 @@ def test_files_keep_their_mode(package):
         (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),
         (["interface", "msg", "Message", "int8 a\nint8 b"], "a field is one line"),
         (["interface", "msg", "Message", "flot32 a"], "IDL201"),
-        (["package", "Demo"], "IDL607"),
-        (["package", "demo2", "--interfaces-only"], "--build-type ament_cmake"),
+        (["node", "a", "--publisher", "String:a"], "or `std_msgs/String`?"),
+        (["node", "a", "--publisher", "std_srvs/SetBool:a"], "service: use --service or --client"),
+        (["node", "a", "--client", "std_msgs/String:a"], "message: use --publisher or --subscri"),
+        (["package", "Demo"], "cannot be a package: use lower-case letters"),
+        (["package", "test"], "cannot be a package: a folder or a module"),
+        (["package", "launch"], "cannot be a package: a folder or a module"),
+        (["package", "x", "--interfaces-only", "--build-type", "ament_python"], "is for ament_cm"),
     ],
 )
 def test_wrong_words_are_explained_and_change_nothing(package, capsys, words, said):
@@ -197,14 +205,87 @@ def test_the_wizard_asks_for_the_same(package, monkeypatch):
 
     from idlc.cli.scaffold_node import command
 
-    answers = ["publish", "std_msgs/Strin", "bad topic", "publish", "std_msgs/String", "chatter"]
-    answers += ["2", "latched", "timer", "0.5", "parameter", "speed:int=3", "done", "n"]
+    answers = ["publish", "std_msgs/Strin", "Imu:imu@50", "std_srvs/Empty", "std_msgs/String"]
+    answers += ["bad topic", "chatter", "often", "2", "latched", "timer", "soon", "0.5"]
+    answers += ["parameter", "speed", "speed:int=3", "done", "n"]
     monkeypatch.setattr("idlc.cli.scaffold_node.interactive", lambda: True)
-    answers[3:3] = ["1", "default"]
     result = CliRunner().invoke(command, ["asker"], input="\n".join(answers) + "\n")
     assert result.exception is None or isinstance(result.exception, SystemExit), result.output
+    complaints = [line for line in result.output.splitlines() if "Error: " in line]
+    wrong = ["did you mean `std_msgs/msg/String`", "`Imu:imu@50`", "it is a service", "`bad topic`"]
+    wrong += ["not `often`", "not `soon`", "`speed` is not NAME:TYPE=DEFAULT"]
+    for complaint, what in zip(complaints, wrong, strict=True):  # each when it is given
+        assert what in complaint
     asked = (package / "demo" / "asker.py").read_text()
     words = ["--publisher", "std_msgs/String:chatter@2", "--qos", "latched", "--timer", "0.5"]
     assert main(["scaffold", "node", "typer", *words, "--param", "speed:int=3"]) == 0
     typed = (package / "demo" / "typer.py").read_text()
     assert asked.replace("asker", "typer").replace("Asker", "Typer") == typed
+
+
+def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
+    config = tmp_path / "config"
+    config.write_text("[user]\n\tname = \"Ada <L> & 'co'\"\n\temail = ada@example.com\n")
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(config))
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    (maintainer,) = parse_package(tmp_path / "demo").maintainers
+    assert (maintainer.name, maintainer.email) == ("Ada <L> & 'co'", "ada@example.com")
+    assert main(["scaffold", "package", "other", "--maintainer", "Bo", "--email", "b@c.de"]) == 0
+    assert "Bo" in (tmp_path / "other/setup.py").read_text()
+
+
+def test_interfaces_only_is_for_cmake(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo_interfaces", "--interfaces-only"]) == 0
+    assert (tmp_path / "demo_interfaces/CMakeLists.txt").is_file()
+
+
+def test_a_launch_file_that_cannot_be_edited_leaves_the_rest(package, capsys):
+    launch = package / "launch" / "demo_launch.py"
+    text = "from launch import LaunchDescription\n\nx = LaunchDescription(nodes())\n"
+    launch.write_text(text)
+    assert main(NODE) == 0
+    said = capsys.readouterr().out
+    line = "Node(package='demo', executable='talker', output='screen')"
+    assert "note: `launch/demo_launch.py` is not edited: " in said
+    assert line in said
+    assert launch.read_text() == text
+    assert "talker = demo.talker:main" in (package / "setup.py").read_text()
+    assert (package / "demo" / "talker.py").is_file()
+
+
+def test_the_launch_file_is_for_nodes_that_stay(package):
+    launch = package / "launch" / "demo_launch.py"
+    before = launch.read_text()
+    assert main(["scaffold", "node", "once", "--client", "std_srvs/Empty:reset"]) == 0
+    assert main([*NODE, "--no-launch"]) == 0
+    assert launch.read_text() == before
+    assert main(["scaffold", "node", "keeper", "--lifecycle", "--timer", "1"]) == 0
+    after = launch.read_text()
+    assert "from launch_ros.actions import LifecycleNode\n" in after
+    assert "LifecycleNode(" in after
+    assert "namespace=''" in after
+
+
+@pytest.mark.parametrize("ours", [True, False])
+def test_the_next_command_is_one_that_works(package, capsys, monkeypatch, tmp_path, ours):
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for name in ("idlc", "rosidlc"):
+        mine = ours if name == "idlc" else True
+        text = "from idlc.cli.main import main" if mine else "the one of Cyclone DDS"
+        (tools / name).write_text(f"#!/bin/sh\n# {text}\n")
+        (tools / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(tools))
+    called = "idlc" if ours else "rosidlc"
+    assert main(["scaffold", "interface", "msg", "Drive", "float32 speed"]) == 0
+    assert f"next: {called} gen\n" in capsys.readouterr().out
+    (package / "pyproject.toml").unlink()
+    assert main(["scaffold", "interface", "msg", "Other", "float32 speed"]) == 0
+    assert f"next: {called} gen . -o demo\n" in capsys.readouterr().out
+    assert main(["gen", ".", "-o", "demo"]) == 0
+    (tools / "rosidlc").unlink()
+    (tools / "idlc").unlink()
+    assert main(["scaffold", "interface", "msg", "Third", "float32 speed"]) == 0
+    assert "-m idlc gen . -o demo\n" in capsys.readouterr().out

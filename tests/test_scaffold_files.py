@@ -9,6 +9,7 @@ from idlc.scaffold import data_files, launch_py, package_xml
 from idlc.scaffold.console_script import add_script
 from idlc.scaffold.edit import Edited, Outcome, Refused, Script
 
+TALKING = launch_py.Started("demo", "talker")
 TALKER = Script("talker", "demo.talker:main")
 
 
@@ -101,12 +102,12 @@ def generate_launch_description():
 
 
 def test_a_node_is_added_to_a_launch_file():
-    outcome = launch_py.add_node(LAUNCH, "demo", "talker")
+    outcome = launch_py.add_node(LAUNCH, TALKING)
     after = text_of(outcome)
     new = '        Node(package="demo", executable="talker", output="screen"),\n'
     assert added(LAUNCH, after) == [new]
-    assert launch_py.add_node(after, "demo", "talker") == outcome
-    assert launch_py.add_node(after, "demo", "listener") == outcome
+    assert launch_py.add_node(after, TALKING) == outcome
+    assert launch_py.add_node(after, launch_py.Started("demo", "listener")) == outcome
 
 
 @pytest.mark.parametrize(
@@ -119,7 +120,7 @@ def test_a_node_is_added_to_a_launch_file():
 )
 def test_node_is_called_as_it_is_imported(head, called):
     text = f"{head}from launch import LaunchDescription\nx = LaunchDescription([])\n"
-    after = text_of(launch_py.add_node(text, "demo", "talker"))
+    after = text_of(launch_py.add_node(text, TALKING))
     assert f"LaunchDescription([{called}package=" in after
     names = {}
     stand_ins = after.replace("import launch_ros.actions", "launch_ros = Stub")
@@ -135,12 +136,14 @@ def test_node_is_called_as_it_is_imported(head, called):
     [
         "from launch import LaunchDescription\nx = LaunchDescription(nodes())\n",
         "from launch import LaunchDescription\nx = LaunchDescription()\nx.add_action(y)\n",
+        "def f():\n    x = LaunchDescription()\n    g(x)\n",
+        "def f():\n    if a:\n        x = LaunchDescription()\n    return x\n",
         "from other import Node\nfrom launch import LaunchDescription\nx = LaunchDescription([])\n",
         "def f(:",
     ],
 )
 def test_unusual_launch_files_are_refused_with_the_line(text):
-    outcome = launch_py.add_node(text, "demo", "talker")
+    outcome = launch_py.add_node(text, TALKING)
     assert isinstance(outcome, Refused)
     assert "executable='talker'" in outcome.line
 
@@ -236,3 +239,44 @@ def test_a_launch_file_is_installed_if_none_was():
     assert data_files.add_launch(SETUP, "demo", "launch/demo_launch.py") == Edited(SETUP)
     computed = SETUP.replace("setup(", "setup(data_files=files(), ")
     assert isinstance(data_files.add_launch(computed, "demo", "launch/demo_launch.py"), Refused)
+
+
+CLASSIC = """\
+from launch import LaunchDescription
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    ld = LaunchDescription()
+    listener = Node(package="demo", executable="listener")
+    ld.add_action(listener)  # ours
+
+    # the end
+    return ld
+"""
+
+
+def test_a_node_is_added_where_nodes_are_added_one_by_one():
+    outcome = launch_py.add_node(CLASSIC, TALKING)
+    after = text_of(outcome)
+    new = '    ld.add_action(Node(package="demo", executable="talker", output="screen"))\n'
+    assert added(CLASSIC, after) == [new]
+    assert launch_py.add_node(after, TALKING) == outcome
+    managed = launch_py.Started("demo", "keeper", lifecycle=True)
+    after = text_of(launch_py.add_node(after, managed))
+    assert "from launch_ros.actions import LifecycleNode, Node\n" in after
+    assert '        name="keeper",\n' in after
+    assert compile(after, "x", "exec")
+    assert launch_py.add_node(after, managed) == Edited(after)
+
+
+def test_packages_that_are_listed_get_those_of_the_classes():
+    names = ["demo", "demo._idlc", "demo.msg"]
+    listed = SETUP.replace("setup(", "setup(packages=[name], ").replace(
+        "\nsetup", "\nname = 'demo'\nsetup"
+    )
+    outcome = data_files.add_packages(listed, names)
+    assert "packages=[name, 'demo._idlc', 'demo.msg'], " in text_of(outcome)
+    assert data_files.add_packages(text_of(outcome), names) == outcome
+    for text in (SETUP, SETUP.replace("setup(", "setup(packages=find_packages(), "), "def f(:"):
+        assert data_files.add_packages(text, names) == Edited(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -65,8 +66,9 @@ def common(function: Command) -> Command:
 
 
 def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
-    """Show what a command did and return the exit status."""
+    """Show what a command did and return the exit status; `hints` are the commands after it."""
     from idlc.cli import terminal
+    from idlc.cli.program import program
     from idlc.text.present import summary
 
     terminal.show(report, "text", sys.stderr)
@@ -82,6 +84,9 @@ def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
             sys.stdout.write(f"{done.what} {folder}{done.path}\n")
     if all(done.what == "unchanged" for done in result.done):
         sys.stdout.write("nothing to do: everything is there\n")
-    else:
+    sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
+    if any(done.what != "unchanged" for done in result.done):
+        if result.following:
+            hints = (shlex.join([*program().split(), *result.following]), *hints)
         sys.stdout.writelines(f"next: {hint}\n" for hint in hints)
     return terminal.status(report)

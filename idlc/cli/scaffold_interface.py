@@ -51,4 +51,4 @@ def command(
     settings = scaffold.Settings(dry_run, force, include)
     known = KINDS[KINDS.index(kind)]
     result = scaffold.interface(known, name, fields, comment, settings, report)
-    return finish(result, report, ("idlc gen",))
+    return finish(result, report)

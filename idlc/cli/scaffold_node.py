@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Any
 
 import click
@@ -95,17 +96,19 @@ def _endpoint_options(function: Any) -> Any:
     help="The quality of service of the endpoint before.",
 )
 @click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
+@click.option("--launch/--no-launch", default=True, help="Enter it in the launch file, or not.")
 @common
-def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  # noqa: ARG001
+def command(name: str, qos: str | None, lifecycle: bool, launch: bool, **given: Any) -> int:  # noqa: ARG001
     """Write a node of the package that the working folder belongs to.
 
     Writes the module and its test, and adds the command to setup.py, the packages that it needs
-    to package.xml and the node to the launch file.
+    to package.xml and the node to the launch file, unless it does one thing and ends.
     """
     from idlc.driver import scaffold, scaffold_node
     from idlc.scaffold import spec
     from idlc.text.diagnostics import Report
 
+    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"], launch)
     asked = any(given[key.replace("-", "_")] for key in _ENDPOINTS)
     asked = asked or given["timers"] or given["parameters"] or lifecycle
     try:
@@ -113,7 +116,7 @@ def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  
         if not asked and interactive():
             from idlc.cli.wizard import ask
 
-            wanted = ask(name)
+            wanted = ask(name, lambda role, type_: scaffold_node.check_type(role, type_, settings))
         else:
             wanted = spec.Node(
                 name,
@@ -125,7 +128,8 @@ def command(name: str, qos: str | None, lifecycle: bool, **given: Any) -> int:  
             )
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
     report = Report()
     result = scaffold_node.node(wanted, settings, report)
-    return finish(result, report)
+    folder = "" if result is None or result.folder == "." else f"{result.folder}/"
+    test = f"{Path(sys.executable).name} -m pytest {folder}test/test_{name}.py"
+    return finish(result, report, (test,))

@@ -21,8 +21,8 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.command("package", epilog=EPILOG)
 @click.argument("name", metavar="NAME")
 @click.option("--description", default="", help="What the package is for, in a sentence.")
-@click.option("--maintainer", default="Your Name", help="Who answers for it.")
-@click.option("--email", default="you@example.com", help="The maintainer's address.")
+@click.option("--maintainer", help="Who answers for it; git's user.name if not given.")
+@click.option("--email", help="The maintainer's address; git's user.email if not given.")
 @click.option("--license", "licence", type=click.Choice(LICENSES), default=LICENSES[0])
 @click.option("--interfaces-only", is_flag=True, help="Only interfaces, for nodes in any language.")
 @click.option(
@@ -40,29 +40,32 @@ def command(
 
     Interfaces in its msg/, srv/ and action/ folders are compiled whenever it is built.
     """
-    from idlc.disk.naming import accept_name
+    from idlc.cli.program import program
+    from idlc.disk.revision import setting
     from idlc.driver import scaffold
-    from idlc.scaffold.package import Package
+    from idlc.scaffold.package import Package, check_name
     from idlc.text.diagnostics import Report
 
     if build_type == "ament_cmake" and not interfaces_only:
         raise click.UsageError("--build-type ament_cmake goes with --interfaces-only")
-    if interfaces_only and build_type != "ament_cmake":
+    if interfaces_only and build_type == "ament_python":
         raise click.UsageError(
-            "--interfaces-only goes with --build-type ament_cmake: an ament_python package can "
-            "have interfaces anyway"
+            "--interfaces-only is for ament_cmake; ament_python packages can have interfaces, too"
         )
+    try:
+        check_name(name)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
     report = Report()
-    if not accept_name(name, "NAME", report):
-        return finish(None, report)
     wanted = Package(
         name,
         given["description"] or f"The package {name}.",
-        given["maintainer"],
-        given["email"],
+        given["maintainer"] or setting("user.name") or "Your Name",
+        given["email"] or setting("user.email") or "you@example.com",
         given["licence"],
-        build_type or BUILD_TYPES[0],
+        BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
     settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
     result = scaffold.package(wanted, folder, settings, report)
-    return finish(result, report, (f"cd {name}", "idlc scaffold interface --help"))
+    inside = name if folder in ("", ".") else f"{folder}/{name}"
+    return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

@@ -18,6 +18,7 @@ from idlc.disk.package import MANIFEST
 from idlc.disk.read import absolute
 from idlc.text import codes
 from idlc.text.diagnostics import Report
+from idlc.text.visible import one_line
 
 
 class Revision(NamedTuple):
@@ -101,6 +102,12 @@ def _git(folder: Path, words: Sequence[str], given: bytes = b"") -> bytes | None
     except OSError:
         return None
     return done.stdout if done.returncode == 0 else None
+
+
+def setting(name: str) -> str:
+    """Return one of the user's settings of git, on one line; empty if there is none."""
+    found = _git(absolute("."), ["config", "--get", name]) or b""
+    return one_line(found.decode("utf-8", errors="replace").strip())
 
 
 def _extract(top: Path, commit: str, root: Path) -> None:

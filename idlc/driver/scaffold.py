@@ -12,7 +12,7 @@ from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.scaffold import cmake, package_xml
+from idlc.scaffold import cmake, data_files, package_xml
 from idlc.scaffold import interface as interface_text
 from idlc.scaffold import package as package_files
 from idlc.scaffold.edit import Edited, Outcome
@@ -27,14 +27,20 @@ class Settings(NamedTuple):
     dry_run: bool = False
     force: bool = False
     include: tuple[str, ...] = ()
+    launch: bool = True
 
 
 class Result(NamedTuple):
-    """What a command did, or would do: its files, and a diff where nothing was written."""
+    """What a command did, or would do: its files, and a diff where nothing was written.
+
+    `notes` say what is left to do by hand, `following` which arguments of `idlc` come next.
+    """
 
     folder: str
     done: tuple[Done, ...]
     diff: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    following: tuple[str, ...] = ()
 
 
 def package(
@@ -56,7 +62,10 @@ def package(
 
 
 #: Files of a new package that are edited later on.
-_GROWING = (MANIFEST, "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt")
+_GROWING = (
+    *(MANIFEST, "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
+    *("README.md", ".gitattributes", ".gitignore"),
+)
 
 
 def interface(
@@ -89,13 +98,27 @@ def interface(
     lists = project.text("CMakeLists.txt")
     if lists is not None:
         edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
+    setup = project.text("setup.py")
+    if setup is not None and lists is None:
+        kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
+        packages = [own, f"{own}._idlc", *(f"{own}.{one}" for one in sorted(kinds))]
+        edits.append(("setup.py", data_files.add_packages(setup, packages)))
     edited = accepted(project, edits, report)
     if edited is None:
         return None
     if lists is None:
         keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
         edited |= dict([interface_text.index(own, keys | {path})])
-    return write(project, {path: text, **tests}, edited, settings, report)
+    result = write(project, {path: text, **tests}, edited, settings, report)
+    after = generation(project, own) if lists is None else ()
+    return result and result._replace(following=after)
+
+
+def generation(project: Project, own: str) -> tuple[str, ...]:
+    """Return the words of the command that compiles the package's interfaces."""
+    if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
+        return ("gen",)
+    return ("gen", project.name, "-o", project.shown(own))
 
 
 def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:

@@ -5,14 +5,13 @@ Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made h
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 
 import jinja2
 import msgspec
 
-from idlc.emit import listing, pynames, types_json, view
+from idlc.emit import listing, pynames, type_data, view
 from idlc.model import ir, link
 
 PACKAGE = Path(__file__).parent.parent
@@ -72,8 +71,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
         page = listing.package(model, kind, modules)
         text = _template("package.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
-    data = json.dumps(types_json.content(model), ensure_ascii=True, separators=(",", ":"))
-    files.append(RenderedFile("_idlc/types.json", data + "\n"))
+    files.append(RenderedFile("_idlc/type_data.py", type_data.source(model)))
     # a package without it would lose to any other of its name, wherever that stands on the path
     files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
     files.append(RenderedFile("py.typed", ""))

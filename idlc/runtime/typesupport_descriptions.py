@@ -1,7 +1,7 @@
 """What ROS 2 is told about a type: its hash, its description and its source text.
 
-The facts are in `types.json` beside this module, written with the package and read only
-when rclpy asks for type support:
+The facts are JSON in `type_data.py` beside this module, written with the package and
+read only when rclpy asks for type support:
 
     {"package": "pkg",
      "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
@@ -18,14 +18,13 @@ for a bounded, 144 for an unbounded sequence (rosidl's
 from __future__ import annotations
 
 import ctypes
-import json
 import os
-import pkgutil
 import sys
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from . import typeinfo
 from . import typesupport_c as c
 
 NESTED, UINT8, BOOL, BYTE, WSTRING = 1, 3, 15, 16, 18
@@ -54,7 +53,7 @@ class Field(NamedTuple):
 
 
 class Types(NamedTuple):
-    """The content of `types.json`; fields by type."""
+    """What is known of types; fields by type."""
 
     package: str
     types: dict[str, list[Field]]
@@ -65,10 +64,7 @@ class Types(NamedTuple):
 @cache
 def load() -> Types:
     """Return the facts about this package's types."""
-    text = pkgutil.get_data(__package__ or "", "types.json")
-    if text is None:
-        raise ImportError(f"{__package__} has no types.json: run `idlc gen` again")
-    data = json.loads(text)
+    data = typeinfo.types()
     types = {
         name: [
             Field(field["name"], **field["type"], default_value=field["default_value"])

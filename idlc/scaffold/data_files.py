@@ -1,11 +1,13 @@
-"""Adding files to the `data_files` of a setup.py, so that they are installed."""
+"""Adding files and folders of modules to what a setup.py installs."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import libcst as cst
 
 from idlc.scaffold.edit import Edited, Outcome, Refused
-from idlc.scaffold.python_text import appended, constants, parsed, quoted
+from idlc.scaffold.python_text import appended, constants, parsed, quoted, string
 from idlc.scaffold.setup_py import setup_calls, strings
 
 WHERE = "to `data_files` in the call of setup()"
@@ -23,12 +25,7 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     if any("launch" in one for one in strings(module, constants(module))):
         return Edited(text)
     calls = setup_calls(module)
-    given = [
-        arg.value
-        for call in calls
-        for arg in call.args
-        if arg.keyword and arg.keyword.value == "data_files"
-    ]
+    given = _given(calls, "data_files")
     if not given:
         return Edited(text)
     listed = [value for value in given if isinstance(value, cst.List)]
@@ -40,6 +37,31 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     changed = module.deep_replace(listed[0], appended(listed[0], new))
     assert isinstance(changed, cst.Module)
     return Edited(changed.code)
+
+
+def add_packages(text: str, names: Iterable[str]) -> Outcome:
+    """Return a setup.py that installs packages, where it lists those that it installs."""
+    module = parsed(text)
+    given = _given(setup_calls(module), "packages") if module else []
+    if module is None or len(given) != 1 or not isinstance(given[0], cst.List):
+        return Edited(text)
+    known = constants(module)
+    listed: cst.BaseExpression = given[0]
+    present = [string(element.value, known) for element in given[0].elements]
+    for name in names:
+        if name not in present and None not in present:
+            assert isinstance(listed, cst.List)
+            literal = quoted(name, [element.value for element in listed.elements])
+            listed = appended(listed, cst.Element(literal))
+    changed = module.deep_replace(given[0], listed)
+    assert isinstance(changed, cst.Module)
+    return Edited(changed.code)
+
+
+def _given(calls: Iterable[cst.Call], keyword: str) -> list[cst.BaseExpression]:
+    """Return what calls are given by a keyword."""
+    arguments = (arg for call in calls for arg in call.args)
+    return [arg.value for arg in arguments if arg.keyword and arg.keyword.value == keyword]
 
 
 def _literals(value: cst.BaseExpression) -> list[cst.BaseExpression]:

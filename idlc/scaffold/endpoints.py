@@ -14,6 +14,8 @@ from idlc.scaffold.spec import Endpoint
 DEFAULT_RATE = 1.0
 #: Fields that are named in a line of the log.
 LOGGED = 6
+#: As much of a line of the log as tests look for.
+HEAD = 60
 #: Longer names of topics are shown shortened.
 SHOWN = 40
 
@@ -39,14 +41,16 @@ QOS_IMPORTS: dict[str, tuple[str, ...]] = {
     "sensor_data": ("qos_profile_sensor_data",),
     "latched": ("DurabilityPolicy", "QoSProfile"),
 }
+#: The steps of a lifecycle that a node takes and undoes.
+CONFIGURE, ACTIVATE = "configure", "activate"
 LATCHED = "LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)"
 
 
 class Part(NamedTuple):
     """An endpoint as its template shows it, and where in the class its lines go.
 
-    `create` and `work` are lines of `__init__`; in a lifecycle node the first belong to its
-    configuration and the second to its activation, with `remove` and `rest` to undo them.
+    `start`, `create` and `work` are lines of `__init__`; in a lifecycle node the second
+    belong to its configuration and the third to its activation, each with the line that undoes it.
     `heads` are the heads of its methods, `message` the lines that make what it sends, `answer`
     those that fill in a response, `log` those that show what it received.
     """
@@ -63,10 +67,9 @@ class Part(NamedTuple):
     log: tuple[str, ...] = ()
     more_log: tuple[str, ...] = ()
     feedback: str = ""
+    start: tuple[str, ...] = ()
     create: tuple[str, ...] = ()
     work: tuple[str, ...] = ()
-    rest: tuple[str, ...] = ()
-    remove: tuple[str, ...] = ()
 
 
 class Endpoints:
@@ -78,11 +81,10 @@ class Endpoints:
 
     def part(self, endpoint: Endpoint, word: str, interface: ir.Interface) -> Part:
         """Return what an endpoint adds to the module."""
-        shown = endpoint.topic if len(endpoint.topic) <= SHOWN else word
         plain = Part(
             role=endpoint.role,
             word=word,
-            topic=shown,
+            topic=shown(endpoint, word),
             type=self._page.use(interface.name),
             template=f"node_{endpoint.role}.py.jinja",
             heads=(),
@@ -107,31 +109,32 @@ class Endpoints:
         method = "create_lifecycle_publisher" if self._lifecycle else "create_publisher"
         words = [part.type, repr(endpoint.topic), QOS[endpoint.qos]]
         every = interval(1.0 / (endpoint.rate or DEFAULT_RATE))
+        publisher, timer = f"self.{word}_publisher", f"self.{word}_timer"
         return part._replace(
             heads=(signature(f"def publish_{word}", ["self"], "None", depth=1),),
             message=constructed(message, self._page, head="message = ", depth=2),
-            create=(*call(f"self.{word}_publisher = self.{method}", words, depth=2),),
-            work=(
-                *call(
-                    f"self.{word}_timer = self.create_timer",
-                    [every, f"self.publish_{word}"],
-                    depth=2,
-                ),
+            create=(
+                *call(f"{publisher} = self.{method}", words, depth=2),
+                *self._undo(CONFIGURE, "self.destroy_lifecycle_publisher", publisher),
             ),
-            rest=(f"self.destroy_timer(self.{word}_timer)",),
-            remove=(f"self.destroy_lifecycle_publisher(self.{word}_publisher)",),
+            work=(
+                *call(f"{timer} = self.create_timer", [every, f"self.publish_{word}"], depth=2),
+                *self._undo(ACTIVATE, "self.destroy_timer", timer),
+            ),
         )
 
     def _subscriber(self, part: Part, endpoint: Endpoint, message: ir.Message) -> Part:
         word = part.word
-        callback = f"self.receive_{word}"
+        callback, subscription = f"self.receive_{word}", f"self.{word}_subscription"
         words = [part.type, repr(endpoint.topic), callback, QOS[endpoint.qos]]
         head = signature(f"def receive_{word}", ["self", f"message: {part.type}"], "None", depth=1)
         return part._replace(
             heads=(head,),
             log=_log(part.topic, "message", message),
-            work=(*call(f"self.{word}_subscription = self.create_subscription", words, depth=2),),
-            rest=(f"self.destroy_subscription(self.{word}_subscription)",),
+            work=(
+                *call(f"{subscription} = self.create_subscription", words, depth=2),
+                *self._undo(ACTIVATE, "self.destroy_subscription", subscription),
+            ),
         )
 
     def _service(
@@ -144,8 +147,10 @@ class Endpoints:
             heads=(signature(f"def handle_{word}", parameters, f"{type_}.Response", depth=1),),
             log=_log(part.topic, "request", request),
             answer=tuple(assigned(response, self._page, "response", depth=2)),
-            work=(*call(f"self.{word}_service = self.create_service", words, depth=2),),
-            rest=(f"self.destroy_service(self.{word}_service)",),
+            work=(
+                *call(f"self.{word}_service = self.create_service", words, depth=2),
+                *self._undo(ACTIVATE, "self.destroy_service", f"self.{word}_service"),
+            ),
         )
 
     def _client(self, part: Part, endpoint: Endpoint, response: ir.Message) -> Part:
@@ -155,8 +160,10 @@ class Endpoints:
         return part._replace(
             heads=(signature(f"async def call_{word}", parameters, "bool", depth=1),),
             log=_log(part.topic, "response", response),
-            create=(*call(f"self.{word}_client = self.create_client", words, depth=2),),
-            remove=(f"self.destroy_client(self.{word}_client)",),
+            create=(
+                *call(f"self.{word}_client = self.create_client", words, depth=2),
+                *self._undo(CONFIGURE, "self.destroy_client", f"self.{word}_client"),
+            ),
         )
 
     def _action_server(
@@ -176,6 +183,7 @@ class Endpoints:
             signature(f"def begin_{word}", ["self", handle], "None", depth=1),
             signature(f"def cancel_{word}", ["self", handle], "CancelResponse", depth=1),
             signature(f"async def execute_{word}", ["self", handle], f"{type_}.Result", depth=1),
+            signature(f"def close_{word}", ["self"], "None", depth=1),
         )
         words = [
             *("self", type_, repr(endpoint.topic)),
@@ -190,16 +198,18 @@ class Endpoints:
             message=constructed(result, self._page, head="result = ", depth=2),
             feedback=constructed(feedback, self._page, head="feedback = ", depth=3),
             log=(f"goal: {type_}.Goal = goal_handle.request", *log) if goal.fields else log,
-            create=(
+            start=(
+                *((f"self.{word}_open = False",) if self._lifecycle else ()),
                 f"self.{word}_goal: ServerGoalHandle | None = None",
+            ),
+            create=(
                 *call(f"self.{word}_server = ActionServer", words, depth=2),
+                *self._undo(CONFIGURE, "self.spawn", "self.retire", f"self.{word}_server"),
             ),
-            rest=(
-                f"goal_handle = self.{word}_goal",
-                "if goal_handle is not None and goal_handle.is_active:",
-                "    goal_handle.abort()",
+            work=(
+                *((f"self.{word}_open = True",) if self._lifecycle else ()),
+                *self._undo(ACTIVATE, f"self.close_{word}"),
             ),
-            remove=(f"self.{word}_server.destroy()",),
         )
 
     def _action_client(
@@ -215,6 +225,7 @@ class Endpoints:
             signature(f"async def send_{word}", ["self", f"goal: {type_}.Goal"], "bool", depth=1),
             signature(f"def follow_{word}", ["self", "message: Any"], "None", depth=1),
             signature(f"async def cancel_{word}", ["self"], "None", depth=1),
+            signature(f"def drop_{word}", ["self"], "None", depth=1),
         )
         reported = _log(part.topic, "feedback", feedback)
         if feedback.fields:
@@ -229,17 +240,27 @@ class Endpoints:
             more_log=reported,
             send=tuple(
                 call(
-                    f"answer = self.{word}_client.send_goal_async",
+                    f"sent = self.{word}_client.send_goal_async",
                     ["goal", f"feedback_callback=self.follow_{word}"],
                     depth=2,
                 )
             ),
+            start=(f"self.{word}_sent: Future | None = None",),
             create=(
-                f"self.{word}_goal: ClientGoalHandle | None = None",
                 *call(f"self.{word}_client = ActionClient", words, depth=2),
+                *self._undo(CONFIGURE, "self.spawn", "self.retire", f"self.{word}_client"),
             ),
-            remove=(f"self.{word}_client.destroy()",),
+            work=self._undo(ACTIVATE, f"self.drop_{word}"),
         )
+
+    def _undo(self, what: str, *words: str) -> tuple[str, ...]:
+        """Return the line by which a lifecycle node knows how to undo the line before."""
+        return undo(what, *words) if self._lifecycle else ()
+
+
+def undo(what: str, *words: str) -> tuple[str, ...]:
+    """Return the line that remembers a call by which to undo a step of the lifecycle."""
+    return tuple(call(f"self.undo_{what}.callback", words, depth=2))
 
 
 def interval(seconds: float) -> str:
@@ -248,10 +269,24 @@ def interval(seconds: float) -> str:
     return text if abs(float(text) - seconds) < seconds * 1e-9 else f"1.0 / {1.0 / seconds:.6g}"
 
 
+def shown(endpoint: Endpoint, word: str) -> str:
+    """Return how an endpoint is called in text."""
+    return endpoint.topic if len(endpoint.topic) <= SHOWN else word
+
+
 def _log(topic: str, variable: str, message: ir.Message) -> tuple[str, ...]:
     """Return the lines that log what a message says, its short fields one by one."""
+    return tuple(logged(_said(topic, variable, message), depth=2))
+
+
+def log_head(topic: str, variable: str, message: ir.Message) -> str:
+    """Return how the line begins that logs a message."""
+    return " ".join(_said(topic, variable, message)).partition("{")[0][:HEAD]
+
+
+def _said(topic: str, variable: str, message: ir.Message) -> list[str]:
     short = [f for f in message.fields if isinstance(f.type, (ir.Primitive, ir.String))]
     parts = [f"{f.name}={{{variable}.{pynames.field(f.name)}!r}}" for f in short[:LOGGED]]
     if not parts:
-        parts = [f"{{{variable}}}"] if message.fields else [f"{variable} received"]
-    return tuple(logged([f"{topic}:", *parts], depth=2))
+        parts = [f"{variable}={{{variable}}}"] if message.fields else [f"{variable} received"]
+    return [f"{topic}:", *parts]

@@ -64,3 +64,11 @@ def signature(head: str, parameters: Sequence[str], returns: str, *, depth: int)
         return f"{head}(\n{inner}\n{margin}) -> {returns}:"
     lines = "".join(f"{margin}    {one},\n" for one in parameters)
     return f"{head}(\n{lines}{margin}) -> {returns}:"
+
+
+def collection(head: str, opening: str, items: Sequence[str], closing: str) -> list[str]:
+    """Return the lines of a list, set or dictionary: one if it fits, else a line for each item."""
+    line = f"{head}{opening}{', '.join(items)}{closing}"
+    if len(line) <= WIDTH:
+        return [line]
+    return [f"{head}{opening}", *(f"    {item}," for item in items), closing]

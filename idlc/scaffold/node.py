@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from idlc.emit.render import environment
 from idlc.model import derive
 from idlc.scaffold import arguments, spec
-from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part, interval
+from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part
 from idlc.scaffold.layout import call, imports
 from idlc.scaffold.plan import Plan
 from idlc.scaffold.samples import INDENT, Page
+from idlc.scaffold.states import PAUSING, StatesView, kept, pauses, states
 
 #: Names that a module of a node uses itself.
 _OWN = (
-    *("Any", "Callable", "ExternalShutdownException", "Future", "LifecycleNode", "LifecycleState"),
-    *("Node", "SignalHandlerOptions", "SingleThreadedExecutor", "TransitionCallbackReturn"),
+    *(
+        "Any",
+        "Callable",
+        "Coroutine",
+        "ExternalShutdownException",
+        "Future",
+        "LifecycleNode",
+        "LifecycleState",
+    ),
+    *(
+        "ExitStack",
+        "Node",
+        "SignalHandlerOptions",
+        "SingleThreadedExecutor",
+        "TransitionCallbackReturn",
+    ),
     *("ActionServer", "ActionClient", "CancelResponse", "ClientGoalHandle", "GoalResponse"),
     *("Event", "GoalStatus", "ServerGoalHandle", "DurabilityPolicy", "QoSProfile", "LATCHED"),
 )
-#: Roles whose methods wait for something.
-_PAUSING = {"client", "action_client", "action_server"}
-_STANDARD = {"argparse", "collections.abc", "sys", "time", "threading", "typing"}
+_STANDARD = {"argparse", "collections.abc", "contextlib", "sys", "time", "threading", "typing"}
 #: The longest description of a node that fits wherever it stands.
 SUMMARY = 70
 CLOCK = "self.get_clock().now().to_msg()"
@@ -36,15 +48,6 @@ class ParameterView(NamedTuple):
     word: str
     annotation: str
     value: str
-
-
-class StatesView(NamedTuple):
-    """What a lifecycle node does when its state changes."""
-
-    on_configure: tuple[str, ...]
-    on_activate: tuple[str, ...]
-    on_deactivate: tuple[str, ...]
-    on_cleanup: tuple[str, ...]
 
 
 class MainView(NamedTuple):
@@ -75,6 +78,7 @@ class NodeView(NamedTuple):
     parts: tuple[Part, ...]
     timers: tuple[str, ...]
     pauses: bool
+    retires: bool
     has_arguments: bool
     lifecycle: bool
     states: StatesView
@@ -89,16 +93,16 @@ def render(planned: Plan) -> str:
 def view(planned: Plan) -> NodeView:
     """Return the lines of a node's module."""
     node = planned.node
-    page = Page(planned.messages, clock=CLOCK, taken=_OWN)
+    page = Page(planned.messages, clock=CLOCK, taken=_OWN, own=node.package)
     endpoints = Endpoints(page, lifecycle=node.lifecycle)
     triples = zip(node.endpoints, planned.words, planned.interfaces, strict=True)
     parts = tuple(endpoints.part(*one) for one in triples)
     page.clock = None  # there is none where the command line is read
     main = _main(planned, page)
     timers = tuple("tick" if n == 0 else f"tick_{n + 1}" for n in range(len(node.timers)))
-    states = _states(planned, parts, timers)
+    steps = states(node, parts, timers, _tasks(planned))
     given = _given(planned)
-    created = () if node.lifecycle else (*states.on_configure, *states.on_activate)
+    created = () if node.lifecycle else (*steps.on_configure, *steps.on_activate)
     class_name = spec.class_name(node.name)
     taken = class_name in page.names or class_name in _OWN
     return NodeView(
@@ -109,14 +113,15 @@ def view(planned: Plan) -> NodeView:
         imports=_imports(planned, page),
         constants=_constants(node),
         init_head=given.head,
-        setup=(*given.setup, *_declarations(node), *created),
+        setup=(*given.setup, *kept(node, parts), *_declarations(node), *created),
         parameters=tuple(map(_parameter, node.parameters)),
         parts=parts,
         timers=timers,
-        pauses=any(part.role in _PAUSING for part in parts),
+        pauses=pauses(parts),
+        retires=node.lifecycle and any("action" in part.role for part in parts),
         has_arguments=bool(planned.clients),
         lifecycle=node.lifecycle,
-        states=states,
+        states=steps,
         main=main,
     )
 
@@ -135,21 +140,6 @@ def _main(planned: Plan, page: Page) -> MainView:
         arguments=tuple(declared),
         requests=tuple(requests),
     )
-
-
-def _states(planned: Plan, parts: tuple[Part, ...], timers: tuple[str, ...]) -> StatesView:
-    ticking, resting = _ticking(planned.node, timers)
-    started = _started(_tasks(planned)) if planned.node.lifecycle else []
-    return StatesView(
-        on_configure=_lines(parts, "create"),
-        on_activate=(*_lines(parts, "work"), *ticking, *started),
-        on_deactivate=(*_lines(parts, "rest"), *resting),
-        on_cleanup=_lines(parts, "remove"),
-    )
-
-
-def _lines(parts: Iterable[Part], which: str) -> tuple[str, ...]:
-    return tuple(line for part in parts for line in getattr(part, which))
 
 
 _DOES = {
@@ -191,13 +181,6 @@ def _parameter(one: spec.Parameter) -> ParameterView:
     return ParameterView(one.name, one.word, one.annotation, f"list({value})" if several else value)
 
 
-def _ticking(node: spec.Node, timers: tuple[str, ...]) -> tuple[list[str], list[str]]:
-    """Return the lines that start the node's own timers, and those that end them."""
-    pairs = list(zip(timers, node.timers, strict=True))
-    start = [f"self.{n}_timer = self.create_timer({interval(s)}, self.{n})" for n, s in pairs]
-    return start, [f"self.destroy_timer(self.{name}_timer)" for name, _ in pairs]
-
-
 def _requests(planned: Plan, page: Page) -> tuple[list[arguments.RequestView], list[str]]:
     """Return the functions that make requests, and the lines that declare their arguments."""
     clients = planned.clients
@@ -232,15 +215,6 @@ def _given_tasks(planned: Plan) -> tuple[str, ...]:
     )
 
 
-def _started(tasks: list[tuple[str, str]]) -> list[str]:
-    """Return the lines of an activation that start what clients do."""
-    if not tasks:
-        return []
-    create = "self.executor.create_task"
-    calls = [call(create, [f"self.{m}", f"{r}(self.given)"], depth=3) for m, r in tasks]
-    return ["if self.executor is not None:", *(f"    {line}" for one in calls for line in one)]
-
-
 class _Given(NamedTuple):
     head: str
     setup: tuple[str, ...]
@@ -272,7 +246,7 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
             add(module, *found)
         add("rclpy.qos", *QOS_IMPORTS[endpoint.qos])
     roles = {endpoint.role for endpoint in node.endpoints}
-    if roles & _PAUSING:
+    if roles & PAUSING:
         add("rclpy.task", "Future")
     if planned.clients:
         add("collections.abc", "Callable")
@@ -285,6 +259,10 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
     else:
         add("rclpy.utilities", "ok")
     if node.lifecycle:
+        add("contextlib", "ExitStack")
+        if roles & PAUSING:
+            add("collections.abc", "Callable", "Coroutine")
+            add("typing", "Any")
         add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
     else:
         add("rclpy.node", "Node")

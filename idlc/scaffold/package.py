@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import keyword
+import sys
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.emit.render import environment
+from idlc.model import names
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -28,6 +31,11 @@ class Package(NamedTuple):
     license: str
     build_type: str = PYTHON
     version: str = VERSION
+
+    @property
+    def is_python(self) -> bool:
+        """Whether the package has nodes."""
+        return self.build_type == PYTHON
 
     @property
     def xml_description(self) -> str:
@@ -101,11 +109,33 @@ _PYTHON_FILES = {
     "launch/NAME_launch.py": "scaffold_launch.py.jinja",
     "test/conftest.py": "scaffold_conftest.py.jinja",
     "test/test_style.py": "scaffold_test_style.py.jinja",
+    "README.md": "scaffold_README.md.jinja",
+    ".gitattributes": "scaffold_gitattributes.jinja",
+    ".gitignore": "scaffold_gitignore.jinja",
 }
 _CMAKE_FILES = {
     "package.xml": "scaffold_package.xml.jinja",
     "CMakeLists.txt": "scaffold_CMakeLists.txt.jinja",
+    "README.md": "scaffold_README.md.jinja",
 }
+#: What would not be found any more next to a package of such a name.
+_TAKEN = frozenset(
+    "action idlc launch launch_ros msg numpy pytest rclpy resource setuptools srv test".split()
+)
+
+
+def check_name(name: str) -> str:
+    """Return the name of a new package; one that hides another module is refused."""
+    if not names.is_package_name(name):
+        raise ValueError(
+            f"`{name}` cannot be a package: use lower-case letters, digits and single underscores, "
+            "a letter first"
+        )
+    if keyword.iskeyword(name) or name in _TAKEN or name in sys.stdlib_module_names:
+        raise ValueError(
+            f"`{name}` cannot be a package: a folder or a module that it needs has that name"
+        )
+    return name
 
 
 def files(package: Package) -> dict[str, str]:

@@ -27,13 +27,20 @@ class Page:
     """What one module of Python imports of interfaces, and how it calls what it imports.
 
     `clock` is the source of the time now, where there is a clock. `taken` names mean other things.
+    Comments are copied from the interfaces of the package `own`: others' say what everybody knows.
     """
 
     def __init__(
-        self, messages: Messages, *, clock: str | None = None, taken: Iterable[str] = ()
+        self,
+        messages: Messages,
+        *,
+        clock: str | None = None,
+        taken: Iterable[str] = (),
+        own: str = "",
     ) -> None:
         self.messages = messages
         self.clock = clock
+        self.own = own
         self._names: dict[tuple[str, str], str] = {}
         self._taken = set(taken)
 
@@ -106,7 +113,7 @@ def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list
         else:
             lines = [head + sample(message, field, page)]
         if all(len(line) + depth * len(INDENT) <= WIDTH for line in lines):
-            found += [*documented(field, depth), *lines]
+            found += [*_documented(message, field, page, depth), *lines]
     return found
 
 
@@ -139,12 +146,14 @@ def _field(
     if any(len(str(line)) > WIDTH for line in value):
         return
     if field.name not in given:
-        yield from (Line(depth, text) for text in documented(field, depth))
+        yield from (Line(depth, text) for text in _documented(message, field, page, depth))
     yield from value
 
 
-def documented(field: ir.Field, depth: int) -> list[str]:
+def _documented(message: ir.Message, field: ir.Field, page: Page, depth: int) -> list[str]:
     """Return what the interface says about a field, as comments that fit."""
+    if message.name.package != page.own:
+        return []
     text = " ".join(filter(None, (clean(line) for line in field.comment)))
     unit = f"[{clean(field.unit)}]" if field.unit else ""
     words = " ".join(filter(None, (text, unit)))

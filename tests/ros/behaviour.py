@@ -76,7 +76,7 @@ def node_and_string():
 
 
 def nothing_is_loaded_before_rclpy_asks():
-    """The classes alone load neither ctypes nor types.json."""
+    """The classes alone load neither ctypes nor the data of types."""
     assert "ctypes" not in sys.modules or "std_msgs._idlc.typesupport" not in sys.modules
     String("text").serialize()
     assert not [name for name in sys.modules if "typesupport" in name and "_idlc" in name]

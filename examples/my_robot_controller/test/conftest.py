@@ -63,7 +63,9 @@ def observer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
     rclpy.init()
-    yield rclpy.create_node('observer')
+    node = rclpy.create_node('observer')
+    yield node
+    node.destroy_node()
     rclpy.shutdown()
 
 

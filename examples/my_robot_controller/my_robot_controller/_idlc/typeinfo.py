@@ -1,4 +1,4 @@
-"""What is known of types at run time, from `types.json`: read when first asked for.
+"""What is known of types at run time, from `type_data.py`: read when first asked for.
 
 It serves what is not on the fast path: `validate`, `to_dict` and `from_dict`, the words of
 errors, `SLOT_TYPES` and rclpy's type descriptions.
@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import importing
@@ -91,9 +90,9 @@ class FieldInfo(NamedTuple):
 
 @cache
 def types() -> dict[str, Any]:
-    """Return the content of `types.json`."""
-    path = Path(__file__).with_name("types.json")
-    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    """Return the content of `type_data.py`."""
+    module = import_module(f"{__name__.rpartition('.')[0]}.type_data")
+    content: dict[str, Any] = json.loads(module.JSON)
     return content
 
 

@@ -17,7 +17,7 @@ setup(
     name=package_name,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
-    package_data={'': ['*.json', 'idlc.lock', 'py.typed']},
+    package_data={'': ['idlc.lock', 'py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
         (

@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from contextlib import ExitStack
 import sys
 import time
+from typing import Any
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -28,36 +30,56 @@ class Keeper(LifecycleNode):
         super().__init__('keeper')
         self.given = given
         self.timeout: float = given.server_timeout
+        self.undo_configure = ExitStack()
+        self.undo_activate = ExitStack()
+        self.activation: object = None
+        self.pauses: set[Future] = set()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Create what is there in every state but the first."""
         self.beat_publisher = self.create_lifecycle_publisher(Empty, 'beat', 10)
+        self.undo_configure.callback(self.destroy_lifecycle_publisher, self.beat_publisher)
         self.switch_client = self.create_client(SetBool, 'switch')
+        self.undo_configure.callback(self.destroy_client, self.switch_client)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start to work."""
+        self.activation = object()
+        self.undo_activate.callback(self.wake)
         self.beat_timer = self.create_timer(1.0, self.publish_beat)
+        self.undo_activate.callback(self.destroy_timer, self.beat_timer)
         self.beat_subscription = self.create_subscription(Empty, 'beat', self.receive_beat, 10)
+        self.undo_activate.callback(self.destroy_subscription, self.beat_subscription)
         self.reset_service = self.create_service(std_srvs_srv_Empty, 'reset', self.handle_reset)
+        self.undo_activate.callback(self.destroy_service, self.reset_service)
         self.tick_timer = self.create_timer(3.0, self.tick)
-        if self.executor is not None:
-            self.executor.create_task(self.call_switch, switch_request(self.given))
+        self.undo_activate.callback(self.destroy_timer, self.tick_timer)
+        self.spawn(self.call_switch, switch_request(self.given))
         return super().on_activate(state)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop working."""
-        self.destroy_timer(self.beat_timer)
-        self.destroy_subscription(self.beat_subscription)
-        self.destroy_service(self.reset_service)
-        self.destroy_timer(self.tick_timer)
+        self.undo_activate.close()
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Remove what `on_configure` created."""
-        self.destroy_lifecycle_publisher(self.beat_publisher)
-        self.destroy_client(self.switch_client)
+        self.undo_configure.close()
         return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop working and remove everything, whatever the state was."""
+        self.undo_activate.close()
+        self.undo_configure.close()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Undo everything after a transition that failed."""
+        self.get_logger().error(f'a transition from {state.label} failed')
+        self.undo_activate.close()
+        self.undo_configure.close()
+        return super().on_error(state)
 
     def publish_beat(self) -> None:
         """Publish a message on beat."""
@@ -78,11 +100,11 @@ class Keeper(LifecycleNode):
     async def call_switch(self, request: SetBool.Request) -> bool:
         """Call switch once; return whether it answered in time."""
         if not await self.until(self.switch_client.service_is_ready):
-            self.get_logger().error('switch: there is no server')
+            self.get_logger().error('switch: gave up waiting for a server')
             return False
         answer = self.switch_client.call_async(request)
         if not await self.until(answer.done):
-            self.get_logger().error('switch: no answer in time')
+            self.get_logger().error('switch: gave up waiting for an answer')
             return False
         response: SetBool.Response | None = answer.result()
         if response is None:
@@ -97,20 +119,36 @@ class Keeper(LifecycleNode):
         self.get_logger().info('tick')
 
     async def until(self, condition: Callable[[], bool]) -> bool:
-        """Wait until a condition holds; return whether it did so in time."""
+        """Wait until a condition holds; return whether it did in time, and while active."""
+        activation = self.activation
         deadline = time.monotonic() + self.timeout
-        while not condition():
+        while activation is not None and activation is self.activation:
+            if condition():
+                return True
             if time.monotonic() > deadline:
                 return False
             await self.pause(0.05)
-        return True
+        return False
 
     async def pause(self, seconds: float) -> None:
-        """Wait without blocking: other callbacks run in the meantime."""
+        """Wait without blocking; when the node is deactivated, no longer."""
         over: Future = Future()
+        self.pauses.add(over)
         timer = self.create_timer(seconds, lambda: over.set_result(None))
         await over
+        self.pauses.remove(over)
         self.destroy_timer(timer)
+
+    def wake(self) -> None:
+        """End all pauses: what waits has to see that the node is not active any more."""
+        self.activation = None
+        for over in self.pauses:
+            over.set_result(None)
+
+    def spawn(self, work: Callable[[Any], Coroutine[Any, Any, object]], what: Any) -> None:
+        """Let a coroutine run beside the callbacks."""
+        if self.executor is not None:
+            self.executor.create_task(work, what)
 
 
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:

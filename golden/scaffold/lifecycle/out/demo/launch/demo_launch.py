@@ -1,7 +1,7 @@
 """Start the nodes of demo."""
 
 from launch import LaunchDescription
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -9,6 +9,12 @@ def generate_launch_description() -> LaunchDescription:
     return LaunchDescription(
         [
             # the nodes
-            Node(package='demo', executable='keeper', output='screen'),
+            LifecycleNode(
+                package='demo',
+                executable='keeper',
+                output='screen',
+                name='keeper',
+                namespace='',
+            ),
         ]
     )

@@ -19,58 +19,90 @@ from std_srvs.srv import SetBool
 
 MODULE = 'demo.keeper'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
+OFFERED = {'/beat', '/reset', '/switch'}
 
 
-def activate(observer: Node, until: Until) -> None:
-    """Bring the node into its active state."""
+def change(node: Any, observer: Node, *steps: int) -> None:
+    """Take the node through transitions, all of which succeed."""
     client = observer.create_client(ChangeState, 'keeper/change_state')
-    assert until(client.service_is_ready)
-    for step in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+    node.until(client.service_is_ready)
+    for step in steps:
         answer = client.call_async(ChangeState.Request(transition=Transition(id=step)))
-        assert until(answer.done)
-        assert answer.result().success
+        node.until(answer.done)
+        assert answer.result().success, node.output
 
 
-def test_it_publishes_beat(start: Start, observer: Node, until: Until) -> None:
-    """Messages arrive on beat."""
+def activate(node: Any, observer: Node) -> None:
+    """Bring the node into its active state."""
+    change(node, observer, Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE)
+
+
+def offered(observer: Node) -> set[str]:
+    """Return which of its topics, services and actions the node has now."""
+    ask = (
+        observer.get_publisher_names_and_types_by_node,
+        observer.get_subscriber_names_and_types_by_node,
+        observer.get_service_names_and_types_by_node,
+        observer.get_client_names_and_types_by_node,
+    )
+    return OFFERED & {name for one in ask for name, _ in one('keeper', '/')}
+
+
+@pytest.mark.parametrize(
+    'steps',
+    [
+        [Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP],
+        [Transition.TRANSITION_ACTIVE_SHUTDOWN],
+    ],
+    ids=['cleaned up', 'shut down'],
+)
+def test_nothing_is_left_when_it_is(start: Start, observer: Node, steps: list[int]) -> None:
+    """Neither a clean-up nor a shutdown leaves anything that the node offered."""
+    node = start(MODULE)
+    activate(node, observer)
+    node.until(lambda: offered(observer) == OFFERED)
+    change(node, observer, *steps)
+    node.until(lambda: not offered(observer))
+    assert node.end() == 0, node.output
+    assert 'Traceback' not in node.output, node.output
+
+
+def test_it_publishes_beat(start: Start, observer: Node) -> None:
+    """Messages arrive on beat, one after the other."""
     received: list[Empty] = []
     observer.create_subscription(Empty, 'beat', received.append, 10)
-    start(MODULE)
-    activate(observer, until)
-    assert until(lambda: bool(received), 22.0)
-    assert isinstance(received[0], Empty)
+    node = start(MODULE)
+    activate(node, observer)
+    node.until(lambda: len(received) > 1, 23.0)
 
 
-def test_it_receives_beat(start: Start, observer: Node, until: Until) -> None:
-    """The node says something when a message arrives on beat."""
+def test_it_receives_beat(start: Start, observer: Node) -> None:
+    """The node says something for each message that arrives on beat."""
     publisher = observer.create_publisher(Empty, 'beat', 10)
     node = start(MODULE)
-    activate(observer, until)
-    assert until(lambda: publisher.get_subscription_count() > 0)
-    before = node.output
+    activate(node, observer)
 
-    def said() -> bool:
+    def heard() -> bool:
         publisher.publish(Empty())
-        return bool(node.output != before)
+        return bool(node.said('beat: message received', 2))
 
-    assert until(said)
-    assert not node.ended()
+    node.until(heard)
 
 
-def test_it_answers_reset(start: Start, observer: Node, until: Until) -> None:
-    """A request to reset is answered."""
+def test_it_answers_reset(start: Start, observer: Node) -> None:
+    """Requests to reset are answered, one after the other."""
     client = observer.create_client(std_srvs_srv_Empty, 'reset')
-    start(MODULE)
-    activate(observer, until)
-    assert until(client.service_is_ready)
-    answer = client.call_async(std_srvs_srv_Empty.Request())
-    assert until(answer.done)
-    assert isinstance(answer.result(), std_srvs_srv_Empty.Response)
+    node = start(MODULE)
+    activate(node, observer)
+    node.until(client.service_is_ready)
+    for _ in range(2):
+        answer = client.call_async(std_srvs_srv_Empty.Request())
+        node.until(answer.done)
+    node.until(lambda: node.said('reset: request received', 2))
 
 
-def test_it_calls_switch(start: Start, observer: Node, until: Until) -> None:
-    """The node calls switch."""
+def test_it_calls_switch(start: Start, observer: Node) -> None:
+    """The node calls switch and says what is answered."""
     requests: list[object] = []
 
     def answer(request: object, response: object) -> object:
@@ -78,18 +110,23 @@ def test_it_calls_switch(start: Start, observer: Node, until: Until) -> None:
         return response
 
     observer.create_service(SetBool, 'switch', answer)
-    start(MODULE)
-    activate(observer, until)
-    assert until(lambda: bool(requests))
-    assert isinstance(requests[0], SetBool.Request)
+    node = start(MODULE)
+    activate(node, observer)
+    node.until(lambda: bool(requests))
+    node.until(lambda: node.said('switch: success='))
+
+
+def test_it_goes_on_with_tick(start: Start, observer: Node) -> None:
+    """The node does something again and again."""
+    node = start(MODULE)
+    activate(node, observer)
+    node.until(lambda: node.said('tick\n', 2), 29.0)
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'keeper' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'keeper' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

@@ -33,11 +33,11 @@ class Asker(Node):
     async def call_ask(self, request: Ask.Request) -> bool:
         """Call ask once; return whether it answered in time."""
         if not await self.until(self.ask_client.service_is_ready):
-            self.get_logger().error('ask: there is no server')
+            self.get_logger().error('ask: gave up waiting for a server')
             return False
         answer = self.ask_client.call_async(request)
         if not await self.until(answer.done):
-            self.get_logger().error('ask: no answer in time')
+            self.get_logger().error('ask: gave up waiting for an answer')
             return False
         response: Ask.Response | None = answer.result()
         if response is None:

@@ -31,30 +31,30 @@ class Ship(Node):
         """Create what the node consists of."""
         super().__init__('ship')
         self.timeout = timeout
-        self.dock_goal: ClientGoalHandle | None = None
+        self.dock_sent: Future | None = None
         self.dock_client = ActionClient(self, Dock, 'dock')
 
     async def send_dock(self, goal: Dock.Goal) -> bool:
         """Send a goal to dock; return whether it was reached."""
         if not await self.until(self.dock_client.server_is_ready):
-            self.get_logger().error('dock: there is no server')
+            self.get_logger().error('dock: gave up waiting for a server')
             return False
-        answer = self.dock_client.send_goal_async(goal, feedback_callback=self.follow_dock)
-        if not await self.until(answer.done):
-            self.get_logger().error('dock: no answer in time')
+        sent = self.dock_client.send_goal_async(goal, feedback_callback=self.follow_dock)
+        self.dock_sent = sent
+        if not await self.until(sent.done):
+            self.get_logger().error('dock: gave up waiting for an answer')
             return False
-        goal_handle: ClientGoalHandle = answer.result()
+        goal_handle: ClientGoalHandle = sent.result()
         if not goal_handle.accepted:
             self.get_logger().error('dock: the goal was rejected')
             return False
-        self.dock_goal = goal_handle
         ending = goal_handle.get_result_async()
         while not ending.done():
             if not self.dock_client.server_is_ready():
                 self.get_logger().error('dock: the server has gone')
                 return False
             await self.pause(0.05)
-        self.dock_goal = None
+        self.dock_sent = None
         result: Dock.Result = ending.result().result
         self.get_logger().info(f'dock: docked={result.docked!r}')
         return bool(ending.result().status == GoalStatus.STATUS_SUCCEEDED)
@@ -65,10 +65,10 @@ class Ship(Node):
         self.get_logger().info(f'dock: distance={feedback.distance!r}')
 
     async def cancel_dock(self) -> None:
-        """Ask the server to cancel the goal that it works on."""
-        goal_handle = self.dock_goal
-        if goal_handle is not None:
-            answer = goal_handle.cancel_goal_async()
+        """Ask the server to cancel the goal that it was sent."""
+        sent = self.dock_sent
+        if sent is not None and await self.until(sent.done):
+            answer = sent.result().cancel_goal_async()
             if await self.until(answer.done):
                 self.get_logger().info('dock: cancelled')
 

@@ -50,7 +50,7 @@ class Station(Node):
         return CancelResponse.ACCEPT
 
     async def execute_dock(self, goal_handle: ServerGoalHandle) -> Dock.Result:
-        """Work on a goal, step by step, until it is reached, cancelled or replaced."""
+        """Work on a goal, step by step, until it is reached, cancelled or given up."""
         result = Dock.Result(
             docked=False,
         )
@@ -64,7 +64,7 @@ class Station(Node):
             goal_handle.publish_feedback(feedback)
             await self.pause(1.0)
             if not goal_handle.is_active:
-                self.get_logger().info('dock: replaced')
+                self.get_logger().info('dock: given up')
                 return result
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()

@@ -11,9 +11,6 @@ def generate_launch_description() -> LaunchDescription:
             # the nodes
             Node(package='demo', executable='talker', output='screen'),
             Node(package='demo', executable='oracle', output='screen'),
-            Node(package='demo', executable='asker', output='screen'),
             Node(package='demo', executable='station', output='screen'),
-            Node(package='demo', executable='ship', output='screen'),
-            Node(package='demo', executable='both', output='screen'),
         ]
     )

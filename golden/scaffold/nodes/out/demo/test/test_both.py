@@ -6,20 +6,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import signal
 from typing import Any
 
 from demo.action import Dock
 from demo.srv import Ask
+import pytest
 from rclpy.action.server import ActionServer, ServerGoalHandle
 from rclpy.node import Node
+from rclpy.task import Future
 
 MODULE = 'demo.both'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_calls_ask(start: Start, observer: Node, until: Until) -> None:
-    """The node calls ask."""
+def test_it_calls_ask(start: Start, observer: Node) -> None:
+    """The node calls ask and says what is answered."""
     requests: list[object] = []
 
     def answer(request: object, response: object) -> object:
@@ -27,31 +29,49 @@ def test_it_calls_ask(start: Start, observer: Node, until: Until) -> None:
         return response
 
     observer.create_service(Ask, 'ask', answer)
-    start(MODULE)
-    assert until(lambda: bool(requests))
-    assert isinstance(requests[0], Ask.Request)
+    node = start(MODULE)
+    node.until(lambda: bool(requests))
+    node.until(lambda: node.said('ask: answer='))
 
 
-def test_it_sends_dock(start: Start, observer: Node, until: Until) -> None:
-    """The node sends a goal to dock."""
-    goals: list[object] = []
+def test_it_sends_dock(start: Start, observer: Node) -> None:
+    """The node sends a goal to dock, and says what is reported and what comes of it."""
+    goals: list[ServerGoalHandle] = []
+    reached: Future = Future()
 
-    def execute(goal_handle: ServerGoalHandle) -> Dock.Result:
-        goals.append(goal_handle.request)
+    async def execute(goal_handle: ServerGoalHandle) -> Dock.Result:
+        goals.append(goal_handle)
+        await reached
         goal_handle.succeed()
         return Dock.Result()
 
     server = ActionServer(observer, Dock, 'dock', execute)
-    start(MODULE)
-    assert until(lambda: bool(goals))
-    assert isinstance(goals[0], Dock.Goal)
+    node = start(MODULE)
+    node.until(lambda: bool(goals))
+
+    def reported() -> bool:
+        goals[0].publish_feedback(Dock.Feedback())
+        return bool(node.said('dock: distance='))
+
+    node.until(reported)
+    reached.set_result(None)
+    node.until(lambda: node.said('dock: docked='))
     server.destroy()
 
 
-def test_it_says_so_when_nobody_answers(start: Start, until: Until) -> None:
+def test_it_says_so_when_nobody_answers(start: Start) -> None:
     """Without a server the node ends, with a message and a status."""
     node = start(MODULE, '--server-timeout', '0.5')
-    assert until(node.ended)
-    assert node.process.returncode == 1
-    assert 'no server' in node.output
-    assert 'Traceback' not in node.output
+    node.until(node.ended)
+    assert node.process.returncode == 1, node.output
+    assert 'gave up waiting for a server' in node.output, node.output
+    assert 'Traceback' not in node.output, node.output
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
+    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    node = start(MODULE, '--server-timeout', '1000')
+    node.until(lambda: 'both' in observer.get_node_names())
+    assert node.end(how) == 130, node.output
+    assert 'Traceback' not in node.output, node.output

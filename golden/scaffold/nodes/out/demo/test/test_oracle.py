@@ -15,25 +15,23 @@ from rclpy.node import Node
 
 MODULE = 'demo.oracle'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_answers_ask(start: Start, observer: Node, until: Until) -> None:
-    """A request to ask is answered."""
+def test_it_answers_ask(start: Start, observer: Node) -> None:
+    """Requests to ask are answered, one after the other."""
     client = observer.create_client(Ask, 'ask')
-    start(MODULE)
-    assert until(client.service_is_ready)
-    answer = client.call_async(Ask.Request())
-    assert until(answer.done)
-    assert isinstance(answer.result(), Ask.Response)
+    node = start(MODULE)
+    node.until(client.service_is_ready)
+    for _ in range(2):
+        answer = client.call_async(Ask.Request())
+        node.until(answer.done)
+    node.until(lambda: node.said('ask: question=', 2))
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'oracle' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'oracle' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

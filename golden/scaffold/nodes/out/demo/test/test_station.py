@@ -17,48 +17,58 @@ from rclpy.node import Node
 
 MODULE = 'demo.station'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_reaches_dock(start: Start, observer: Node, until: Until) -> None:
+def test_it_reaches_dock(start: Start, observer: Node) -> None:
     """A goal for dock is reached, with feedback on the way."""
     feedback: list[object] = []
     client = ActionClient(observer, Dock, 'dock')
-    start(MODULE)
-    assert until(client.server_is_ready)
-    goal = Dock.Goal()
-    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
-    assert until(sent.done)
-    assert sent.result().accepted
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    node.until(sent.done)
+    assert sent.result().accepted, node.output
+    node.until(lambda: node.said('dock: station='))
     ending = sent.result().get_result_async()
-    assert until(ending.done, 60.0)
-    assert ending.result().status == GoalStatus.STATUS_SUCCEEDED
-    assert feedback
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_SUCCEEDED, node.output
+    assert feedback, node.output
     client.destroy()
 
 
-def test_it_cancels_dock(start: Start, observer: Node, until: Until) -> None:
+def test_it_cancels_dock(start: Start, observer: Node) -> None:
     """A goal for dock can be cancelled while the node works on it."""
     feedback: list[object] = []
     client = ActionClient(observer, Dock, 'dock')
-    start(MODULE)
-    assert until(client.server_is_ready)
-    goal = Dock.Goal()
-    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
-    assert until(lambda: bool(sent.done() and feedback))
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()
-    assert until(ending.done)
-    assert ending.result().status == GoalStatus.STATUS_CANCELED
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_CANCELED, node.output
+    client.destroy()
+
+
+def test_it_gives_up_dock_for_a_newer_goal(start: Start, observer: Node) -> None:
+    """A goal for dock ends when another one comes."""
+    client = ActionClient(observer, Dock, 'dock')
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(Dock.Goal())
+    node.until(sent.done)
+    client.send_goal_async(Dock.Goal())
+    ending = sent.result().get_result_async()
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output
     client.destroy()
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'station' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'station' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

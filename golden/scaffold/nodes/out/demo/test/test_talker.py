@@ -11,17 +11,19 @@ from typing import Any
 
 from demo.msg import Command
 import pytest
+from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from std_msgs.msg import String
 
 MODULE = 'demo.talker'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
+PARAMETERS = {'speed': 0.5, 'names': ['a', 'b']}
 
 
-def test_it_publishes_command(start: Start, observer: Node, until: Until) -> None:
-    """Messages arrive on command."""
+def test_it_publishes_command(start: Start, observer: Node) -> None:
+    """Messages arrive on command, one after the other."""
     received: list[Command] = []
     observer.create_subscription(
         Command,
@@ -29,32 +31,43 @@ def test_it_publishes_command(start: Start, observer: Node, until: Until) -> Non
         received.append,
         QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
     )
-    start(MODULE)
-    assert until(lambda: bool(received), 20.2)
-    assert isinstance(received[0], Command)
+    node = start(MODULE)
+    node.until(lambda: len(received) > 1, 20.3)
 
 
-def test_it_receives_words(start: Start, observer: Node, until: Until) -> None:
-    """The node says something when a message arrives on words."""
+def test_it_receives_words(start: Start, observer: Node) -> None:
+    """The node says something for each message that arrives on words."""
     publisher = observer.create_publisher(String, 'talker/words', qos_profile_sensor_data)
     node = start(MODULE)
-    assert until(lambda: publisher.get_subscription_count() > 0)
-    before = node.output
 
-    def said() -> bool:
+    def heard() -> bool:
         publisher.publish(String())
-        return bool(node.output != before)
+        return bool(node.said('~/words: data=', 2))
 
-    assert until(said)
-    assert not node.ended()
+    node.until(heard)
+
+
+def test_it_goes_on_with_tick(start: Start, observer: Node) -> None:
+    """The node does something again and again."""
+    node = start(MODULE)
+    node.until(lambda: node.said('tick\n', 2), 20.8)
+
+
+def test_it_has_its_parameters(start: Start, observer: Node) -> None:
+    """The parameters are declared, with their defaults."""
+    client = observer.create_client(GetParameters, 'talker/get_parameters')
+    node = start(MODULE)
+    node.until(client.service_is_ready)
+    answer = client.call_async(GetParameters.Request(names=list(PARAMETERS)))
+    node.until(answer.done)
+    values = [parameter_value_to_python(value) for value in answer.result().values]
+    assert values == list(PARAMETERS.values()), node.output
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'talker' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'talker' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

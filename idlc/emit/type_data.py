@@ -1,9 +1,16 @@
-"""The content of `_idlc/types.json`: what rclpy, tools and error messages ask about types."""
+"""The module `_idlc/type_data.py`: what rclpy, tools and error messages ask about types.
+
+It is a module so that no installation can leave it out, as it can a data file. Its content is JSON
+in string literals, so that no text of an interface file is code.
+"""
 
 from __future__ import annotations
 
-from typing import TypedDict
+import json
+from collections.abc import Iterator
+from typing import Any, TypedDict
 
+from idlc.emit import literals
 from idlc.model import derive, link
 from idlc.model.describe import IndividualDict
 
@@ -42,3 +49,25 @@ def content(model: link.Model) -> TypesDict:
         "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
         "sources": dict(sorted(sources.items())),
     }
+
+
+def source(model: link.Model) -> str:
+    """Return the text of the module: one line of it for each type."""
+    lines = "".join(f"    {literals.text(part)}\n" for part in _parts(content(model)))
+    return f'"""The types of {model.package}, read by `typeinfo`."""\n\nJSON = (\n{lines})\n'
+
+
+def _parts(tables: TypesDict) -> Iterator[str]:
+    """Yield pieces that joined are the JSON text."""
+    yield f'{{"package":{_json(tables["package"])}'
+    for key in ("descriptions", "hashes", "sources"):
+        mark = f',"{key}":{{'
+        entries: dict[str, Any] = tables[key]
+        for name, value in entries.items():
+            yield f"{mark}{_json(name)}:{_json(value)}"
+            mark = ","
+        yield "}" if entries else mark + "}"
+    yield "}"
+
+
+_json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
