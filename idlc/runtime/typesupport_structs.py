@@ -17,7 +17,7 @@ from . import typesupport_c as c
 from . import typesupport_introspection as introspection
 from . import typesupport_transcode as transcode
 from .cdr import HEADERS, NATIVE
-from .codec import encode_error
+from .codec import encode_error, functions
 
 _HEADER = 4
 
@@ -26,6 +26,7 @@ _HEADER = 4
 def _memory_type(cls: Any, name: str) -> type[bytes]:
     """Return the type of memory for a class: `message @ memory` fills it, `+memory` reads it."""
     encode = cls._codec_(NATIVE).encode
+    _, decode = functions(cls)
     everything = transcode.whole(name)
     true = c.TRUE
 
@@ -41,7 +42,7 @@ def _memory_type(cls: Any, name: str) -> type[bytes]:
     def fetch(memory: bytes) -> object:
         data = bytearray(HEADERS[NATIVE])
         everything.drain(id(memory) + c.BYTES_OFFSET, data)
-        return cls.deserialize(data)
+        return decode(data)
 
     def free(memory: bytes) -> None:
         everything.free(id(memory) + c.BYTES_OFFSET)

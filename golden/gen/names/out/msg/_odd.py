@@ -14,9 +14,12 @@ from ._point import Point
 class Odd(_idlc.Message):
     """names_msgs/msg/Odd.
 
+    Fields hide the methods of the same name (serialize): `super(Odd, message)` still
+    has them, and `super(Odd, Odd)` those of the class.
+
     Attributes:
         class_: int32, -2147483648 to 2147483647.
-        serialize_: int32, -2147483648 to 2147483647.
+        serialize: int32, -2147483648 to 2147483647.
         self: int32, -2147483648 to 2147483647.
         fields_and_field_types: int32, -2147483648 to 2147483647.
         int: int32, -2147483648 to 2147483647.
@@ -35,7 +38,7 @@ class Odd(_idlc.Message):
 
     __match_args__ = (
         "class_",
-        "serialize_",
+        "serialize",
         "self",
         "fields_and_field_types",
         "int",
@@ -51,7 +54,7 @@ class Odd(_idlc.Message):
         "array",
         "order",
     )
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "class": "int32",
             "serialize": "int32",
@@ -78,7 +81,7 @@ class Odd(_idlc.Message):
     ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
 
     class_: _builtins.int
-    serialize_: _builtins.int
+    serialize: _builtins.int  # type: ignore[assignment]
     self: _builtins.int
     fields_and_field_types: _builtins.int
     int: _builtins.int
@@ -97,7 +100,7 @@ class Odd(_idlc.Message):
     def __init__(
         _self,
         class_: _builtins.int = 0,
-        serialize_: _builtins.int = 3,
+        serialize: _builtins.int = 3,
         self: _builtins.int = 0,
         fields_and_field_types: _builtins.int = 0,
         int: _builtins.int = 4,
@@ -119,7 +122,7 @@ class Odd(_idlc.Message):
         ):
             return
         _self._class = class_
-        _self._serialize = serialize_
+        _self._serialize = serialize
         _self._self = self
         _self._fields_and_field_types_ = fields_and_field_types
         _self._int = int
@@ -141,22 +144,25 @@ class Odd(_idlc.Message):
     def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Odd):
             return NotImplemented
+        if (
+            _self._class != other._class
+            or _self._serialize != other._serialize
+            or _self._self != other._self
+            or _self._fields_and_field_types_ != other._fields_and_field_types_
+            or _self._int != other._int
+            or _self._list != other._list
+            or _self._bytes != other._bytes
+            or _self._bool != other._bool
+            or _self._float != other._float
+            or _self._message != other._message
+            or _self._data != other._data
+            or _self._at != other._at
+        ):
+            return False
         if not _idlc.same(_self._order, other._order):
             return False
         return (
-            _self._class == other._class
-            and _self._serialize == other._serialize
-            and _self._self == other._self
-            and _self._fields_and_field_types_ == other._fields_and_field_types_
-            and _self._int == other._int
-            and _self._list == other._list
-            and _self._bytes == other._bytes
-            and _self._bool == other._bool
-            and _self._float == other._float
-            and _self._str == other._str
-            and _self._message == other._message
-            and _self._data == other._data
-            and _self._at == other._at
+            _self._str == other._str
             and _self._item == other._item
             and _self._array == other._array
         )
