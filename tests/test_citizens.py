@@ -541,17 +541,20 @@ int8 get_fields_and_field_types
 int8 mro
 int8 copy
 """
+HIDING_FILES = {
+    "msg/Hiding.msg": HIDING,
+    "msg/Part.msg": "int8 validate\nint8 serialize\nint8[] deserialize\nint8 to_dict\n",
+    "msg/None.msg": "int8 a\n",
+    "msg/True.msg": "None one\nNone[] more\nNone[2] pair\n",
+    "srv/None.srv": "None a\n---\nTrue b\n",
+    "action/False.action": "None a\n---\nint8 b\n---\nTrue c\n",
+}
 
 
 @pytest.fixture(scope="module")
 def hiding(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hiding")
-    part = "int8 validate\nint8 serialize\nint8[] deserialize\nint8 to_dict\nint8 from_dict\n"
-    files = {"msg/Hiding.msg": HIDING, "msg/Part.msg": part, "msg/None.msg": "int8 a\n"}
-    files["msg/True.msg"] = "None one\nNone[] more\nNone[2] pair\n"
-    files["srv/None.srv"] = "None a\n---\nTrue b\n"
-    files["action/False.action"] = "None a\n---\nint8 b\n---\nTrue c\n"
-    generated.write_package(folder, "hiding_msgs", files)
+    generated.write_package(folder, "hiding_msgs", HIDING_FILES)
     with generated.importable(folder):
         yield importlib.import_module("hiding_msgs.msg")
 

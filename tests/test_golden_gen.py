@@ -130,7 +130,7 @@ from comments_msgs.action import Fill
 from comments_msgs.msg import Gauge
 from comments_msgs.srv import Reset
 from layouts_msgs.msg import Everything, Inner
-from names_msgs.msg import Odd, Point
+from names_msgs.msg import Hiding, Odd, Point
 from numpy.typing import NDArray
 from typing_extensions import assert_type
 
@@ -170,6 +170,11 @@ assert_type(odd.class_, int)
 assert_type(odd.list, str)
 assert_type(odd.str, list[str])
 assert_type(odd.item[0].x, float)
+hiding = Hiding(Point(1.0), deserialize=[1, 2], from_dict=(1, 2, 3))
+assert_type(hiding.validate.x, float)
+assert_type(hiding.serialize, int)
+assert_type(hiding.deserialize, "array[float]")
+assert_type(super(Hiding, hiding).serialize(), bytes)
 
 request: Reset.Request = Reset.Request(reason="why")
 goal: Fill.Goal = Fill.Goal(1.0)

@@ -51,6 +51,9 @@ PRAGMAS = (
 )
 
 
+HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
+
+
 def origin(name: ir.TypeName) -> str:
     """Return an interface's file, as package/kind/Name.kind."""
     return f"{name}.{name.kind}"
@@ -66,7 +69,10 @@ def module(
     return ModuleView(
         path=f"{name.kind}/{modules[name]}.py",
         origin=origin(name),
-        pragmas=PRAGMAS if _has_others(references, messages) else (),
+        pragmas=(
+            *(PRAGMAS if _has_others(references, messages) else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
+        ),
         summary=f"The classes of {name}.",
         imports=tuple(_imports(references, structures, name.kind)),
         messages=tuple(
@@ -74,6 +80,10 @@ def module(
         ),
         groups=tuple(groups.views(interface)),
     )
+
+
+def _hides_methods(structure: ir.Message) -> bool:
+    return any(pynames.hides_method(field.name) for field in structure.fields)
 
 
 def _has_others(references: References, messages: layout.Messages) -> bool:
