@@ -12,7 +12,7 @@ import zlib
 from pathlib import Path
 
 from middleware import Official, Walker, interface_of, members_of, official_members, table
-from trees import Values
+from trees import Values, methods
 
 COUNT = 5
 #: Where a `bytes` object has its content: there the C structure lies.
@@ -32,7 +32,7 @@ def look_at(name, values, official):
         parties.append((Official(name), SHIFT))
     for tree in [values.plain(name, cls()), *(values.invent(name) for _ in range(COUNT))]:
         message = values.build(name, tree)
-        data = message.serialize()
+        data = methods(message).serialize()
         for party, shift in parties:
             check(name, party, shift, support.memory, message, data)
 
@@ -47,7 +47,7 @@ def check(name, party, shift, new_memory, message, data):
         print(f"{name}: {who} reads {found.hex()}, not {data[4:].hex()}"[:500])
     memory = new_memory()
     party.write(data[4:], id(memory) + shift)
-    again = (+memory).serialize()
+    again = methods(+memory).serialize()
     if again != data:
         print(f"{name}: {who} wrote what is read as {again.hex()}, not {data.hex()}"[:500])
 
@@ -64,7 +64,7 @@ def look_at_memory(name, values):
     support = structs.message(cls, name)
     walker = Walker(support.handle)
     message = values.build(name, values.invent(name))
-    data = message.serialize()[4:]
+    data = methods(message).serialize()[4:]
     sizes = []
     for _ in range(4):
         for _ in range(300):
@@ -72,7 +72,7 @@ def look_at_memory(name, values):
             message @ memory
             memory = support.memory()
             walker.write(data, id(memory))
-            (+memory).serialize()
+            methods(+memory).serialize()
         sizes.append(resident())
     if sizes[-1] - sizes[0] > 2:
         print(f"{name}: memory grew: {sizes}")
