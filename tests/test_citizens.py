@@ -365,6 +365,23 @@ def test_copies_are_like_the_original(kind):
     assert json.loads(json.dumps(types)) == kind.get_fields_and_field_types()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_messages_that_check_their_fields_are_like_others(name):
+    kind = generated.class_of(name)
+    message = kind(check_fields=True)
+    assert message == kind()
+    assert pprint.pformat(message) == pprint.pformat(kind())
+    assert pydoc.plain(pydoc.render_doc(message))
+    assert dict(inspect.getmembers(message))
+    assert list(dataclasses.asdict(message)) == list(kind.__match_args__)
+    assert kind.deserialize(message.serialize()) == kind()
+    copies = [copy.copy(message), copy.deepcopy(message)]
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        copies.append(pickle.loads(pickle.dumps(message, protocol)))
+    for again in copies:
+        assert (again, again._check_fields) == (message, True)
+
+
 def test_msgspec_writes_what_it_knows():
     message = generated.class_of("std_msgs/msg/Header")(frame_id="map")
     plain = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "map"}
@@ -561,7 +578,7 @@ def hiding(tmp_path_factory):
 
 def test_fields_are_free_to_have_the_names_of_methods(hiding):
     kind, part = hiding.Hiding, hiding.Part
-    message = kind(1, 2, [3.5], "4", [5, 6, 7], True, [part(1, 2, [3], 4, 5)], part(6), 8, 9, 10)
+    message = kind(1, 2, [3.5], "4", [5, 6, 7], True, [part(1, 2, [3], 4)], part(6), 8, 9, 10)
     message.validate = 100
     message.deserialize = [4.5]
     assert (message.validate, message.serialize, message.to_dict) == (100, 2, "4")
@@ -587,6 +604,10 @@ def test_fields_are_free_to_have_the_names_of_methods(hiding):
         with pytest.raises(ValueError, match=r"^validate: must be an integer from -128 to 127"):
             check(message)
     message.validate = 1
+    checked = kind(deserialize=[2.5], check_fields=True)
+    assert super(kind, kind).deserialize(base.serialize(checked)) == checked
+    with pytest.raises(AssertionError, match="validate"):
+        checked.validate = "x"
     for other in (copy.copy(message), copy.deepcopy(message), dataclasses.replace(message)):
         assert other == message
     assert pickle.loads(pickle.dumps(message)) == message

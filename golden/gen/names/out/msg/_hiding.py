@@ -53,17 +53,27 @@ class Hiding(_idlc.Message):
         deserialize: _idlc.Floats | None = None,
         from_dict: _arrays.Values | None = None,
         to_dict: list[str] | None = None,
+        **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
+        if (
+            options or (validate is not None and validate.__class__ is not Point)
+        ) and _idlc.construct(self, options, locals()):
+            return
         self._validate = Point() if validate is None else validate
         self._serialize = serialize
         if deserialize is None:
             self._deserialize = _array("f")
         else:
-            self._deserialize = _idlc.to_array("f", deserialize)
+            self._deserialize = _idlc.to_array("f", deserialize, "deserialize")
         if from_dict is None:
             self._from_dict = _arrays.zeros(3, _arrays.INT32)
         else:
-            self._from_dict = _arrays.to_ndarray(_arrays.INT32, 3, from_dict)
+            self._from_dict = _arrays.to_ndarray(
+                _arrays.INT32,
+                3,
+                from_dict,
+                "from_dict",
+            )
         self._to_dict = [] if to_dict is None else to_dict
 
     def __eq__(self, other: _idlc.Any) -> bool:
