@@ -375,10 +375,8 @@ def test_messages_that_check_their_fields_are_like_others(name):
     assert dict(inspect.getmembers(message))
     assert list(dataclasses.asdict(message)) == list(kind.__match_args__)
     assert kind.deserialize(message.serialize()) == kind()
-    copies = [copy.copy(message), copy.deepcopy(message)]
-    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
-        copies.append(pickle.loads(pickle.dumps(message, protocol)))
-    for again in copies:
+    pickled = [pickle.dumps(message, protocol) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)]
+    for again in (copy.copy(message), copy.deepcopy(message), *map(pickle.loads, pickled)):
         assert (again, again._check_fields) == (message, True)
 
 
