@@ -11,6 +11,7 @@ def message(structure: ir.Message, summary: str) -> list[str]:
     lines = [literals.prose(line) for line in structure.comment] or [summary]
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
+    lines += _hidden(structure)
     described = [c for c in structure.constants if c.comment or c.unit]
     if structure.fields:
         lines += ["", "Attributes:"]
@@ -21,6 +22,19 @@ def message(structure: ir.Message, summary: str) -> list[str]:
         for constant in described:
             lines += literals.wrapped(_constant(constant), 8, 4)
     return lines
+
+
+def _hidden(structure: ir.Message) -> list[str]:
+    """Return how to call the methods that fields hide."""
+    hidden = [field.name for field in structure.fields if pynames.hides_method(field.name)]
+    if not hidden:
+        return []
+    name = pynames.class_(structure.name)
+    text = (
+        f"Fields hide the methods of the same name ({', '.join(hidden)}): "
+        f"`super({name}, message)` still has them, and `super({name}, {name})` those of the class."
+    )
+    return ["", *literals.wrapped(text, 0, 0)]
 
 
 def _field(field: ir.Field) -> str:

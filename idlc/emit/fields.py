@@ -22,6 +22,7 @@ class FieldView(msgspec.Struct, frozen=True):
     A field of numbers has none, because it converts what it is given.
     """
 
+    name: str
     declaration: str
     parameter: str
     stores: tuple[str, ...]
@@ -83,6 +84,7 @@ def view(field: ir.Field, references: References, receiver: str, qualify: bool) 
         annotation = prefix + _element(field.type, references)
         default = _scalar_default(field)
         return FieldView(
+            name,
             f"{name}: {annotation}",
             f"{name}: {annotation} = {default}",
             tuple(assign(slot, name, 8)),
@@ -104,6 +106,7 @@ def view(field: ir.Field, references: References, receiver: str, qualify: bool) 
     if known:
         doubt = f"({doubt} and {name}.__class__ is not {known})"
     return FieldView(
+        name,
         f"{name}: {annotation}",
         f"{name}: {annotation} | None = None",
         tuple(_store(slot, name, fresh, name)),
@@ -118,7 +121,7 @@ def _element(element: ir.Element, references: References) -> str:
         case ir.String():
             return "str"
         case ir.Ref(target):
-            return references.name(target)
+            return references.annotation(target)
         case ir.Unknown():
             raise ValueError("an unknown type cannot be emitted")
 
@@ -136,9 +139,7 @@ def _store(slot: str, name: str, fresh: Node, given: Node) -> list[str]:
 
 
 def _fresh_message(target: ir.TypeName, references: References) -> Node:
-    if target in references.implied:
-        return call("_idlc.make", f'"{target.package}.{target.kind}"', f'"{target.name}"')
-    return f"{references.name(target)}()"
+    return f"{references.annotation(target)}()"
 
 
 def _scalar_default(field: ir.Field) -> str:
@@ -216,7 +217,10 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
         declaration = f"{name}: _arrays.{kind} = _arrays.{kind}({field.type.size})"
         given = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
     return FieldView(
-        declaration, f"{name}: {values} | None = None", tuple(_store(slot, name, fresh, given))
+        name,
+        declaration,
+        f"{name}: {values} | None = None",
+        tuple(_store(slot, name, fresh, given)),
     )
 
 

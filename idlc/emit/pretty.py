@@ -109,6 +109,24 @@ def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
     return [f"{margin}if (", *(f"{margin}    {one}" for one in inner), end]
 
 
+def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
+    """Return the lines of `before`, whether any condition is true, and `after`."""
+    margin = " " * indent
+    text = " or ".join(conditions)
+    one = f"{margin}{before}{text}{after}"
+    if len(one) <= WIDTH:
+        return [one]
+    inner = [text]
+    if len(margin) + len(text) + 4 > WIDTH:
+        inner = [conditions[0], *(f"or {condition}" for condition in conditions[1:])]
+    brackets = ("", "") if before.endswith("(") else ("(", ")")
+    return [
+        f"{margin}{before}{brackets[0]}",
+        *(f"{margin}    {line}" for line in inner),
+        f"{margin}{brackets[1]}{after}",
+    ]
+
+
 def assign(target: Node, value: Node, indent: int) -> list[str]:
     """Return an assignment as lines; a tuple of targets is a Group without `before`."""
     margin = " " * indent

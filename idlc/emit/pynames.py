@@ -25,6 +25,12 @@ CODEC_NAMES = frozenset(
     | {"parts", "put", "reading", "size", "struct", "to_str", "view", "words"}
 )
 
+#: The methods that a message class inherits; a field of such a name hides the method.
+METHODS = frozenset(
+    {"deserialize", "deserialize_many", "from_dict", "get_fields_and_field_types", "serialize"}
+    | {"serialize_many", "to_columns", "to_dict", "validate"}
+)
+
 #: Names that no local variable can have, or should.
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
 
@@ -51,7 +57,7 @@ def modules(names: Iterable[ir.TypeName]) -> Modules:
 
 def class_(name: ir.TypeName) -> ClassName:
     """Return the class of a structure, service or action."""
-    return ClassName(name.name + "_" if keyword.iskeyword(name.name) else name.name)
+    return ClassName(public_name(name.name))
 
 
 def qualified_class(name: ir.TypeName) -> ClassName:
@@ -62,6 +68,11 @@ def qualified_class(name: ir.TypeName) -> ClassName:
 def field(name: str) -> FieldName:
     """Return the attribute of a field."""
     return FieldName(public_name(name))
+
+
+def hides_method(name: str) -> bool:
+    """Whether a message class offers a method of a field's name."""
+    return name in METHODS
 
 
 def slot(name: str) -> SlotName:

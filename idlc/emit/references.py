@@ -57,6 +57,16 @@ class References:
         """Return the class's name in this module."""
         return self._names[type_]
 
+    def annotation(self, type_: ir.TypeName) -> str:
+        """Return the class as annotations and constructors name it."""
+        if type_ in self.implied:
+            return f"{_module(type_)}.{pynames.class_(type_)}"
+        return self.name(type_)
+
+    def modules(self) -> list[tuple[str, str]]:
+        """Return the modules of implied types, with their names in this module."""
+        return sorted({(f"{type_.package}.{type_.kind}", _module(type_)) for type_ in self.implied})
+
     def imports(self, types: Iterable[ir.TypeName], kind: ir.Kind) -> tuple[list[str], list[str]]:
         """Return import statements, those of this package and those of others, sorted."""
         inside: set[tuple[int, str, str]] = set()
@@ -78,6 +88,10 @@ class References:
                 for module, targets in sorted(outside.items())
             ],
         )
+
+
+def _module(type_: ir.TypeName) -> str:
+    return f"_{type_.package}_{type_.kind}"
 
 
 def referred(message: ir.Message) -> list[ir.TypeName]:

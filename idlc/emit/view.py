@@ -11,7 +11,8 @@ import msgspec
 from idlc.emit import code, documentation, fields, groups, layout, literals, pynames
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
-from idlc.emit.pretty import WIDTH, Group, all_of, assign, call, if_any, lines
+from idlc.emit.equality import equality
+from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -50,6 +51,9 @@ PRAGMAS = (
 )
 
 
+HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
+
+
 def origin(name: ir.TypeName) -> str:
     """Return an interface's file, as package/kind/Name.kind."""
     return f"{name}.{name.kind}"
@@ -65,7 +69,10 @@ def module(
     return ModuleView(
         path=f"{name.kind}/{modules[name]}.py",
         origin=origin(name),
-        pragmas=PRAGMAS if _has_others(references, messages) else (),
+        pragmas=(
+            *(PRAGMAS if _has_others(references, messages) else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
+        ),
         summary=f"The classes of {name}.",
         imports=tuple(_imports(references, structures, name.kind)),
         messages=tuple(
@@ -73,6 +80,10 @@ def module(
         ),
         groups=tuple(groups.views(interface)),
     )
+
+
+def _hides_methods(structure: ir.Message) -> bool:
+    return any(pynames.hides_method(field.name) for field in structure.fields)
 
 
 def _has_others(references: References, messages: layout.Messages) -> bool:
@@ -100,9 +111,13 @@ def _imports(
     if outside:
         result += ["", "with _idlc.importing():", *(f"    {line}" for line in wrapped(outside))]
     if references.implied:
-        _, implied = references.imports(references.implied, kind)
+        implied = references.modules()
         result += ["", "TYPE_CHECKING = False", "if TYPE_CHECKING:"]
-        result += [f"    {line}" for line in wrapped(implied)]
+        result += [f"    import {module} as {name}" for module, name in implied]
+        result += [
+            "else:",
+            *(f'    {name} = _idlc.Package("{module}")' for module, name in implied),
+        ]
     return result
 
 
@@ -129,7 +144,7 @@ def _message(
         name=references.name(structure.name),
         body=tuple(_body(structure, views)),
         init=tuple(_init(structure, views)),
-        equality=tuple(_equality(structure, references)),
+        equality=tuple(equality(structure, _receiver(structure), references)),
         codec=_codec_head(structure.name),
         tables=(*_codec_imports(needed, references, interface.name.kind, arrays), *definitions),
         encode=tuple(writing),
@@ -180,14 +195,20 @@ def _body(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         *literals.docstring(doc, 4),
         "",
         *_tuple("__match_args__", tuple(public)),
-        *lines(_frozen(types), 4, "_fields_and_field_types = "),
+        *lines(_table(types), 4, "_fields_and_field_types = "),
         *_separated(_constants(structure)),
-        *_separated([f"    {view.declaration}" for view in views]),
+        *_separated([_declaration(view) for view in views]),
     ]
 
 
-def _frozen(items: tuple[str, ...]) -> Group:
-    return call("_idlc.frozen", Group("", items, brackets="{}"))
+def _declaration(view: fields.FieldView) -> str:
+    # type checkers take a field of a method's name for a mistake
+    ignore = "  # type: ignore[assignment]" if pynames.hides_method(view.name) else ""
+    return f"    {view.declaration}{ignore}"
+
+
+def _table(items: tuple[str, ...]) -> Group:
+    return call("_idlc.table", Group("", items, brackets="{}"))
 
 
 def _separated(block: list[str]) -> list[str]:
@@ -219,24 +240,6 @@ def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         "            return",
         *(line for view in views for line in view.stores),
     ]
-
-
-def _equality(structure: ir.Message, references: References) -> list[str]:
-    """Return the method that compares field by field, as rosidl's does."""
-    receiver = _receiver(structure)
-    boolean = "_builtins.bool" if fields.shadows(structure) else "bool"
-    head = [
-        f"    def __eq__({receiver}, other: _idlc.Any) -> {boolean}:",
-        f"        if not isinstance(other, {references.name(structure.name)}):",
-        "            return NotImplemented",
-    ]
-    parts = [fields.comparison(field, receiver, references) for field in structure.fields]
-    calls = [part for part in parts if isinstance(part, Group)]
-    plain = [part for part in parts if isinstance(part, str)]
-    last = all_of(plain, 8) if plain or not calls else lines(calls.pop(), 8, "return ")
-    for part in calls:
-        head += [*lines(part, 8, "if not ", ":"), "            return False"]
-    return [*head, *last]
 
 
 def _tuple(target: str, items: tuple[str, ...]) -> list[str]:

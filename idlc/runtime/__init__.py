@@ -28,9 +28,9 @@ from .cdr import (
 from .codec import Codec, Reading, codec_for, maker
 from .construction import construct
 from .errors import DecodeError, ValidationError, importing
-from .interfaces import Action, Imported, Service, make, several
-from .loading import lazily
-from .message import Fresh, FreshList, Message, dataclass, frozen
+from .interfaces import Action, Imported, Package, Service, several
+from .loading import Fresh, FreshList, lazily
+from .message import Message, dataclass, table
 from .objects import same
 from .sequences import (
     Float32Sequence,
@@ -63,23 +63,15 @@ from .texts import (
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from typing import Any as Any
-    from typing import TypeAlias as TypeAlias
-    from typing import TypedDict
-
-    from typing_extensions import Unpack as Unpack
-
-    #: What numeric sequences take.
-    Integers: TypeAlias = Iterable[int]
-    Floats: TypeAlias = Iterable[float]
-
-    class Options(TypedDict, total=False):
-        """What every constructor takes besides the fields."""
-
-        #: Raise AssertionError when a wrong value is assigned, as rosidl's classes do.
-        check_fields: bool
-
+    from .hints import Any as Any
+    from .hints import Floats as Floats
+    from .hints import Integers as Integers
+    from .hints import Options as Options
+    from .hints import TypeAlias as TypeAlias
+    from .hints import Unpack as Unpack
+else:
+    _HINTS = ("Any", "Floats", "Integers", "Options", "TypeAlias", "Unpack")
+    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS, "hints"))
 
 __all__ = [
     "ENDS",
@@ -102,6 +94,7 @@ __all__ = [
     "Int32Sequence",
     "Int64Sequence",
     "Message",
+    "Package",
     "Reading",
     "Service",
     "Texts",
@@ -116,11 +109,9 @@ __all__ = [
     "dataclass",
     "flags",
     "flags_writer",
-    "frozen",
     "importing",
     "layout",
     "lazily",
-    "make",
     "maker",
     "octets",
     "octets_writer",
@@ -135,6 +126,7 @@ __all__ = [
     "several",
     "sizes",
     "strings_reader",
+    "table",
     "text_block",
     "text_phases",
     "texts_reader",

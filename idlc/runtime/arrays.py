@@ -19,6 +19,16 @@ if TYPE_CHECKING:
     from .codec import Reading
 
     Values: TypeAlias = ArrayLike
+else:
+
+    def __getattr__(name: str) -> Any:
+        """Return what only annotations use, for who evaluates them."""
+        if name == "Values":
+            from numpy.typing import ArrayLike
+
+            return ArrayLike
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 Element = TypeVar("Element", bound="np.generic")
 
@@ -85,6 +95,14 @@ class NumberArray(Generic[Element]):
             store(message, to_ndarray(dtype, size, values, name))
 
         return property(slot.__get__, setter)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
+        """Return how pydantic checks and writes an array."""
+        from .schemas import numbers_schema
+
+        kind = float if cls.dtype.kind == "f" else int
+        return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
 
     if TYPE_CHECKING:
 

@@ -109,7 +109,8 @@ def checked_class(kind: Any) -> Any:
     }
     for field in fields_of(type_name(kind)):
         namespace[field.public] = _property(owner.__dict__[field.slot], field)
-    return type(kind)(kind.__name__, (kind, Checked), {"__slots__": (), **namespace})
+    namespace["__slots__"] = ()
+    return type.__new__(type(kind), kind.__name__, (kind, Checked), namespace)
 
 
 def _property(slot: Any, field: FieldInfo) -> property:

@@ -6,6 +6,7 @@ import struct
 
 from .cdr import HEADERS, NATIVE
 from .errors import DecodeError, ValidationError
+from .objects import owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     #: What turns bytes into a str.
     Text: TypeAlias = Callable[[Any], str]
     Make: TypeAlias = Callable[[str, "Reading"], "Codec"]
+    #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
+    Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
 
     class Codecs(Protocol):
         """Gives the codec of a byte order, making it on first use."""
@@ -111,9 +114,27 @@ def maker(kind: type) -> Callable[[], Any]:
     return make
 
 
-def install(kind: type[Message]) -> None:
-    """Replace `serialize` and `deserialize` of the class that owns the codec by direct ones."""
-    owner: Any = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+def functions(kind: type) -> Functions:
+    """Return `serialize` and `deserialize` of the generated class that `kind` is, or extends.
+
+    They replace those that the class inherits, unless its fields have these names.
+    """
+    owner = owner_of(kind)
+    made: Functions | None = owner.__dict__.get("_functions_")
+    if made is None:
+        made = owner._functions_ = _functions(owner)
+        serialize, deserialize = made
+        _provide(owner, "serialize", serialize)
+        _provide(owner, "deserialize", staticmethod(deserialize))
+    return made
+
+
+def _provide(owner: Any, name: str, function: object) -> None:
+    if name not in owner.__dict__:
+        setattr(owner, name, function)
+
+
+def _functions(owner: Any) -> Functions:
     codecs = owner._codec_
     little = codecs("<")
     encode, decode = little.encode, little.decode
@@ -136,10 +157,10 @@ def install(kind: type[Message]) -> None:
             failure = error
         return recover(owner, buffer, failure)
 
-    serialize.__doc__ = owner.serialize.__doc__
-    deserialize.__doc__ = owner.deserialize.__doc__
-    owner.serialize = serialize
-    owner.deserialize = staticmethod(deserialize)
+    base = owner.__mro__[1]
+    serialize.__doc__ = base.serialize.__doc__
+    deserialize.__doc__ = base.deserialize.__doc__
+    return serialize, deserialize
 
 
 def read(codecs: Codecs, buffer: Any, copy: bool = True) -> Any:
@@ -154,14 +175,25 @@ def read(codecs: Codecs, buffer: Any, copy: bool = True) -> Any:
     return codecs(order_of(buffer), READINGS[text, copy]).decode(buffer)
 
 
-def read_as_subclass(kind: Any, buffer: Any, *, copy: bool = True) -> Any:
-    """Return a message of a user's subclass."""
-    owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
-    message = owner.deserialize(buffer, copy=copy)
+def deserialize(kind: Any, buffer: Any, *, copy: bool = True) -> Any:
+    """Return a message of a generated class, or of a user's subclass of one."""
+    owner = owner_of(kind)
+    message = functions(owner)[1](buffer, copy)
+    if kind is owner:
+        return message
     result = kind.__new__(kind)
     for slot in owner.__slots__:
         setattr(result, slot, getattr(message, slot))
     return result
+
+
+def extended(owner: Any) -> None:
+    """Let a generated class read messages of any class that extends it.
+
+    Until there is one, its `deserialize` is a static method, which is faster.
+    """
+    if "deserialize" not in owner._fields_and_field_types:
+        owner.deserialize = classmethod(deserialize)
 
 
 def order_of(data: Any) -> str:
@@ -201,4 +233,12 @@ def encode_error(message: Message, byteorder: str, error: Exception) -> Exceptio
     return error
 
 
-__all__ = ["Codec", "Reading", "Text", "codec_for", "encode_error", "install", "maker"]
+__all__ = [
+    "Codec",
+    "Reading",
+    "Text",
+    "codec_for",
+    "encode_error",
+    "functions",
+    "maker",
+]

@@ -1,43 +1,68 @@
-"""The `dataclasses.Field` objects of a message class, for who asks."""
+"""Messages as the module dataclasses sees them, for who asks."""
 
 from __future__ import annotations
 
 import dataclasses
-from inspect import signature
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_type_hints
 
-from .names import public_name, slot_name
+from .names import slot_name
+from .objects import owner_of
 
 if TYPE_CHECKING:
-    from .message import Message
+    from collections.abc import Iterator
+
+#: The `__dataclass_params__` of all messages.
+PARAMETERS: Any = dataclasses.make_dataclass(  # type: ignore[attr-defined]
+    "Message", [], slots=True
+).__dataclass_params__
 
 
-def dataclass_fields(kind: type[Message]) -> dict[str, dataclasses.Field[Any]]:
-    """Return a class's fields by their Python names, in order."""
-    owner: Any = next(
-        base for base in kind.__mro__ if "_fields_and_field_types" in base.__dict__
+def dataclass_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
+    """Return a class's fields by their Python names, in order.
+
+    They are kept on the generated class, which then needs nobody to ask for them.
+    """
+    if "__dataclass_fields__" in kind.__dict__:  # the base of all messages
+        return {}
+    owner = owner_of(kind)
+    plain = dataclasses.make_dataclass(
+        owner.__name__, _fields(owner), init=False, repr=False, eq=False
     )
-    parameters = signature(owner).parameters
-    found = {}
-    for wire in owner._fields_and_field_types:
-        name = public_name(wire)
-        default = parameters[name].default
-        if default is None:
-            made: Any = dataclasses.field(
-                default_factory=_fresh(owner, slot_name(wire))
-            )
-        else:
-            made = dataclasses.field(default=default)
-        made.name = name
-        made.type = owner.__annotations__.get(name)
-        made.kw_only = False
-        made._field_type = dataclasses._FIELD  # type: ignore[attr-defined]
-        found[name] = made
+    found: dict[str, Any] = plain.__dataclass_fields__  # type: ignore[attr-defined]
+    owner.__dataclass_fields__ = found
+    if "_arrays." not in "".join(owner.__annotations__.values()):
+        # pytest explains field by field what dataclasses made, which it knows by this name
+        code = owner.__eq__.__code__
+        owner.__eq__.__code__ = code.replace(co_filename="<string>")
     return found
 
 
-def _fresh(owner: type[Message], slot: str) -> Any:
+def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
+    defaults = owner.__init__.__defaults__ or ()
+    names = zip(
+        owner.__match_args__, owner._fields_and_field_types, defaults, strict=True
+    )
+    try:
+        types = get_type_hints(owner)
+    except ImportError:  # of another package, whose classes only these fields need
+        types = owner.__annotations__
+    for name, wire, default in names:
+        made: Any = (
+            dataclasses.field(default_factory=_fresh(owner, slot_name(wire)))
+            if default is None
+            else dataclasses.field(default=default)
+        )
+        yield name, types[name], made
+
+
+def _fresh(owner: Any, slot: str) -> Any:
     def make() -> Any:
         return getattr(owner(), slot)
 
     return make
+
+
+def named_values(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield each field's Python name and value, those that a user's subclass adds included."""
+    for field in dataclasses.fields(message):
+        yield field.name, getattr(message, field.name)

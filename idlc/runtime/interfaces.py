@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-from .errors import importing
-from .message import InterfaceMeta
+from .errors import MissingPackageError, importing
+from .message import InterfaceMeta, metaclass_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any, ClassVar
 
 
+class Package:
+    """A module of another package, imported when one of its classes is asked for."""
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a class; what begins with an underscore is none."""
+        if name[0] == "_":
+            raise AttributeError(f"{self._module} has no class {name!r}")
+        with importing():
+            return getattr(__import__(self._module, fromlist=[name]), name)
+
+
 class Imported:
-    """A class of another package, imported when it is asked for."""
+    """A class attribute: a class of another package, imported when it is asked for."""
 
     def __init__(self, module: str, name: str) -> None:
-        self._module = module
+        self._package = Package(module)
         self._name = name
 
     def __get__(self, instance: object, owner: type | None = None) -> Any:
-        """Return the class."""
-        return _imported(self._module, self._name)
-
-
-def make(module: str, name: str) -> Any:
-    """Return a new instance of another package's class."""
-    return _imported(module, name)()
-
-
-def _imported(module: str, name: str) -> Any:
-    with importing():
-        return getattr(__import__(module, fromlist=[name]), name)
+        """Return the class; without the package, the attribute is missing."""
+        try:
+            return getattr(self._package, self._name)
+        except MissingPackageError as error:
+            raise AttributeError(str(error)) from error
 
 
 def several(kind: Any, count: int) -> list[Any]:
@@ -47,9 +54,7 @@ class _GroupMeta(InterfaceMeta):
     ) -> Any:
         if not bases:
             return super().__new__(cls, name, bases, namespace)
-        metaclass: Any = type(
-            f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
-        )
+        metaclass = metaclass_of(cls, name, namespace)
         made: Any = type.__new__(metaclass, name, bases, namespace)
         metaclass._interface = made
         return made

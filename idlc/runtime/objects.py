@@ -1,8 +1,10 @@
-"""What messages need to be compared and copied."""
+"""What messages need to be compared, copied and shown."""
 
 from __future__ import annotations
 
 from array import array
+
+from .names import slot_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -17,7 +19,10 @@ SMALL = 64
 
 def owner_of(kind: type) -> Any:
     """Return the generated class that a class is, or that a user's class derives from."""
-    return next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    for base in kind.__mro__:
+        if "_codec_" in base.__dict__:
+            return base
+    raise TypeError(f"{kind.__name__} is not a generated message class")
 
 
 def same(mine: Any, other: Any) -> bool:
@@ -74,3 +79,40 @@ def _reconstructed(
         for name, value in (part or {}).items():
             object.__setattr__(made, name, copy_of(value))
     return made
+
+
+def represented(message: Any) -> str:
+    """Return a message as rosidl shows it."""
+    parts = []
+    for field in message._fields_and_field_types:
+        value = getattr(message, slot_name(field))
+        shown = value.tolist() if type(value) is array else value
+        parts.append(f"{field}={shown!r}")
+    return f"{_shown_name(type(message))}({', '.join(parts)})"
+
+
+# pprint knows what can be shown field by field from where dataclasses make `__repr__`
+represented.__qualname__ = "__create_fn__.<locals>.__repr__"
+
+
+def _shown_name(kind: type) -> str:
+    """Return a class's name after that of its package, its module left out."""
+    package = kind.__module__.rpartition(".")[0]
+    return f"{package}.{kind.__name__}" if package else kind.__name__
+
+
+def pretty(message: Any, printer: Any, cycle: bool) -> None:
+    """Show a message on as many lines as it takes, with IPython's pretty printer."""
+    from .fields import named_values
+
+    name = _shown_name(type(message))
+    if cycle:
+        printer.text(f"{name}(...)")
+        return
+    with printer.group(len(name) + 1, f"{name}(", ")"):
+        for index, (field, value) in enumerate(named_values(message)):
+            if index:
+                printer.text(",")
+                printer.breakable()
+            printer.text(f"{field}=")
+            printer.pretty(value.tolist() if type(value) is array else value)

@@ -92,6 +92,14 @@ class NumberSequence(Generic[Number]):
 
         return property(slot.__get__, setter)
 
+    @classmethod
+    def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
+        """Return how pydantic checks and writes a sequence."""
+        from .schemas import numbers_schema
+
+        kind = float if cls.code in "fd" else int
+        return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
+
     if TYPE_CHECKING:
 
         def __get__(

@@ -12,7 +12,8 @@ from importlib import import_module
 from typing import Any, NamedTuple
 
 from .errors import importing
-from .names import public_name, slot_name
+from .names import public_name, slot_name, wire_name
+from .objects import owner_of
 
 
 class Primitive(NamedTuple):
@@ -98,13 +99,10 @@ def types() -> dict[str, Any]:
 
 def type_name(kind: type) -> str:
     """Return a message class's full name, package/kind/Name."""
-    for base in kind.__mro__:
-        if "_fields_and_field_types" in base.__dict__:
-            kind = base
-            break
+    kind = owner_of(kind)
     path = kind.__module__.split(".")
     package = types()["package"] if kind.__module__.startswith(OWN + ".") else path[-3]
-    return f"{package}/{path[-2]}/{kind.__name__}"
+    return f"{package}/{path[-2]}/{wire_name(kind.__name__)}"
 
 
 @cache
@@ -135,12 +133,21 @@ def class_of(name: str) -> Any:
     package, kind, short = name.split("/")
     root = OWN if package == types()["package"] else package
     with importing():
-        return getattr(import_module(f"{root}.{kind}"), short)
+        return getattr(import_module(f"{root}.{kind}"), public_name(short))
 
 
 def slot_types(kind: type) -> tuple[Any, ...]:
     """Return the fields' types as rosidl_parser.definition objects."""
-    definition = import_module("rosidl_parser.definition")
+    if "SLOT_TYPES" in kind.__dict__:  # the base of all messages
+        return ()
+    try:
+        definition = import_module("rosidl_parser.definition")
+    except ImportError as error:
+        raise ImportError(
+            f"{kind.__name__}.SLOT_TYPES needs rosidl_parser, which cannot be imported "
+            f"({error}): source your ROS 2 installation, or pip install "
+            "ros-jazzy-rosidl-parser"
+        ) from error
     return tuple(_slot_type(definition, field) for field in fields_of(type_name(kind)))
 
 

@@ -24,7 +24,7 @@ from . import typesupport_fastrtps_python as python
 from . import typesupport_introspection as introspection
 from . import typesupport_native as native
 from .cdr import HEADERS, NATIVE
-from .codec import encode_error, install
+from .codec import encode_error, functions
 from .typesupport_descriptions import about
 from .typesupport_fastcdr import fast_cdr
 
@@ -145,9 +145,8 @@ def _native(answers: dict[bytes, int]) -> dict[str, int]:
 
 def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
     """Return the function that gives the message in a memory, or `None` for garbage."""
-    install(cls)
     decode = cls._codec_(NATIVE).decode
-    decode_any = cls.deserialize
+    _, decode_any = functions(cls)
     native = HEADERS[NATIVE][1]
 
     def taken(memory: Any) -> Any:

@@ -15,7 +15,7 @@ from itertools import product
 from pathlib import Path
 
 from middleware import Official, Walker, interface_of, members_of, official_handle, table
-from trees import Values
+from trees import Values, methods
 
 COUNT = 5
 
@@ -71,7 +71,7 @@ def look_at(name, values, official):
 def check(name, party, memory, create, destroy, message):
     """Let a middleware read what Python wrote, and Python what a middleware wrote."""
     who = type(party).__name__
-    data = message.serialize()
+    data = methods(message).serialize()
     place = create()
     for _ in range(2):  # twice, as for memory that is used again
         assert memory.store(message, place)
@@ -81,7 +81,7 @@ def check(name, party, memory, create, destroy, message):
     destroy(place)
     place = create()
     party.write(data[4:], place)
-    again = memory.fetch(place).serialize()
+    again = methods(memory.fetch(place)).serialize()
     if again != data:
         print(f"{name}: {who} wrote what is read as {again.hex()}, not {data.hex()}"[:500])
     destroy(place)
@@ -98,7 +98,7 @@ def look_at_memory(name, values):
     memory = Memory(support)
     walker = Walker(support.handle)
     message = values.build(name, values.invent(name))
-    data = message.serialize()[4:]
+    data = methods(message).serialize()[4:]
     sizes = []
     for _ in range(4):
         for _ in range(300):
@@ -107,7 +107,7 @@ def look_at_memory(name, values):
             memory.destroy(place)
             place = memory.create()
             walker.write(data, place)
-            memory.fetch(place).serialize()
+            methods(memory.fetch(place)).serialize()
             memory.destroy(place)
         sizes.append(resident())
     if sizes[-1] - sizes[0] > 2:

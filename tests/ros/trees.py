@@ -44,6 +44,11 @@ def class_of(package, kind, name):
     return getattr(module, name)
 
 
+def methods(message):
+    """Return an object with the methods of idlc's class, which a field may hide."""
+    return super(type(message), message)
+
+
 def attribute(cls, field):
     """Return a field's name in Python: idlc puts an underscore behind keywords."""
     clash = field + "_"

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from struct import Struct
 
-from .codec import FAILURES, ORDERS, READINGS, encode_error, read
+from .codec import (
+    FAILURES,
+    ORDERS,
+    READINGS,
+    deserialize,
+    encode_error,
+    read,
+)
 from .errors import DecodeError, ValidationError
+from .objects import owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -45,7 +53,7 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
 
 def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]:
     """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
-    owner = next(base for base in kind.__mro__ if "_codec_" in base.__dict__)
+    owner = owner_of(kind)
     codecs = owner._codec_
     decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []
@@ -69,7 +77,7 @@ def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]
 def _one(kind: Any, buffer: Any, copy: bool, index: int) -> Any:
     """Return one message as `deserialize` would."""
     try:
-        return kind.deserialize(buffer, copy=copy)
+        return deserialize(kind, buffer, copy=copy)
     except DecodeError as error:
         failed(error, index)
 

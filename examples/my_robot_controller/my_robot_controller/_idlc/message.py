@@ -7,70 +7,48 @@ property that converts for numeric arrays. Nothing else is computed until it is 
 
 from __future__ import annotations
 
-from array import array
+import sys
 
 from . import codec
 from .construction import CHECK_FIELDS, call_checked, is_checked
-from .generics import Generic, TypeVar
+from .loading import OnDemand
 from .names import public_name, slot_name
-from .objects import copied, deeply_copied
+from .objects import copied, deeply_copied, pretty, represented
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable
     from dataclasses import Field, dataclass
-    from types import MappingProxyType
     from typing import Any, ClassVar, Literal
 
     import typing_extensions
 else:
-    MappingProxyType = type(vars(type))
 
     def dataclass(**_options):
         """Leave the class as it is: the generated class already is what a dataclass has."""
         return lambda cls: cls
 
 
-Value = TypeVar("Value")
-#: Makes a dictionary that nobody changes.
-frozen = MappingProxyType
+#: What generated classes call `dict`; linters take a display for a mistake there.
+table = dict
 
 
-class Fresh(Generic[Value]):
-    """A class attribute whose value is made anew at each access, for mutable defaults."""
+def _slot_types(kind: type) -> tuple[Any, ...]:
+    from .typeinfo import slot_types
 
-    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
-        self._make = make
-        self._arguments = arguments
-
-    def __get__(self, instance: object, owner: type | None = None) -> Value:
-        """Return a new value."""
-        return self._make(*self._arguments)
+    return slot_types(kind)
 
 
-class FreshList(Fresh[list[Value]]):
-    """A class attribute whose value is a new list of the same values at each access."""
+def _dataclass_fields(kind: type) -> dict[str, Field[Any]]:
+    from .fields import dataclass_fields
 
-    def __init__(self, *values: Value) -> None:
-        super().__init__(list, values)
-
-
-class _SlotTypes:
-    """The field types as rosidl_parser.definition objects, made on first access."""
-
-    def __get__(self, instance: object, owner: type) -> tuple[Any, ...]:
-        from .typeinfo import slot_types
-
-        return slot_types(owner)
+    return dataclass_fields(kind)
 
 
-class _DataclassFields:
-    """The `__dataclass_fields__` of a class, made on first access."""
+def _dataclass_params(_kind: type) -> Any:
+    from .fields import PARAMETERS
 
-    def __get__(self, instance: object, owner: type[Message]) -> dict[str, Field[Any]]:
-        from .fields import dataclass_fields
-
-        return dataclass_fields(owner)
+    return PARAMETERS
 
 
 class InterfaceMeta(type):
@@ -82,6 +60,16 @@ class InterfaceMeta(type):
         if name.isupper() and name[0] != "_" and hasattr(cls, name):
             raise AttributeError(f"{cls.__name__}.{name} is a constant")
         super().__setattr__(name, value)
+
+
+def metaclass_of(
+    base: type[InterfaceMeta], name: str, namespace: dict[str, Any]
+) -> Any:
+    """Return a metaclass for one interface, in the module of its class like rosidl's."""
+    module = namespace["__module__"]
+    made = type(f"Metaclass_{name}", (base,), {"__module__": module})
+    setattr(sys.modules.get(module), made.__name__, made)
+    return made
 
 
 class MessageMeta(InterfaceMeta):
@@ -96,18 +84,21 @@ class MessageMeta(InterfaceMeta):
     _message: ClassVar[Any] = None
 
     def __new__(
-        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
-    ) -> MessageMeta:
+        cls,
+        name: str,
+        bases: tuple[type, ...],
+        namespace: dict[str, Any],
+        **options: Any,
+    ) -> Any:
         """Return a message class, or a user's subclass of one."""
         fields = namespace.get("_fields_and_field_types")
         if fields is None:
-            if bases:
-                read = classmethod(codec.read_as_subclass)
-                namespace.setdefault("deserialize", read)
-            return super().__new__(cls, name, bases, namespace)
-        metaclass: Any = type(
-            f"Metaclass_{name}", (cls,), {"__module__": namespace["__module__"]}
-        )
+            if not bases:
+                return super().__new__(cls, name, bases, namespace)
+            from .subclasses import subclass
+
+            return subclass(cls, name, bases, namespace, options)
+        metaclass = metaclass_of(cls, name, namespace)
         converted = {
             public: namespace.pop(public, None) for public in map(public_name, fields)
         }
@@ -120,7 +111,7 @@ class MessageMeta(InterfaceMeta):
             attribute = member if conversion is None else conversion.property_of(member)
             type.__setattr__(made, public, attribute)
         metaclass._message = made
-        return made  # type: ignore[no-any-return]
+        return made
 
     @classmethod
     def __import_type_support__(cls) -> None:
@@ -141,13 +132,14 @@ class Message(metaclass=MessageMeta):
 
     # no annotations at run time, where `typing.get_type_hints` would ask for their names
     if TYPE_CHECKING:
-        _fields_and_field_types: ClassVar[Mapping[str, str]]
+        _fields_and_field_types: ClassVar[dict[str, str]]
         _codec_: ClassVar[codec.Codecs]
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
-        SLOT_TYPES = _SlotTypes()
-        __dataclass_fields__ = _DataclassFields()
+        SLOT_TYPES = OnDemand(_slot_types)
+        __dataclass_fields__ = OnDemand(_dataclass_fields)
+        __dataclass_params__ = OnDemand(_dataclass_params)
 
     @property
     def _check_fields(self) -> bool:
@@ -171,8 +163,7 @@ class Message(metaclass=MessageMeta):
         Raises ValidationError for a value that its field cannot hold. The bound of a string is
         not a matter of the wire format and only checked by `validate`.
         """
-        codec.install(type(self))
-        return self.serialize(byteorder=byteorder)
+        return codec.functions(type(self))[0](self, byteorder)
 
     @classmethod
     def deserialize(
@@ -184,8 +175,8 @@ class Message(metaclass=MessageMeta):
         With `copy=False`, numeric sequences and arrays are read-only `numpy.ndarray`s, which of
         all but short arrays are views of the buffer.
         """
-        codec.install(cls)
-        return cls.deserialize(buffer, copy=copy)
+        message: typing_extensions.Self = codec.deserialize(cls, buffer, copy=copy)
+        return message
 
     @classmethod
     def serialize_many(
@@ -264,27 +255,39 @@ class Message(metaclass=MessageMeta):
 
     __copy__ = copied
     __deepcopy__ = deeply_copied
+    _repr_pretty_ = pretty
 
     def __repr__(self) -> str:
-        kind = type(self)
-        parts = []
-        for field in kind._fields_and_field_types:
-            value = getattr(self, slot_name(field))
-            shown = value.tolist() if type(value) is array else value
-            parts.append(f"{field}={shown!r}")
-        package = kind.__module__.rpartition(".")[0]
-        return f"{package}.{kind.__name__}({', '.join(parts)})"
+        return represented(self)
+
+    # pprint shows it field by field, as it does dataclasses
+    __repr__.__wrapped__ = represented  # type: ignore[attr-defined]
+
+    def __rich_repr__(self) -> Iterable[tuple[str, Any]]:
+        """Return names and values, for rich."""
+        from .fields import named_values
+
+        return named_values(self)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
+        """Return how pydantic checks and writes a message."""
+        from .schemas import message_schema
+
+        return message_schema(handler(source))
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        # the two oldest protocols of pickle do not know slots; theirs can say what later ones do
+        return super().__reduce_ex__(max(protocol, 2))
 
 
 if CHECK_FIELDS:
     MessageMeta.__call__ = call_checked  # type: ignore[assignment]
 
 __all__ = [
-    "Fresh",
-    "FreshList",
     "InterfaceMeta",
     "Message",
     "MessageMeta",
     "dataclass",
-    "frozen",
+    "table",
 ]

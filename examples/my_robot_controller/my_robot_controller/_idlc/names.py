@@ -1,8 +1,7 @@
 """How the names of an interface appear in Python.
 
 Wire names stay as they are in files, dictionaries and type descriptions. In Python a name that
-is a keyword, or that a message class needs for itself, gets a trailing underscore; no field
-name can end in one, so two names never meet.
+is a keyword gets a trailing underscore; no name of ROS can end in one, so two names never meet.
 """
 
 from __future__ import annotations
@@ -13,29 +12,13 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-#: What a message class offers itself, and what it must not lose to a field.
-RESERVED = frozenset(
-    {
-        "deserialize",
-        "deserialize_many",
-        "from_dict",
-        "get_fields_and_field_types",
-        "mro",
-        "serialize",
-        "serialize_many",
-        "to_columns",
-        "to_dict",
-        "validate",
-    }
-)
-
 #: Class attributes that look like the slot of a field.
 RESERVED_SLOTS = frozenset({"_fields_and_field_types"})
 
 
-def public_name(field: str) -> str:
-    """Return the attribute, and the keyword argument, that a field has in Python."""
-    return field + "_" if iskeyword(field) or field in RESERVED else field
+def public_name(name: str) -> str:
+    """Return what a field is called as attribute and argument, or a type as class."""
+    return name + "_" if iskeyword(name) else name
 
 
 def slot_name(field: str) -> str:
@@ -47,4 +30,9 @@ def slot_name(field: str) -> str:
 def name_of(slot: Any) -> str:
     """Return the public name of the field that a slot's member descriptor holds."""
     name: str = slot.__name__
-    return public_name(name[1:].removesuffix("_"))
+    return public_name(wire_name(name[1:]))
+
+
+def wire_name(name: str) -> str:
+    """Return the name whose `public_name` is `name`."""
+    return name.removesuffix("_")

@@ -13,6 +13,7 @@ from typing import Any
 
 from . import typesupport_c as c
 from . import typesupport_services as services
+from .names import wire_name
 from .typesupport_descriptions import load
 from .typesupport_extension import OF_RCL, extension
 
@@ -60,7 +61,7 @@ def _road() -> ModuleType:
 def _name(cls: Any) -> str:
     """Return the full name of a class as ROS 2 writes it."""
     kind = cls.__module__.split(".")[-2]
-    return f"{load().package}/{kind}/{cls.__name__}"
+    return f"{load().package}/{kind}/{wire_name(cls.__name__)}"
 
 
 def _handle(cls: Any) -> int:

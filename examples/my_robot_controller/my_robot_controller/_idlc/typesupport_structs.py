@@ -18,7 +18,7 @@ from . import typesupport_memory as memory
 from . import typesupport_native as native
 from . import typesupport_transcode as transcode
 from .cdr import HEADERS, NATIVE
-from .codec import encode_error
+from .codec import encode_error, functions
 from .typesupport_layout import structure
 
 _HEADER = 4
@@ -27,6 +27,7 @@ _HEADER = 4
 def _converter(cls: Any, name: str) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
+    _, decode = functions(cls)
     everything = transcode.whole(name)
 
     def store(address: int, message: Any) -> None:
@@ -39,7 +40,7 @@ def _converter(cls: Any, name: str) -> object:
     def fetch(address: int) -> Any:
         data = bytearray(HEADERS[NATIVE])
         everything.drain(address, data)
-        return cls.deserialize(data)
+        return decode(data)
 
     methods = {
         "__setitem__": staticmethod(store),
@@ -52,7 +53,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     size, content = ctypes.sizeof(structure(name)), memory.content(name)
     try:
-        functions = memory.functions(size, content, _converter(cls, name))
+        made = memory.functions(size, content, _converter(cls, name))
         handle = introspection.handle(name, functional=True)
     except native.RefusedError as error:
         raise ImportError(
@@ -60,7 +61,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
             "set RMW_IMPLEMENTATION to rmw_fastrtps_cpp, or build the interface package "
             "with colcon"
         ) from error
-    return c.MessageSupport(handle, *functions[:4])
+    return c.MessageSupport(handle, *made[:4])
 
 
 class _ServiceMembers(ctypes.Structure):

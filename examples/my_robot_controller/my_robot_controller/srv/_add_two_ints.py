@@ -9,7 +9,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from service_msgs.msg import ServiceEventInfo
+    import service_msgs.msg as _service_msgs_msg
+else:
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -22,7 +24,7 @@ class AddTwoInts_Request(_idlc.Message):
     """
 
     __match_args__ = ("a", "b")
-    _fields_and_field_types = _idlc.frozen({"a": "int64", "b": "int64"})
+    _fields_and_field_types = _idlc.table({"a": "int64", "b": "int64"})
 
     a: int
     b: int
@@ -43,7 +45,7 @@ class AddTwoInts_Request(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, AddTwoInts_Request):
             return NotImplemented
-        return self._a == other._a and self._b == other._b
+        return not (self._a != other._a or self._b != other._b)
 
 
 @_idlc.codec_for(AddTwoInts_Request)
@@ -74,7 +76,7 @@ class AddTwoInts_Response(_idlc.Message):
     """
 
     __match_args__ = ("sum",)
-    _fields_and_field_types = _idlc.frozen({"sum": "int64"})
+    _fields_and_field_types = _idlc.table({"sum": "int64"})
 
     sum: int
 
@@ -92,7 +94,7 @@ class AddTwoInts_Response(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, AddTwoInts_Response):
             return NotImplemented
-        return self._sum == other._sum
+        return bool(self._sum == other._sum)
 
 
 @_idlc.codec_for(AddTwoInts_Response)
@@ -125,7 +127,7 @@ class AddTwoInts_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<my_robot_controller/AddTwoInts_Request, 1>",
@@ -133,23 +135,20 @@ class AddTwoInts_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[AddTwoInts_Request]
     response: list[AddTwoInts_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[AddTwoInts_Request] | None = None,
         response: list[AddTwoInts_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 

@@ -9,9 +9,13 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from builtin_interfaces.msg import Time
-    from service_msgs.msg import ServiceEventInfo
-    from unique_identifier_msgs.msg import UUID
+    import builtin_interfaces.msg as _builtin_interfaces_msg
+    import service_msgs.msg as _service_msgs_msg
+    import unique_identifier_msgs.msg as _unique_identifier_msgs_msg
+else:
+    _builtin_interfaces_msg = _idlc.Package("builtin_interfaces.msg")
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
+    _unique_identifier_msgs_msg = _idlc.Package("unique_identifier_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -23,7 +27,7 @@ class Fill_Goal(_idlc.Message):
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types = _idlc.frozen({"level": "float"})
+    _fields_and_field_types = _idlc.table({"level": "float"})
 
     level: float
 
@@ -41,7 +45,7 @@ class Fill_Goal(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Goal):
             return NotImplemented
-        return self._level == other._level
+        return bool(self._level == other._level)
 
 
 @_idlc.codec_for(Fill_Goal)
@@ -72,7 +76,7 @@ class Fill_Result(_idlc.Message):
     """
 
     __match_args__ = ("reached",)
-    _fields_and_field_types = _idlc.frozen({"reached": "float"})
+    _fields_and_field_types = _idlc.table({"reached": "float"})
 
     reached: float
 
@@ -90,7 +94,7 @@ class Fill_Result(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Result):
             return NotImplemented
-        return self._reached == other._reached
+        return bool(self._reached == other._reached)
 
 
 @_idlc.codec_for(Fill_Result)
@@ -121,7 +125,7 @@ class Fill_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("level",)
-    _fields_and_field_types = _idlc.frozen({"level": "float"})
+    _fields_and_field_types = _idlc.table({"level": "float"})
 
     level: float
 
@@ -139,7 +143,7 @@ class Fill_Feedback(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Feedback):
             return NotImplemented
-        return self._level == other._level
+        return bool(self._level == other._level)
 
 
 @_idlc.codec_for(Fill_Feedback)
@@ -171,16 +175,16 @@ class Fill_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"goal_id": "unique_identifier_msgs/UUID", "goal": "comments_msgs/Fill_Goal"},
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     goal: Fill_Goal
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         goal: Fill_Goal | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -189,7 +193,7 @@ class Fill_SendGoal_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._goal = Fill_Goal() if goal is None else goal
@@ -247,17 +251,17 @@ class Fill_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
     )
 
     accepted: bool
-    stamp: Time
+    stamp: _builtin_interfaces_msg.Time
 
     def __init__(
         self,
         accepted: bool = False,
-        stamp: Time | None = None,
+        stamp: _builtin_interfaces_msg.Time | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or accepted.__class__ is not bool) and _idlc.construct(
@@ -265,17 +269,14 @@ class Fill_SendGoal_Response(_idlc.Message):
         ):
             return
         self._accepted = accepted
-        if stamp is None:
-            self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
-        else:
-            self._stamp = stamp
+        self._stamp = _builtin_interfaces_msg.Time() if stamp is None else stamp
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_SendGoal_Response):
             return NotImplemented
-        if not _idlc.same(self._stamp, other._stamp):
+        if self._accepted != other._accepted:
             return False
-        return self._accepted == other._accepted
+        return _idlc.same(self._stamp, other._stamp)
 
 
 @_idlc.codec_for(Fill_SendGoal_Response)
@@ -323,7 +324,7 @@ class Fill_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<comments_msgs/Fill_SendGoal_Request, 1>",
@@ -331,23 +332,20 @@ class Fill_SendGoal_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[Fill_SendGoal_Request]
     response: list[Fill_SendGoal_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[Fill_SendGoal_Request] | None = None,
         response: list[Fill_SendGoal_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -488,13 +486,13 @@ class Fill_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
+    _fields_and_field_types = _idlc.table({"goal_id": "unique_identifier_msgs/UUID"})
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or goal_id is not None) and _idlc.construct(
@@ -502,7 +500,7 @@ class Fill_GetResult_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
 
@@ -553,7 +551,7 @@ class Fill_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"status": "int8", "result": "comments_msgs/Fill_Result"},
     )
 
@@ -576,7 +574,9 @@ class Fill_GetResult_Response(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_GetResult_Response):
             return NotImplemented
-        return self._status == other._status and self._result == other._result
+        if self._status != other._status:
+            return False
+        return self._result == other._result
 
 
 @_idlc.codec_for(Fill_GetResult_Response)
@@ -615,7 +615,7 @@ class Fill_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<comments_msgs/Fill_GetResult_Request, 1>",
@@ -623,23 +623,20 @@ class Fill_GetResult_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[Fill_GetResult_Request]
     response: list[Fill_GetResult_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[Fill_GetResult_Request] | None = None,
         response: list[Fill_GetResult_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -767,19 +764,19 @@ class Fill_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "goal_id": "unique_identifier_msgs/UUID",
             "feedback": "comments_msgs/Fill_Feedback",
         },
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     feedback: Fill_Feedback
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         feedback: Fill_Feedback | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -788,7 +785,7 @@ class Fill_FeedbackMessage(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._feedback = Fill_Feedback() if feedback is None else feedback

@@ -40,7 +40,7 @@ class Gauge(_idlc.Message):
         "covariance",
         "flags",
     )
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "rate": "float",
             "level": "uint8",
@@ -105,17 +105,18 @@ class Gauge(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Gauge):
             return NotImplemented
+        if (
+            self._rate != other._rate
+            or self._level != other._level
+            or self._label != other._label
+            or self._flags != other._flags
+        ):
+            return False
         if not _idlc.same(self._samples, other._samples):
             return False
         if not _idlc.same(self._covariance, other._covariance):
             return False
-        return (
-            self._rate == other._rate
-            and self._level == other._level
-            and self._label == other._label
-            and self._notes == other._notes
-            and self._flags == other._flags
-        )
+        return self._notes == other._notes
 
 
 @_idlc.codec_for(Gauge)

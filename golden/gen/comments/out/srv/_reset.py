@@ -9,7 +9,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from service_msgs.msg import ServiceEventInfo
+    import service_msgs.msg as _service_msgs_msg
+else:
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -21,7 +23,7 @@ class Reset_Request(_idlc.Message):
     """
 
     __match_args__ = ("reason",)
-    _fields_and_field_types = _idlc.frozen({"reason": "string"})
+    _fields_and_field_types = _idlc.table({"reason": "string"})
 
     reason: str
 
@@ -39,7 +41,7 @@ class Reset_Request(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Request):
             return NotImplemented
-        return self._reason == other._reason
+        return bool(self._reason == other._reason)
 
 
 @_idlc.codec_for(Reset_Request)
@@ -77,7 +79,7 @@ class Reset_Response(_idlc.Message):
     """
 
     __match_args__ = ("ok",)
-    _fields_and_field_types = _idlc.frozen({"ok": "boolean"})
+    _fields_and_field_types = _idlc.table({"ok": "boolean"})
 
     ok: bool
 
@@ -95,7 +97,7 @@ class Reset_Response(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Response):
             return NotImplemented
-        return self._ok == other._ok
+        return bool(self._ok == other._ok)
 
 
 @_idlc.codec_for(Reset_Response)
@@ -129,7 +131,7 @@ class Reset_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<comments_msgs/Reset_Request, 1>",
@@ -137,23 +139,20 @@ class Reset_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[Reset_Request]
     response: list[Reset_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[Reset_Request] | None = None,
         response: list[Reset_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 

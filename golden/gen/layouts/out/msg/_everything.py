@@ -58,7 +58,7 @@ class Everything(_idlc.Message):
         "weights",
         "last",
     )
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "flag": "boolean",
             "inner": "layouts_msgs/Inner",
@@ -149,6 +149,8 @@ class Everything(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Everything):
             return NotImplemented
+        if self._flag != other._flag or self._last != other._last:
+            return False
         if not _idlc.same(self._doubles, other._doubles):
             return False
         if not _idlc.same(self._shorts, other._shorts):
@@ -160,8 +162,7 @@ class Everything(_idlc.Message):
         if not _idlc.same(self._weights, other._weights):
             return False
         return (
-            self._flag == other._flag
-            and self._inner == other._inner
+            self._inner == other._inner
             and self._inners == other._inners
             and self._rows == other._rows
             and self._pair == other._pair
@@ -170,7 +171,6 @@ class Everything(_idlc.Message):
             and self._texts == other._texts
             and self._wides == other._wides
             and self._stamps == other._stamps
-            and self._last == other._last
         )
 
 

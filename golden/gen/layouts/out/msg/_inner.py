@@ -18,7 +18,7 @@ class Inner(_idlc.Message):
     """
 
     __match_args__ = ("a", "b", "c", "d")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"a": "uint8", "b": "double", "c": "string", "d": "wstring"},
     )
 
@@ -47,11 +47,11 @@ class Inner(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Inner):
             return NotImplemented
-        return (
-            self._a == other._a
-            and self._b == other._b
-            and self._c == other._c
-            and self._d == other._d
+        return not (
+            self._a != other._a
+            or self._b != other._b
+            or self._c != other._c
+            or self._d != other._d
         )
 
 

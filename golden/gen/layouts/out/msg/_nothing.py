@@ -11,7 +11,7 @@ class Nothing(_idlc.Message):
     """layouts_msgs/msg/Nothing."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.frozen({})
+    _fields_and_field_types = _idlc.table({})
 
     def __init__(
         self,

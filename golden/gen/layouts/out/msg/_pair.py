@@ -16,7 +16,7 @@ class Pair(_idlc.Message):
     """
 
     __match_args__ = ("key", "value")
-    _fields_and_field_types = _idlc.frozen({"key": "string", "value": "string"})
+    _fields_and_field_types = _idlc.table({"key": "string", "value": "string"})
 
     key: str
     value: str
@@ -37,7 +37,7 @@ class Pair(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Pair):
             return NotImplemented
-        return self._key == other._key and self._value == other._value
+        return not (self._key != other._key or self._value != other._value)
 
 
 @_idlc.codec_for(Pair)

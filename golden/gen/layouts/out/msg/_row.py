@@ -18,7 +18,7 @@ class Row(_idlc.Message):
     """
 
     __match_args__ = ("a", "b", "c")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"a": "uint32", "b": "uint16", "c": "uint8[3]"},
     )
 
@@ -47,9 +47,9 @@ class Row(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Row):
             return NotImplemented
-        if not _idlc.same(self._c, other._c):
+        if self._a != other._a or self._b != other._b:
             return False
-        return self._a == other._a and self._b == other._b
+        return _idlc.same(self._c, other._c)
 
 
 @_idlc.codec_for(Row)

@@ -20,7 +20,7 @@ class Texts(_idlc.Message):
     """
 
     __match_args__ = ("pairs", "few", "titled", "last")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "pairs": "sequence<layouts_msgs/Pair>",
             "few": "sequence<layouts_msgs/Pair, 2>",
@@ -54,11 +54,12 @@ class Texts(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Texts):
             return NotImplemented
+        if self._last != other._last:
+            return False
         return (
             self._pairs == other._pairs
             and self._few == other._few
             and self._titled == other._titled
-            and self._last == other._last
         )
 
 

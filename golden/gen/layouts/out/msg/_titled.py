@@ -19,7 +19,7 @@ class Titled(_idlc.Message):
     """
 
     __match_args__ = ("level", "title", "pairs", "number")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "level": "uint8",
             "title": "string",
@@ -53,12 +53,13 @@ class Titled(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Titled):
             return NotImplemented
-        return (
-            self._level == other._level
-            and self._title == other._title
-            and self._pairs == other._pairs
-            and self._number == other._number
-        )
+        if (
+            self._level != other._level
+            or self._title != other._title
+            or self._number != other._number
+        ):
+            return False
+        return self._pairs == other._pairs
 
 
 @_idlc.codec_for(Titled)

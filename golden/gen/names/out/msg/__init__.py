@@ -10,16 +10,18 @@ if TYPE_CHECKING:
     from ._any import Any
     from ._foo_bar import FOOBar
     from ._foo_bar_2 import FooBar
+    from ._hiding import Hiding
     from ._odd import Odd
     from ._point import Point
     from ._text import Text
 
-__all__ = ["Any", "FOOBar", "FooBar", "Odd", "Point", "Text"]
+__all__ = ["Any", "FOOBar", "FooBar", "Hiding", "Odd", "Point", "Text"]
 
 _MODULES = {
     "Any": "_any",
     "FOOBar": "_foo_bar",
     "FooBar": "_foo_bar_2",
+    "Hiding": "_hiding",
     "Odd": "_odd",
     "Point": "_point",
     "Text": "_text",

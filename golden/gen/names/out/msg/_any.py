@@ -20,7 +20,7 @@ class Any(_idlc.Message):
     """
 
     __match_args__ = ("pose",)
-    _fields_and_field_types = _idlc.frozen({"pose": "geometry_msgs/Pose"})
+    _fields_and_field_types = _idlc.table({"pose": "geometry_msgs/Pose"})
 
     pose: Pose
 

@@ -16,7 +16,7 @@ class FOOBar(_idlc.Message):
     """
 
     __match_args__ = ("inner",)
-    _fields_and_field_types = _idlc.frozen({"inner": "names_msgs/FooBar"})
+    _fields_and_field_types = _idlc.table({"inner": "names_msgs/FooBar"})
 
     inner: FooBar
 

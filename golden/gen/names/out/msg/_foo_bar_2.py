@@ -15,7 +15,7 @@ class FooBar(_idlc.Message):
     """
 
     __match_args__ = ("a",)
-    _fields_and_field_types = _idlc.frozen({"a": "int32"})
+    _fields_and_field_types = _idlc.table({"a": "int32"})
 
     a: int
 
@@ -33,7 +33,7 @@ class FooBar(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, FooBar):
             return NotImplemented
-        return self._a == other._a
+        return bool(self._a == other._a)
 
 
 @_idlc.codec_for(FooBar)

@@ -16,7 +16,7 @@ class Point(_idlc.Message):
     """
 
     __match_args__ = ("x", "y")
-    _fields_and_field_types = _idlc.frozen({"x": "double", "y": "double"})
+    _fields_and_field_types = _idlc.table({"x": "double", "y": "double"})
 
     x: float
     y: float
@@ -37,7 +37,7 @@ class Point(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Point):
             return NotImplemented
-        return self._x == other._x and self._y == other._y
+        return not (self._x != other._x or self._y != other._y)
 
 
 @_idlc.codec_for(Point)

@@ -24,7 +24,7 @@ class Text(_idlc.Message):
     """
 
     __match_args__ = ("other", "own", "any")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "other": "geometry_msgs/Point",
             "own": "names_msgs/Point",

@@ -9,7 +9,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from service_msgs.msg import ServiceEventInfo
+    import service_msgs.msg as _service_msgs_msg
+else:
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -17,7 +19,7 @@ class None_Request(_idlc.Message):
     """names_msgs/srv/None_Request."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.frozen({})
+    _fields_and_field_types = _idlc.table({})
 
     def __init__(
         self,
@@ -56,7 +58,7 @@ class None_Response(_idlc.Message):
     """names_msgs/srv/None_Response."""
 
     __match_args__ = ()
-    _fields_and_field_types = _idlc.frozen({})
+    _fields_and_field_types = _idlc.table({})
 
     def __init__(
         self,
@@ -101,7 +103,7 @@ class None_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<names_msgs/None_Request, 1>",
@@ -109,23 +111,20 @@ class None_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[None_Request]
     response: list[None_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[None_Request] | None = None,
         response: list[None_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 

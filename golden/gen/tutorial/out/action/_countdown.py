@@ -9,9 +9,13 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from builtin_interfaces.msg import Time
-    from service_msgs.msg import ServiceEventInfo
-    from unique_identifier_msgs.msg import UUID
+    import builtin_interfaces.msg as _builtin_interfaces_msg
+    import service_msgs.msg as _service_msgs_msg
+    import unique_identifier_msgs.msg as _unique_identifier_msgs_msg
+else:
+    _builtin_interfaces_msg = _idlc.Package("builtin_interfaces.msg")
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
+    _unique_identifier_msgs_msg = _idlc.Package("unique_identifier_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -23,7 +27,7 @@ class Countdown_Goal(_idlc.Message):
     """
 
     __match_args__ = ("target_count",)
-    _fields_and_field_types = _idlc.frozen({"target_count": "int32"})
+    _fields_and_field_types = _idlc.table({"target_count": "int32"})
 
     target_count: int
 
@@ -41,7 +45,7 @@ class Countdown_Goal(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Goal):
             return NotImplemented
-        return self._target_count == other._target_count
+        return bool(self._target_count == other._target_count)
 
 
 @_idlc.codec_for(Countdown_Goal)
@@ -74,7 +78,7 @@ class Countdown_Result(_idlc.Message):
     """
 
     __match_args__ = ("final_count", "success")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"final_count": "int32", "success": "boolean"},
     )
 
@@ -97,8 +101,8 @@ class Countdown_Result(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Result):
             return NotImplemented
-        return (
-            self._final_count == other._final_count and self._success == other._success
+        return not (
+            self._final_count != other._final_count or self._success != other._success
         )
 
 
@@ -131,7 +135,7 @@ class Countdown_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("current_count",)
-    _fields_and_field_types = _idlc.frozen({"current_count": "int32"})
+    _fields_and_field_types = _idlc.table({"current_count": "int32"})
 
     current_count: int
 
@@ -149,7 +153,7 @@ class Countdown_Feedback(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Feedback):
             return NotImplemented
-        return self._current_count == other._current_count
+        return bool(self._current_count == other._current_count)
 
 
 @_idlc.codec_for(Countdown_Feedback)
@@ -181,19 +185,19 @@ class Countdown_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "goal_id": "unique_identifier_msgs/UUID",
             "goal": "tutorial_msgs/Countdown_Goal",
         },
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     goal: Countdown_Goal
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         goal: Countdown_Goal | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -202,7 +206,7 @@ class Countdown_SendGoal_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._goal = Countdown_Goal() if goal is None else goal
@@ -264,17 +268,17 @@ class Countdown_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
     )
 
     accepted: bool
-    stamp: Time
+    stamp: _builtin_interfaces_msg.Time
 
     def __init__(
         self,
         accepted: bool = False,
-        stamp: Time | None = None,
+        stamp: _builtin_interfaces_msg.Time | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or accepted.__class__ is not bool) and _idlc.construct(
@@ -282,17 +286,14 @@ class Countdown_SendGoal_Response(_idlc.Message):
         ):
             return
         self._accepted = accepted
-        if stamp is None:
-            self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
-        else:
-            self._stamp = stamp
+        self._stamp = _builtin_interfaces_msg.Time() if stamp is None else stamp
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_SendGoal_Response):
             return NotImplemented
-        if not _idlc.same(self._stamp, other._stamp):
+        if self._accepted != other._accepted:
             return False
-        return self._accepted == other._accepted
+        return _idlc.same(self._stamp, other._stamp)
 
 
 @_idlc.codec_for(Countdown_SendGoal_Response)
@@ -342,7 +343,7 @@ class Countdown_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<tutorial_msgs/Countdown_SendGoal_Request, 1>",
@@ -350,23 +351,20 @@ class Countdown_SendGoal_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[Countdown_SendGoal_Request]
     response: list[Countdown_SendGoal_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[Countdown_SendGoal_Request] | None = None,
         response: list[Countdown_SendGoal_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -509,13 +507,13 @@ class Countdown_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
+    _fields_and_field_types = _idlc.table({"goal_id": "unique_identifier_msgs/UUID"})
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or goal_id is not None) and _idlc.construct(
@@ -523,7 +521,7 @@ class Countdown_GetResult_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
 
@@ -576,7 +574,7 @@ class Countdown_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"status": "int8", "result": "tutorial_msgs/Countdown_Result"},
     )
 
@@ -599,7 +597,9 @@ class Countdown_GetResult_Response(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_GetResult_Response):
             return NotImplemented
-        return self._status == other._status and self._result == other._result
+        if self._status != other._status:
+            return False
+        return self._result == other._result
 
 
 @_idlc.codec_for(Countdown_GetResult_Response)
@@ -646,7 +646,7 @@ class Countdown_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<tutorial_msgs/Countdown_GetResult_Request, 1>",
@@ -654,23 +654,20 @@ class Countdown_GetResult_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[Countdown_GetResult_Request]
     response: list[Countdown_GetResult_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[Countdown_GetResult_Request] | None = None,
         response: list[Countdown_GetResult_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -814,19 +811,19 @@ class Countdown_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "goal_id": "unique_identifier_msgs/UUID",
             "feedback": "tutorial_msgs/Countdown_Feedback",
         },
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     feedback: Countdown_Feedback
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         feedback: Countdown_Feedback | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -835,7 +832,7 @@ class Countdown_FeedbackMessage(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._feedback = Countdown_Feedback() if feedback is None else feedback

@@ -9,9 +9,13 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from builtin_interfaces.msg import Time
-    from service_msgs.msg import ServiceEventInfo
-    from unique_identifier_msgs.msg import UUID
+    import builtin_interfaces.msg as _builtin_interfaces_msg
+    import service_msgs.msg as _service_msgs_msg
+    import unique_identifier_msgs.msg as _unique_identifier_msgs_msg
+else:
+    _builtin_interfaces_msg = _idlc.Package("builtin_interfaces.msg")
+    _service_msgs_msg = _idlc.Package("service_msgs.msg")
+    _unique_identifier_msgs_msg = _idlc.Package("unique_identifier_msgs.msg")
 
 
 @_idlc.dataclass(init=False, kw_only=True)
@@ -23,7 +27,7 @@ class ExecuteTask_Goal(_idlc.Message):
     """
 
     __match_args__ = ("task_name",)
-    _fields_and_field_types = _idlc.frozen({"task_name": "string"})
+    _fields_and_field_types = _idlc.table({"task_name": "string"})
 
     task_name: str
 
@@ -41,7 +45,7 @@ class ExecuteTask_Goal(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Goal):
             return NotImplemented
-        return self._task_name == other._task_name
+        return bool(self._task_name == other._task_name)
 
 
 @_idlc.codec_for(ExecuteTask_Goal)
@@ -79,7 +83,7 @@ class ExecuteTask_Result(_idlc.Message):
     """
 
     __match_args__ = ("success",)
-    _fields_and_field_types = _idlc.frozen({"success": "boolean"})
+    _fields_and_field_types = _idlc.table({"success": "boolean"})
 
     success: bool
 
@@ -97,7 +101,7 @@ class ExecuteTask_Result(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Result):
             return NotImplemented
-        return self._success == other._success
+        return bool(self._success == other._success)
 
 
 @_idlc.codec_for(ExecuteTask_Result)
@@ -129,7 +133,7 @@ class ExecuteTask_Feedback(_idlc.Message):
     """
 
     __match_args__ = ("current_status",)
-    _fields_and_field_types = _idlc.frozen({"current_status": "string"})
+    _fields_and_field_types = _idlc.table({"current_status": "string"})
 
     current_status: str
 
@@ -147,7 +151,7 @@ class ExecuteTask_Feedback(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Feedback):
             return NotImplemented
-        return self._current_status == other._current_status
+        return bool(self._current_status == other._current_status)
 
 
 @_idlc.codec_for(ExecuteTask_Feedback)
@@ -192,19 +196,19 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "goal")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "goal_id": "unique_identifier_msgs/UUID",
             "goal": "tutorial_msgs/ExecuteTask_Goal",
         },
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     goal: ExecuteTask_Goal
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         goal: ExecuteTask_Goal | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -213,7 +217,7 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._goal = ExecuteTask_Goal() if goal is None else goal
@@ -287,17 +291,17 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
     """
 
     __match_args__ = ("accepted", "stamp")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"accepted": "boolean", "stamp": "builtin_interfaces/Time"},
     )
 
     accepted: bool
-    stamp: Time
+    stamp: _builtin_interfaces_msg.Time
 
     def __init__(
         self,
         accepted: bool = False,
-        stamp: Time | None = None,
+        stamp: _builtin_interfaces_msg.Time | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or accepted.__class__ is not bool) and _idlc.construct(
@@ -305,17 +309,14 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):
         ):
             return
         self._accepted = accepted
-        if stamp is None:
-            self._stamp = _idlc.make("builtin_interfaces.msg", "Time")
-        else:
-            self._stamp = stamp
+        self._stamp = _builtin_interfaces_msg.Time() if stamp is None else stamp
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Response):
             return NotImplemented
-        if not _idlc.same(self._stamp, other._stamp):
+        if self._accepted != other._accepted:
             return False
-        return self._accepted == other._accepted
+        return _idlc.same(self._stamp, other._stamp)
 
 
 @_idlc.codec_for(ExecuteTask_SendGoal_Response)
@@ -365,7 +366,7 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<tutorial_msgs/ExecuteTask_SendGoal_Request, 1>",
@@ -373,23 +374,20 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[ExecuteTask_SendGoal_Request]
     response: list[ExecuteTask_SendGoal_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[ExecuteTask_SendGoal_Request] | None = None,
         response: list[ExecuteTask_SendGoal_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -549,13 +547,13 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
     """
 
     __match_args__ = ("goal_id",)
-    _fields_and_field_types = _idlc.frozen({"goal_id": "unique_identifier_msgs/UUID"})
+    _fields_and_field_types = _idlc.table({"goal_id": "unique_identifier_msgs/UUID"})
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or goal_id is not None) and _idlc.construct(
@@ -563,7 +561,7 @@ class ExecuteTask_GetResult_Request(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
 
@@ -616,7 +614,7 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
     """
 
     __match_args__ = ("status", "result")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {"status": "int8", "result": "tutorial_msgs/ExecuteTask_Result"},
     )
 
@@ -639,7 +637,9 @@ class ExecuteTask_GetResult_Response(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Response):
             return NotImplemented
-        return self._status == other._status and self._result == other._result
+        if self._status != other._status:
+            return False
+        return self._result == other._result
 
 
 @_idlc.codec_for(ExecuteTask_GetResult_Response)
@@ -679,7 +679,7 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
     """
 
     __match_args__ = ("info", "request", "response")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "info": "service_msgs/ServiceEventInfo",
             "request": "sequence<tutorial_msgs/ExecuteTask_GetResult_Request, 1>",
@@ -687,23 +687,20 @@ class ExecuteTask_GetResult_Event(_idlc.Message):
         },
     )
 
-    info: ServiceEventInfo
+    info: _service_msgs_msg.ServiceEventInfo
     request: list[ExecuteTask_GetResult_Request]
     response: list[ExecuteTask_GetResult_Response]
 
     def __init__(
         self,
-        info: ServiceEventInfo | None = None,
+        info: _service_msgs_msg.ServiceEventInfo | None = None,
         request: list[ExecuteTask_GetResult_Request] | None = None,
         response: list[ExecuteTask_GetResult_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if (options or info is not None) and _idlc.construct(self, options, locals()):
             return
-        if info is None:
-            self._info = _idlc.make("service_msgs.msg", "ServiceEventInfo")
-        else:
-            self._info = info
+        self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
 
@@ -838,19 +835,19 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
     """
 
     __match_args__ = ("goal_id", "feedback")
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "goal_id": "unique_identifier_msgs/UUID",
             "feedback": "tutorial_msgs/ExecuteTask_Feedback",
         },
     )
 
-    goal_id: UUID
+    goal_id: _unique_identifier_msgs_msg.UUID
     feedback: ExecuteTask_Feedback
 
     def __init__(
         self,
-        goal_id: UUID | None = None,
+        goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         feedback: ExecuteTask_Feedback | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
@@ -859,7 +856,7 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):
         ):
             return
         if goal_id is None:
-            self._goal_id = _idlc.make("unique_identifier_msgs.msg", "UUID")
+            self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
             self._goal_id = goal_id
         self._feedback = ExecuteTask_Feedback() if feedback is None else feedback

@@ -26,7 +26,7 @@ class RobotCommand(_idlc.Message):
         "angular_velocity_z",
         "frame_id",
     )
-    _fields_and_field_types = _idlc.frozen(
+    _fields_and_field_types = _idlc.table(
         {
             "command_type": "string",
             "linear_velocity_x": "float",
@@ -64,11 +64,11 @@ class RobotCommand(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, RobotCommand):
             return NotImplemented
-        return (
-            self._command_type == other._command_type
-            and self._linear_velocity_x == other._linear_velocity_x
-            and self._angular_velocity_z == other._angular_velocity_z
-            and self._frame_id == other._frame_id
+        return not (
+            self._command_type != other._command_type
+            or self._linear_velocity_x != other._linear_velocity_x
+            or self._angular_velocity_z != other._angular_velocity_z
+            or self._frame_id != other._frame_id
         )
 
 

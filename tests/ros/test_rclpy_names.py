@@ -1,0 +1,20 @@
+"""Fields and messages whose names Python or messages need themselves, on the real rclpy."""
+
+import subprocess
+import sys
+
+import generated
+import test_citizens
+from installed import HERE
+
+
+def test_names_that_are_taken_are_free_in_ros(tmp_path, ros_environment):
+    generated.write_package(tmp_path, "hiding_msgs", test_citizens.HIDING_FILES)
+    done = subprocess.run(
+        [sys.executable, str(HERE / "citizens.py")],
+        env={**ros_environment, "PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
