@@ -1,4 +1,5 @@
-# Everything that a developer does. Needs Python 3.10 or newer, make and a package index.
+# Everything that a developer does. Needs Python 3.10 or newer, make and a package index; the tests of
+# type support need a C compiler as well.
 #
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
