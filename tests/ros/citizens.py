@@ -17,6 +17,7 @@ from hiding_msgs.action import False_
 from hiding_msgs.msg import Hiding, None_, Part, True_
 from hiding_msgs.srv import None_ as NoneService
 from rclpy.serialization import deserialize_message, serialize_message
+from structs_side import Memory
 
 PATIENCE = 60.0
 HIDING = Hiding(1, 2, [3.5], "4", [5, 6, 7], True, [Part(1, 2)], Part(6), 8, 9)
@@ -50,10 +51,15 @@ def check_structs():
     from hiding_msgs._idlc import typesupport_structs as structs
 
     for message in (HIDING, TRUE):
-        name = f"hiding_msgs/msg/{type(message).__name__.rstrip('_')}"
-        memory = structs.message(type(message), name).memory()
-        assert message @ memory
-        assert +memory == message
+        memory = Memory(structs.message(type(message), wire_name(type(message))))
+        place = memory.create()
+        assert memory.store(message, place)
+        assert memory.fetch(place) == message
+        memory.destroy(place)
+
+
+def wire_name(cls):
+    return f"hiding_msgs/msg/{cls.__name__.rstrip('_')}"
 
 
 def spin(node, condition):
