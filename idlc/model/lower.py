@@ -80,13 +80,14 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
         at = file.separators[needed]
         span = Span(file.source, at, at + 3)
         hint = "remove it" if needed else "put services in .srv and actions in .action files"
-        report.add(codes.SEPARATOR_COUNT.at(span, f"{rule}, this is one more", hint=hint))
+        message = f"{rule}; this is one more" if needed else rule
+        report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
     else:
         end = len(file.source.text)
         report.add(
             codes.SEPARATOR_COUNT.at(
                 Span(file.source, end, end),
-                f"{rule}, this one has {_NUMBERS[count]}",
+                f"{rule}; this file has {_NUMBERS[count] if count else 'none'}",
                 hint="write `---` on a line of its own between the parts",
             )
         )
@@ -95,7 +96,7 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 def _has_near_separator(file: tree.File, expected: int) -> bool:
     """Tell whether some line was meant as a separator and is reported as such.
 
-    What stands behind the `expected` sections is not looked at any more.
+    What comes after the `expected` sections is not looked at any more.
     """
     if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
         return True

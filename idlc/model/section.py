@@ -6,7 +6,7 @@ from itertools import takewhile
 
 import msgspec
 
-from idlc.model import ir, names
+from idlc.model import ir, names, slips
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.fault import Fault
 from idlc.model.literals import Text, default, scalar
@@ -98,7 +98,10 @@ class _Section:
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
             body = parse_definition(text)
-            if isinstance(body, tree.Broken):
+            slip = slips.slip(text, body, self.name.kind)
+            if slip is not None:
+                self._add(line, 0, slip)
+            elif isinstance(body, tree.Broken):
                 self._broken(line, body)
             else:
                 self._warn_hash(line, text)
@@ -143,6 +146,11 @@ class _Section:
     def _add(self, line: tree.Line, offset: int, fault: Fault) -> None:
         piece = tree.Piece(" " * max(fault.end - fault.start, 0), offset + fault.start)
         self.report.add(fault.code.at(self.file.span(line, piece), fault.message, hint=fault.hint))
+
+    def _add_value(self, line: tree.Line, piece: tree.Piece, fault: Fault) -> None:
+        if slips.has_comment(piece.text):
+            fault = msgspec.structs.replace(fault, hint=slips.COMMENT_HINT)
+        self._add(line, piece.start, fault)
 
     def _type(self, line: tree.Line, type_: tree.Type) -> ir.FieldType:
         lowered = lower_type(type_, self.name.package)
@@ -199,7 +207,7 @@ class _Section:
             return None
         found = default(type_, piece.text)
         if isinstance(found, Fault):
-            self._add(line, piece.start, found)
+            self._add_value(line, piece, found)
             return None
         return found
 
@@ -219,7 +227,7 @@ class _Section:
             return None
         value = scalar(type_, body.value.text)
         if isinstance(value, Fault):
-            self._add(line, body.value.start, value)
+            self._add_value(line, body.value, value)
             return None
         return ir.Constant(
             name=body.name.text,
