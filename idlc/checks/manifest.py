@@ -18,16 +18,18 @@ from idlc.text.source import Span
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
 #: What rosidl adds by itself.
 _IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
-#: What a package.xml begins with; dependencies come behind it.
+#: What a package.xml begins with; dependencies come after it.
 _HEAD = frozenset(("name", "version", "description", "maintainer", "license", "url", "author"))
 _GROUP = "rosidl_interface_packages"
-_GENERATORS = "rosidl_default_generators"
-_RUNTIME = "rosidl_default_runtime"
+#: The packages that generate interfaces, and those that generated code needs, usual first.
+_GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
+_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime")
 
 
 def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """Packages whose messages are used are declared."""
-    declared = facts.declared(*_NEEDED)
+    # what CMake does not install is there for the package's own tests
+    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
     seen = {facts.name, *declared}
     for message in sections(model):
         for field in message.fields:
@@ -80,12 +82,12 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
     if not (facts.generates and model.own):
         return
     missing = [
-        (package, f"<{tag}>{package}</{tag}>")
-        for package, tag, others in (
+        (packages[0], f"<{tag}>{packages[0]}</{tag}>")
+        for packages, tag, others in (
             (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
             (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
         )
-        if package not in facts.declared(*others)
+        if facts.declared(*others).keys().isdisjoint(packages)
     ]
     if missing:
         needed = " and ".join(f"`{package}`" for package, _ in missing)
@@ -116,7 +118,7 @@ def declared_imports(facts: Facts, _: Model, report: Report) -> None:
 
 
 def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
-    """Return a problem with the edits that add lines to package.xml, each behind its like."""
+    """Return a problem with the edits that add lines to package.xml, each after its like."""
     edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
     return msgspec.structs.replace(found, edits=edits)
 

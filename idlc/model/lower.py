@@ -11,7 +11,7 @@ from idlc.model.section import lower_section
 from idlc.syntax import tree
 from idlc.syntax.escapes import EscapeError, through_idl
 from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.diagnostics import Diagnostic, Edit, Report
 from idlc.text.source import Span
 
 SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
@@ -50,13 +50,12 @@ def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
 def _check_reading(file: tree.File, report: Report) -> None:
     source = file.source
     if source.text.startswith(tree.BYTE_ORDER_MARK):
-        report.add(
-            codes.BYTE_ORDER_MARK.at(
-                Span(source, 0, 1),
-                "the file begins with a byte order mark",
-                hint="save it as UTF-8 without a byte order mark",
-            )
+        found = codes.BYTE_ORDER_MARK.at(
+            Span(source, 0, 1),
+            "the file begins with a byte order mark",
+            hint="save it as UTF-8 without a byte order mark",
         )
+        report.add(msgspec.structs.replace(found, edits=(Edit(Span(source, 0, 1), ""),)))
     for section in file.sections:
         for line in section.lines:
             if line.newline and line.newline not in ("\n", "\r\n", "\r"):

@@ -14,7 +14,7 @@ from idlc.model.types import STRINGS, as_parsed, lower_type
 from idlc.syntax import tree
 from idlc.syntax.parse import parse_definition
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Edit, Report
 from idlc.text.source import Span
 
 _BROKEN = {
@@ -128,7 +128,20 @@ class _Section:
 
     def _broken(self, line: tree.Line, body: tree.Broken) -> None:
         span = self.file.span(line, body.piece)
-        self.report.add(_BROKEN[body.slug].at(span, body.message, hint=body.hint))
+        found = _BROKEN[body.slug].at(span, body.message, hint=body.hint)
+        self.report.add(msgspec.structs.replace(found, edits=self._edits(line, body, span)))
+
+    def _edits(self, line: tree.Line, body: tree.Broken, span: Span) -> tuple[Edit, ...]:
+        """Return the edit that makes a broken line what it was meant to be, if that is sure."""
+        if body.slug == codes.INDENTED_DEFINITION.slug:
+            return (Edit(span, ""),)
+        if not _is_dashes(line) or line.comment:
+            return ()
+        lines = [one for section in self.file.sections for one in section.lines]
+        count = len(self.file.separators) + sum(map(_is_dashes, lines))
+        if count != ir.KINDS.index(self.name.kind):
+            return ()
+        return (Edit(Span(span.source, line.start, line.start + len(line.code)), "---"),)
 
     def _warn_hash(self, line: tree.Line, text: str) -> None:
         """Warn when a comment begins between quotes that the writer saw as a pair."""
@@ -253,6 +266,10 @@ class _Section:
             )
         )
         return None
+
+
+def _is_dashes(line: tree.Line) -> bool:
+    return bool(line.definition) and not line.definition.strip("-")
 
 
 def _head_text(line: tree.Line) -> str:

@@ -87,14 +87,19 @@ def dotted(name: str) -> str | None:
     return f"{parts[0]}/{parts[-1]}" if fits and parts[1:-1] in ([], ["msg"]) else None
 
 
+def is_comment(text: str) -> bool:
+    """Return whether a text begins with what begins a comment in other languages."""
+    return text.startswith(_COMMENTS)
+
+
 def has_comment(value: str) -> bool:
     """Return whether a value is, or ends in, a comment as other languages have it."""
-    return any(part.startswith(_COMMENTS) for part in value.split(" "))
+    return any(map(is_comment, value.split(" ")))
 
 
 def slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
     """Return what is wrong with a line as a whole, so that nothing else need be said about it."""
-    if text.startswith(_COMMENTS):
+    if is_comment(text):
         message = f"`{text[:2]}` does not begin a comment"
         return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
     if isinstance(body, tree.Broken):
