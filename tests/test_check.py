@@ -506,6 +506,36 @@ def test_the_core_generators_will_do(capsys):
     assert codes(capsys, "demo") == []
 
 
+def test_generators_that_everybody_gets_bring_their_runtime(capsys):
+    manifest = (
+        '<package format="3">\n  <name>demo</name>\n  <depend>rosidl_default_generators</depend>\n'
+        "  <member_of_group>rosidl_interface_packages</member_of_group>\n</package>\n"
+    )
+    write(
+        {
+            "demo/package.xml": manifest,
+            "demo/CMakeLists.txt": "rosidl_generate_interfaces(demo msg/A.msg)\n",
+            "demo/msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys, "demo") == []
+    write({"demo/package.xml": manifest.replace("depend>", "build_depend>")})
+    assert codes(capsys, "demo") == ["IDL454"]
+
+
+def test_nothing_is_unused_where_not_all_is_known(capsys):
+    write(
+        {
+            "demo/package.xml": '<package format="3">\n  <name>demo</name>\n'
+            "  <depend>std_msgs</depend>\n</package>\n",
+            "demo/msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys, "demo") == ["IDL452"]
+    write({"demo/msg/A.msg": "Header a\n"})
+    assert codes(capsys, "demo") == ["IDL201"]
+
+
 def test_a_file_with_capitals_in_its_extension_is_named(capsys):
     write({"demo/msg/A.msg": "int8 a\n", "demo/msg/B.MSG": "int8 b\n"})
     assert codes(capsys, "demo") == ["IDL622"]

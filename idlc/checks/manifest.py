@@ -23,7 +23,7 @@ _HEAD = frozenset(("name", "version", "description", "maintainer", "license", "u
 _GROUP = "rosidl_interface_packages"
 #: The packages that generate interfaces, and those that generated code needs, usual first.
 _GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
-_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime")
+_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 
 
 def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
@@ -49,7 +49,7 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """A package of interfaces alone declares no interfaces that it does not use."""
-    if facts.modules or facts.native or not facts.whole:
+    if facts.modules or facts.native or not facts.whole or _has_gaps(model):
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
@@ -61,6 +61,17 @@ def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
                     hint="remove the line",
                 )
             )
+
+
+def _has_gaps(model: Model) -> bool:
+    """Return whether some field is of a type that is not known, and may be of any package."""
+    elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
+    return any(
+        element.target not in model.interfaces
+        if isinstance(element, ir.Ref)
+        else isinstance(element, ir.Unknown)
+        for element in elements
+    )
 
 
 def interface_group(facts: Facts, model: Model, report: Report) -> None:
