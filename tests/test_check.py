@@ -327,7 +327,7 @@ def test_entry_points(capsys):
     )
     _, out = check(capsys)
     assert re.findall(r"IDL457\]: (.*)", out) == [
-        "`nowhere` is no entry point",
+        "`nowhere` is not an entry point",
         "there is no Python package `nodes` here",
         "there is no module `demo.noode`",
         "`demo/node.py` has no `run`",

@@ -117,6 +117,7 @@ def test_what_a_hint_says_to_write_is_right(line, right):
         ("vector<float> a", "`TYPE[]`"),
         ("std::vector<float> a", "`TYPE[]`"),
         ("dict a", "no maps"),
+        ("Cfg_Block a", "write `CfgBlock`"),
         ("enum a", "no enums"),
         ("Do a", "`Do` is a service"),
         ("std_srvs/SetBool a", "`SetBool` is a service"),

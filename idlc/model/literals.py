@@ -95,12 +95,12 @@ def _integer(type_: ir.Primitive, text: str) -> int | Fault:
     value = _int(text) if len(text) > LONG or _shape("INTEGER").fullmatch(text) else None
     if value is None:
         message = f"{_shown(text)} is not an integer" if text else "the value is missing"
-        hint = "write decimal digits, or `0x`, `0o`, `0b` and digits"
+        hint = "write a number such as `10`, `-3`, `0xff` or `0b101`"
         return _fault(codes.BAD_VALUE, text, message, hint)
     if info.low is None or info.high is None or info.low <= value <= info.high:
         return value
     hint = f"{type_.name} holds {info.low} to {info.high}"
-    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} does not fit {type_.name}", hint)
+    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} is out of range", hint)
 
 
 def _real(text: str) -> float | None:

@@ -77,8 +77,8 @@ def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
         if dotted := slips.dotted(name):
             message = f"`{name}` cannot be a type name"
             return _fault(codes.TYPE_NAME, piece, message, f"write `{dotted}`")
-    capitalised = name[:1].upper() + name[1:]
-    hint = f"write `{capitalised}`" if names.is_message_name(capitalised) else names.MESSAGE_HINT
+    like = names.message_name_like(name)
+    hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
     return _fault(codes.TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 
