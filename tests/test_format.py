@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from random import Random
 
 import pytest
 import rosidl_view
@@ -189,11 +190,43 @@ def laid_out_lines(draw):
 @example("AB=1\n", False)
 @example("int8 AB=1\nint8 A = 1\n", False)
 @example("# head\x0b  # more\n", True)
+@example("string A=1\nstring B=\t1\nstring C\t=1\n", False)
 def test_layout_invented_by_chance_keeps_the_content(text, is_service):
     if is_service:
         text += "---\n" + text
     if not content(text, "srv" if is_service else "msg")[-1]:
         assert_only_the_layout_changes(text, "srv" if is_service else "msg")
+
+
+GAPS = ["", " ", " ", "  ", "   ", "\t", " \t", "      "]
+
+
+def untidy_line(random):
+    """Return a line of no more words than a line has, with any gaps between them."""
+    gap, blank = lambda: random.choice(GAPS), lambda: random.choice(GAPS[1:])
+    name = random.choice(["a", "bc", "def_g", "long_name"])
+    comment = random.choice(["", "", f"{gap()}# x"])
+    match random.randrange(10):
+        case 0:
+            return random.choice(["", "# comment"])
+        case 1:
+            return f"{blank()}# more"
+        case 2 | 3 | 4:
+            return f"{random.choice(['int8', 'uint16[]'])}{blank()}{name}{comment}"
+        case 5:
+            return f"int8{blank()}{name}{blank()}{random.choice(['1', '-30'])}{comment}"
+    value = random.choice(["1", "20", "-300"])
+    type_ = random.choice(["int8", "float32"])
+    return f"{type_}{blank()}{name.upper()}{gap()}={gap()}{value}{comment}"
+
+
+def test_laying_out_twice_is_laying_out_once():
+    random = Random(5)
+    for _ in range(1000):
+        text = "".join(f"{untidy_line(random)}\n" for _ in range(random.randint(1, 9)))
+        once = formatted(text)
+        assert formatted(once) == once, text
+        assert "".join(once.split()) == "".join(text.split())
 
 
 WORDS = st.sampled_from(["a", "speed", "x_of_the_robot", "temperature"])

@@ -119,7 +119,8 @@ def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[
     for found in kinds:
         columns = _columns(found)
         for _, word in found:
-            word.keeps_column = word.is_wide or not columns.isdisjoint(word.edges)
+            in_column = bool(word.gap) and not columns.isdisjoint(word.edges)
+            word.keeps_column = word.is_wide or in_column
     for row in rows.values():
         _balance(row)
     for found in kinds:
@@ -206,7 +207,8 @@ def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
 
 
 def _usual(words: _Column) -> str:
-    """Return the narrow gap that a section has most often before such words."""
-    narrow = NARROW[words[0][1].kind] if words else ("",)
+    """Return the narrow gap before words of a kind: of those before comments the most common."""
+    if not words or words[0][1].kind != "comment":
+        return " "  # where `=` has a stray gap, it has one on either side
     counts = Counter(word.gap for _, word in words)
-    return max(narrow, key=lambda gap: counts[gap])
+    return max(NARROW["comment"], key=lambda gap: counts[gap])
