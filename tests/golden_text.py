@@ -61,11 +61,16 @@ def write(case: Case, found: dict[str, str]) -> str:
     return case.head + "".join(f"-- {name} --\n{text}" for name, text in sections.items())
 
 
+def only_rclpy(package: str) -> list[Path]:
+    """Stand for a Python in which nodes run and no interfaces are installed."""
+    return [Path("/nowhere")] if package == "rclpy" else []
+
+
 def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
     """Return what each expected section should hold, made independent of idlc's version."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("idlc.disk.surroundings.ament_prefixes", lambda: ())
-    monkeypatch.setattr("idlc.disk.surroundings.python_folders", lambda _: [])
+    monkeypatch.setattr("idlc.disk.surroundings.python_folders", only_rclpy)
     for path, text in case.files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""`idlc check`: what is shown, in which format, and what is mended."""
+"""`idlc check`: what is shown, in which format, and what is fixed."""
 
 import json
 import re
@@ -140,7 +140,7 @@ def test_text_of_unknown_origin_does_no_harm_in_any_format(style, capsys):
 @pytest.mark.parametrize("style", ["github", "gitlab", "junit", "sarif"])
 def test_a_problem_without_a_place_has_one_in_each_format(style, capsys):
     write({"demo/msg/DriveMsg.msg": "int8 a\n"})
-    status, out = check(capsys, "demo", "--format", style)
+    status, out = check(capsys, "demo", "--format", style, "--select", "redundant-suffix")
     assert status == 0
     assert "IDL407" in out
     assert "demo/msg/DriveMsg.msg" in out
@@ -203,7 +203,7 @@ PACKAGE_XML = """<?xml version="1.0"?>
 """
 
 
-def test_what_can_be_mended_is_mended_once_and_nothing_else_changes(capsys):
+def test_what_can_be_fixed_is_fixed_once_and_nothing_else_changes(capsys):
     write(
         {
             "package.xml": PACKAGE_XML,
@@ -212,11 +212,11 @@ def test_what_can_be_mended_is_mended_once_and_nothing_else_changes(capsys):
             "std_msgs/Header h\ngeometry_msgs/Pose p # idlc: ignore[IDL401] no longer true\n",
         }
     )
-    status, out = check(capsys, "--fix")
+    status, out = check(capsys, "--fix", "--select", "correctness,portability,package,IDL401")
     assert status == 0
-    assert out == "7 problems mended, no problems in 1 file\n"
+    assert out == "7 problems fixed, no problems in 1 file\n"
     assert Path("msg/A.msg").read_text() == (
-        "# char is a word\nuint8[3]   a\nuint8  B=5  # a char\n"
+        "# char is a word\nuint8[3]  a\nuint8 B=5  # a char\n"
         "std_msgs/Header h\ngeometry_msgs/Pose p\n"
     )
     assert Path("package.xml").read_text() == PACKAGE_XML.replace(
@@ -327,7 +327,7 @@ def test_entry_points(capsys):
     )
     _, out = check(capsys)
     assert re.findall(r"IDL457\]: (.*)", out) == [
-        "`nowhere` is no entry point",
+        "`nowhere` is not an entry point",
         "there is no Python package `nodes` here",
         "there is no module `demo.noode`",
         "`demo/node.py` has no `run`",
@@ -351,3 +351,192 @@ def test_every_lint_rule_is_asked():
     rules = {*LINT_RULES, *PACKAGE_RULES}
     advice = {code for code in CODES if "IDL400" < code < "IDL490"}
     assert len(rules) == len(advice) == 21
+
+
+def test_what_is_sure_of_a_broken_file_is_fixed(capsys):
+    write(
+        {
+            "demo/msg/A.msg": "\ufeff# head\n  float64 a\n\tint8 b # c\n",
+            "demo/srv/B.srv": "int8 a\n-----\nint8 b\n",
+            "demo/action/C.action": "---\nint8 a\n--  \n",
+        }
+    )
+    status, out = check(capsys, "demo", "--fix")
+    assert (status, out) == (0, "5 problems fixed, no problems in 3 files\n")
+    assert Path("demo/msg/A.msg").read_text("utf-8") == "# head\nfloat64 a\nint8 b # c\n"
+    assert Path("demo/srv/B.srv").read_text() == "int8 a\n---\nint8 b\n"
+    assert Path("demo/action/C.action").read_text() == "---\nint8 a\n---\n"
+
+
+def test_what_might_be_meant_otherwise_is_not_fixed(capsys):
+    files = {
+        "demo/msg/A.msg": "int8 a\n----\n",
+        "demo/srv/B.srv": "int8 a\n----\nint8 b\n---\nint8 c\n",
+        "demo/srv/C.srv": "int8 a\n--- # the answer\nint8 b\n",
+    }
+    write(files)
+    assert check(capsys, "demo", "--fix")[0] == 1
+    assert {path: Path(path).read_text() for path in files} == files
+
+
+def test_fix_leaves_columns_in_order(capsys):
+    write({"demo/msg/A.msg": "char    key   # x\nfloat32 value # y\nchar    CD = 1  # z\n"})
+    assert main(["fmt", "--check", "demo"]) == 0
+    check(capsys, "demo", "--fix", "--select", "char-type")
+    assert main(["fmt", "--check", "demo"]) == 0
+    assert Path("demo/msg/A.msg").read_text() == (
+        "uint8   key   # x\nfloat32 value # y\nuint8   CD = 1  # z\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "word", ["IDL421", "idl421", "421", "wide-string", "wide_string", "IDL42", "portability"]
+)
+def test_rules_are_named_by_code_name_and_category(word, capsys):
+    write({"demo/msg/A.msg": "wstring a\n"})
+    assert codes(capsys, "demo", "--select", word) == ["IDL421"]
+    assert codes(capsys, "demo", "--ignore", word) == []
+
+
+def test_a_remark_may_name_the_rule(capsys):
+    write({"demo/msg/A.msg": "wstring a  # idlc: ignore[wide-string] for Windows\n"})
+    assert codes(capsys, "demo") == []
+    write({"demo/msg/A.msg": "int8 a  # idlc: ignore[wide-string] for Windows\n"})
+    assert codes(capsys, "demo") == ["IDL490"]
+    assert codes(capsys, "demo", "--select", "IDL405") == []
+
+
+def test_a_misspelt_rule_is_guessed(capsys):
+    assert main(["check", "--ignore", "wide-sting"]) == 2
+    assert "did you mean `wide-string`?" in capsys.readouterr().err
+
+
+def test_many_problems_end_with_numbers(capsys):
+    lines = "".join(f"wstring w{number}\n" for number in range(12))
+    write({"demo/msg/A.msg": lines, "demo/msg/B.msg": "wstring w\nint7 a\n"})
+    status, out = check(capsys, "demo")
+    assert status == 1
+    assert out.count("warning[IDL421]") == 3
+    assert "more of these warnings:\n  demo/msg/A.msg:4:1: IDL421 " in out
+    assert "  demo/msg/B.msg:1:1: IDL421 " in out
+    assert out.endswith(
+        "\n13  IDL421 wide-string\n 1  IDL201 unknown-type\n1 error, 13 warnings in 2 files\n"
+    )
+    status, out = check(capsys, "demo", "--statistics")
+    assert (status, out.splitlines()) == (
+        1,
+        ["13  IDL421 wide-string", " 1  IDL201 unknown-type", "1 error, 13 warnings in 2 files"],
+    )
+
+
+#: What nothing should be said about, although it looks like what something is said about.
+CALM = {
+    "msg/PoseStamped.msg": "builtin_interfaces/Time stamp\nint8 pose\n",
+    "msg/Odd.msg": "string inches 5\"\nstring url http://example.com\nstring a '//'\n"
+    'string b "a // b"\nstring[] c ["x"]\n',
+    "msg/Fix.msg": "float64 latitude  # [deg]\nfloat64 lon  # [degrees]\n"
+    "float32 dwell_time_ms  # [ms]\nfloat32 timing_deg  # [deg]\nfloat32 v_km_h  # [km/h]\n",
+    "msg/Frames.msg": "float32 x  # [m] [@frame NED]\nfloat32 v  # [m/s] [@invalid NaN] [0, 5]\n",
+    "msg/Text.msg": "char[20] name\n",
+    "srv/ApiService.srv": "---\n",
+}
+
+
+@pytest.mark.parametrize("path", CALM)
+def test_nothing_is_said_about_what_is_usual(path, capsys):
+    write({f"demo/{path}": CALM[path]})
+    assert check(capsys, "demo")[1] == "no problems in 1 file\n"
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "code"),
+    [
+        ("msg/PoseStamped.msg", "int8 pose\nbuiltin_interfaces/Time stamp\n", "IDL401"),
+        ("msg/PoseStamped.msg", "std_msgs/Header head\n", "IDL401"),
+        ("msg/A.msg", 'string a "b\n', "IDL315"),
+        ("msg/A.msg", "string a 'b\"\n", "IDL315"),
+        ("msg/A.msg", "string a // b\n", "IDL315"),
+        ("msg/A.msg", "string a /* b */\n", "IDL315"),
+        ("msg/A.msg", "string A='b\n", "IDL315"),
+        ("msg/A.msg", 'string a "#"\n', "IDL109"),
+        ("msg/A.msg", "float32 turn  # [deg]\n", "IDL405"),
+        ("msg/A.msg", "float32 v  # [m/s] or [km/h]\n", "IDL411"),
+    ],
+)
+def test_one_warning(path, text, code, capsys):
+    write({f"demo/{path}": text})
+    assert codes(capsys, "demo") == [code]
+
+
+CMAKE = {
+    "rosidl_generate_interfaces(demo msg/A.msg)": True,
+    "rosidl_generate_interfaces(${PROJECT_NAME}\n  ${files}\n  DEPENDENCIES std_msgs\n)": True,
+    "rosidl_generate_interfaces(demo msg/A.msg SKIP_INSTALL)": False,
+    "if(BUILD_TESTING)\n  rosidl_generate_interfaces(demo\n    msg/A.msg\n    SKIP_INSTALL)": False,
+    "# rosidl_generate_interfaces(demo msg/A.msg)": False,
+    "rosidl_generate_interfaces(demo msg/A.msg # SKIP_INSTALL\n)": True,
+}
+
+
+@pytest.mark.parametrize("cmake", CMAKE)
+def test_interfaces_for_tests_alone_need_no_group(cmake, capsys):
+    write(
+        {
+            "demo/package.xml": '<package format="3">\n  <name>demo</name>\n'
+            "  <test_depend>std_msgs</test_depend>\n</package>\n",
+            "demo/CMakeLists.txt": cmake + "\n",
+            "demo/msg/A.msg": "std_msgs/Header header\n",
+        }
+    )
+    expected = ["IDL451", "IDL453", "IDL454"] if CMAKE[cmake] else []
+    assert sorted(codes(capsys, "demo")) == expected
+
+
+def test_the_core_generators_will_do(capsys):
+    write(
+        {
+            "demo/package.xml": '<package format="3">\n  <name>demo</name>\n'
+            "  <buildtool_depend>rosidl_core_generators</buildtool_depend>\n"
+            "  <exec_depend>rosidl_core_runtime</exec_depend>\n"
+            "  <member_of_group>rosidl_interface_packages</member_of_group>\n</package>\n",
+            "demo/CMakeLists.txt": "rosidl_generate_interfaces(demo msg/A.msg)\n",
+            "demo/msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys, "demo") == []
+
+
+def test_generators_that_everybody_gets_bring_their_runtime(capsys):
+    manifest = (
+        '<package format="3">\n  <name>demo</name>\n  <depend>rosidl_default_generators</depend>\n'
+        "  <member_of_group>rosidl_interface_packages</member_of_group>\n</package>\n"
+    )
+    write(
+        {
+            "demo/package.xml": manifest,
+            "demo/CMakeLists.txt": "rosidl_generate_interfaces(demo msg/A.msg)\n",
+            "demo/msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys, "demo") == []
+    write({"demo/package.xml": manifest.replace("depend>", "build_depend>")})
+    assert codes(capsys, "demo") == ["IDL454"]
+
+
+def test_nothing_is_unused_where_not_all_is_known(capsys):
+    write(
+        {
+            "demo/package.xml": '<package format="3">\n  <name>demo</name>\n'
+            "  <depend>std_msgs</depend>\n</package>\n",
+            "demo/msg/A.msg": "int8 a\n",
+        }
+    )
+    assert codes(capsys, "demo") == ["IDL452"]
+    write({"demo/msg/A.msg": "Header a\n"})
+    assert codes(capsys, "demo") == ["IDL201"]
+
+
+def test_a_file_with_capitals_in_its_extension_is_named(capsys):
+    write({"demo/msg/A.msg": "int8 a\n", "demo/msg/B.MSG": "int8 b\n"})
+    assert codes(capsys, "demo") == ["IDL622"]
+    assert main(["check", "demo/msg/B.MSG"]) == 2

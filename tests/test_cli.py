@@ -266,7 +266,9 @@ def test_settings_come_from_the_nearest_pyproject_and_options_override_them(monk
 
 def test_json_output_is_one_object_per_line():
     make("demo/msg/A.msg", "float64 class\nstereo_msgs/DisparityImage image\n")
-    done = idlc("gen", "demo", "-o", "out/demo", "--format", "json")
+    make("site/rclpy/__init__.py", "")
+    env = {**os.environ, "PYTHONPATH": "site"}
+    done = idlc("gen", "demo", "-o", "out/demo", "--format", "json", env=env)
     facts = [json.loads(line) for line in done.stdout.splitlines()]
     assert [fact["type"] for fact in facts][-2:] == ["package", "summary"]
     assert {fact["code"] for fact in facts if fact["type"] == "diagnostic"} == {
@@ -430,3 +432,23 @@ def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
             _, err = process.communicate(timeout=30)
     assert process.returncode == 0
     assert "Traceback" not in err
+
+
+def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monkeypatch, capsys):
+    from idlc.cli.main import main
+
+    make("demo/msg/A.msg", "stereo_msgs/DisparityImage image\nstd_msgs/Header header\n")
+    here = {"rclpy": ["/ros/rclpy"]}
+    folders = "idlc.disk.surroundings.python_folders"
+    monkeypatch.setattr(folders, lambda package: [Path(one) for one in here.get(package, ())])
+    assert main(["gen", "demo", "-o", "out/demo"]) == 0
+    assert "warning[IDL617]" in capsys.readouterr().err
+    # as in an environment of pipx, uv or pre-commit, which holds idlc alone
+    here.clear()
+    for words in (["gen", "demo", "-o", "out/demo"], ["gen", "demo", "-o", "other/demo"]):
+        assert main(words) == 0
+        said = capsys.readouterr()
+        assert said.err == ""
+        assert said.out.endswith("; imports std_msgs, stereo_msgs\n")
+        assert main([*words, "--check"]) == 0
+        assert "imports" not in "".join(capsys.readouterr())

@@ -1,11 +1,13 @@
 """`fmt`'s layout: what it changes, what it leaves, and that the meaning stays."""
 
 import json
+import re
 from pathlib import Path
+from random import Random
 
 import pytest
 import rosidl_view
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from inventions import Inventor
 
@@ -65,6 +67,19 @@ UNCHANGED = [
     "int8 A=1\nint8 LONGER = 2\n",
     "int8 A      = 1\nint8 LONGER = 2\n",
     "int8 a # one blank is a gap\n\nint8 bcd      # a wide one too\n",
+    "int8 a # one blank\nint8 bcd # in each line\n",
+    "int8 a    # four blanks\nint8 bcd    # in each line\n",
+    "int8    a\nuint16  b\nfloat32 c\n",
+    "int8    a\n\n# apart\nuint16  b\n",
+    "int8  a\nint8 longest_of_all\nint8  b\n",
+    "int8 A =  1\nint8 B = 10\nint8 C = -3\n",
+    "int8 A =  -1\nint8 BCD = 2\nint8 CD =  3\n",
+    "int8 a\t\t# x\nint16 bcd\t# y\n",
+    "int8 a\t\t\t# x\nint16 bcd\t\t# of four\n",
+    "int8    AB  = 1\nuint16  C   = 2\n",
+    "float32 x            # [m] east\n                     # of here\nfloat32 y_north  # [m]\n",
+    "int8 a\n\t# more\n",
+    "\nint8 a\n",
     "float32 x   # [m] east\n            # of here\nfloat32 yz  # [m] north\n",
     "float32 x\n    # indented, with its own place\nfloat32 y\n",
     "int8 a\n---\n\nint8 b\n\n---\nint8 c\n",
@@ -89,23 +104,31 @@ def test_what_is_in_order_stays(text):
         ("int8\ta\t1\t# x", "int8 a 1                # x\n"),
         ("int8 a   5  \n", "int8 a 5\n"),
         ("int8 A= 1\nint8 B =2\nint8 C  =  3\n", "int8 A = 1\nint8 B = 2\nint8 C = 3\n"),
-        ("int8  A   = 1\nint16 LONG= 2\n", "int8 A = 1\nint16 LONG = 2\n"),
-        ("int8    AB  = 1\nuint16  C   = 2\n", "int8 AB  = 1\nuint16 C = 2\n"),
+        ("int8  A   = 1\nint16 LONG= 2\n", "int8  A = 1\nint16 LONG = 2\n"),
         ("int8 a# x\n", "int8 a  # x\n"),
-        ("int8 a # x\nint8 bcd # y\n", "int8 a    # x\nint8 bcd  # y\n"),
+        ("int8 a# x\nint8 bcd # y\n", "int8 a # x\nint8 bcd # y\n"),
+        # out of the column of its neighbours, and where there is none
         (
-            "float32 x  # [m] east\n           # of here\nfloat32 y_north  # [m]\n",
-            "float32 x        # [m] east\n                 # of here\nfloat32 y_north  # [m]\n",
+            "int8 a    # x\nint8 b   # y\nint8 c    # z\n",
+            "int8 a    # x\nint8 b    # y\nint8 c    # z\n",
         ),
-        ("int8 a\n\t# more\n", "int8 a\n        # more\n"),
+        (
+            "int8    a\nint16   b\nfloat32  c  # x\n",
+            "int8    a\nint16   b\nfloat32 c  # x\n",
+        ),
+        ("int8   a\nint16 b\nint32 c\n", "int8 a\nint16 b\nint32 c\n"),
+        ("int8 a   # x\nint16 b     # y\n", "int8 a  # x\nint16 b  # y\n"),
+        # what was in a column stays there
+        ("int8   a  # x\nint16 b   # y\n", "int8 a    # x\nint16 b   # y\n"),
+        ("int8 A= 1  # x\nint8 BC =2 # y\n", "int8 A = 1  # x\nint8 BC = 2 # y\n"),
         ("# head \n\n# about a   \nint8 a\n", "# head \n\n# about a\nint8 a\n"),
-        ("\n\n\nint8 a\n\n\n\n\nint8 b\n\n\n", "int8 a\n\n\nint8 b\n"),
+        ("\n\n\nint8 a\n\n\n\n\nint8 b\n\n\n", "\nint8 a\n\n\nint8 b\n"),
         ("\n\n\n# about a\nint8 a\n", "\n# about a\nint8 a\n"),
         ("int8 a\r\nint8  b\n", "int8 a\r\nint8 b\r\n"),
         ("int8 a\rint8 b\x0bint8 c", "int8 a\nint8 b\nint8 c\n"),
         ("int8 a\n---", "int8 a\n---\n"),
         ("---\r\nint8 a", "---\r\nint8 a\r\n"),
-        ("   \n\t\nint8 a\n   \n", "int8 a\n"),
+        ("   \n\t\nint8 a\n   \n", "\nint8 a\n"),
     ],
 )
 def test_layout(before, after):
@@ -167,11 +190,103 @@ def laid_out_lines(draw):
 @example("AB=1\n", False)
 @example("int8 AB=1\nint8 A = 1\n", False)
 @example("# head\x0b  # more\n", True)
+@example("string A=1\nstring B=\t1\nstring C\t=1\n", False)
 def test_layout_invented_by_chance_keeps_the_content(text, is_service):
     if is_service:
         text += "---\n" + text
     if not content(text, "srv" if is_service else "msg")[-1]:
         assert_only_the_layout_changes(text, "srv" if is_service else "msg")
+
+
+GAPS = ["", " ", " ", "  ", "   ", "\t", " \t", "      "]
+
+
+def untidy_line(random):
+    """Return a line of no more words than a line has, with any gaps between them."""
+    gap, blank = lambda: random.choice(GAPS), lambda: random.choice(GAPS[1:])
+    name = random.choice(["a", "bc", "def_g", "long_name"])
+    comment = random.choice(["", "", f"{gap()}# x"])
+    match random.randrange(10):
+        case 0:
+            return random.choice(["", "# comment"])
+        case 1:
+            return f"{blank()}# more"
+        case 2 | 3 | 4:
+            return f"{random.choice(['int8', 'uint16[]'])}{blank()}{name}{comment}"
+        case 5:
+            return f"int8{blank()}{name}{blank()}{random.choice(['1', '-30'])}{comment}"
+    value = random.choice(["1", "20", "-300"])
+    type_ = random.choice(["int8", "float32"])
+    return f"{type_}{blank()}{name.upper()}{gap()}={gap()}{value}{comment}"
+
+
+def test_laying_out_twice_is_laying_out_once():
+    random = Random(5)
+    for _ in range(1000):
+        text = "".join(f"{untidy_line(random)}\n" for _ in range(random.randint(1, 9)))
+        once = formatted(text)
+        assert formatted(once) == once, text
+        assert "".join(once.split()) == "".join(text.split())
+
+
+WORDS = st.sampled_from(["a", "speed", "x_of_the_robot", "temperature"])
+TYPES = st.sampled_from(["int8", "float32", "string<=10", "std_msgs/Header", "uint8[]"])
+
+
+def in_columns(rows, gap, tab):
+    """Return rows of words as text in which the words of each column begin in one column."""
+    lines = [""] * len(rows)
+    for column in zip(*rows, strict=True):
+        if lines[0]:
+            width = max(len(line.expandtabs(tab)) for line in lines) + gap
+            width += -width % tab
+            lines = [filled(line, width, tab) for line in lines]
+        lines = [line + word for line, word in zip(lines, column, strict=True)]
+    return lines
+
+
+def filled(line, width, tab):
+    missing = width - len(line.expandtabs(tab))
+    return line + ("\t" * -(-missing // tab) if tab > 1 else " " * missing)
+
+
+@st.composite
+def aligned_blocks(draw):
+    """Draw a block of fields or constants with comments, all of it in columns."""
+    tab, count = draw(st.sampled_from([1, 1, 4, 8])), draw(st.integers(2, 6))
+    constants = draw(st.booleans())
+    rows = []
+    for number in range(count):
+        name = f"{draw(WORDS)}_{number}"
+        if constants:
+            row = ["int32", name.upper(), "=", str(draw(st.integers(-99, 999)))]
+        else:
+            row = [draw(TYPES), name]
+        rows.append([*row, "# [m] why"])
+    lines = in_columns(rows, draw(st.integers(1, 4)), tab)
+    continued = draw(st.integers(0, count - 1))
+    column = lines[continued].index("#")
+    indent = re.sub("[^\\t]", " ", lines[continued][:column])
+    if len(indent.expandtabs(tab)) == len(lines[continued][:column].expandtabs(tab)):
+        lines.insert(continued + 1, f"{indent}# and because")
+    return lines
+
+
+@given(aligned_blocks())
+def test_what_stands_in_columns_is_not_touched(lines):
+    text = "".join(f"{line}\n" for line in lines)
+    assert formatted(text) == text
+
+
+@given(aligned_blocks(), st.data())
+def test_a_comment_out_of_its_column_goes_back_to_it(lines, data):
+    assume(len(lines) > 3 and "\t" not in "".join(lines))
+    at = data.draw(st.integers(0, len(lines) - 1))
+    assume(lines[at].split("#")[0].strip())
+    moved = lines[at].replace("#", f"{' ' * data.draw(st.integers(2, 5))}#")
+    broken = [*lines[:at], moved, *lines[at + 1 :]]
+    assume("and because" not in "".join(lines[at : at + 2]))
+    assert formatted("\n".join(broken)) == "".join(f"{line}\n" for line in lines)
 
 
 @given(st.text("a1 =#\t\n\r\x0b[]<-\"'A", max_size=40))

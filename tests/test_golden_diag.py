@@ -82,6 +82,7 @@ def tried(tmp_path, monkeypatch, capsys):
         return done.stdout + done.stderr
 
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    monkeypatch.setattr("idlc.disk.surroundings.runs_nodes", lambda: True)
     return run
 
 

@@ -30,9 +30,9 @@ class Facts(msgspec.Struct, frozen=True):
 
     `modules` are its Python files by dotted name, tests excluded. `inputs` are the digests of its
     interface files by name within the package, empty without `outputs`; `whole` is whether these
-    files are all that it has. `generates` is whether its CMakeLists.txt calls
-    rosidl_generate_interfaces, `native` whether it has C or C++ sources, `marker` whether
-    resource/NAME exists. `known` are the names of ROS packages that can be found.
+    files are all that it has. `generates` is whether its CMakeLists.txt
+    generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
+    whether resource/NAME exists. `known` are the names of ROS packages that can be found.
     """
 
     name: str

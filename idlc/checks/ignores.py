@@ -1,6 +1,6 @@
 """Remarks in interface files that silence a warning: `# idlc: ignore[IDL405] why`.
 
-Behind a definition such a remark is about that line, on a line of its own about the next
+After a definition such a remark is about that line, on a line of its own about the next
 definition, and at the head of a file about the whole file. A reason is mandatory, and a remark
 that silences nothing is reported.
 """
@@ -58,7 +58,7 @@ def without_ignored(found: Iterable[Diagnostic], sources: Iterable[Source]) -> I
             yield codes.IGNORE_WITHOUT_REASON.at(
                 remark.span,
                 f"this does not say why `{remark.code}` is ignored",
-                hint=f"write the reason behind it: `ignore[{remark.code}] REASON`",
+                hint=f"write the reason after it: `ignore[{remark.code}] REASON`",
             )
         elif at not in used:
             yield _unused(remark)
@@ -80,9 +80,10 @@ def switched_off(found: Diagnostic, selection: Selection) -> bool:
     """Tell whether an unused remark is about a rule that was not asked."""
     if found.code != codes.UNUSED_IGNORE.id or found.span is None:
         return False
-    code = found.span.text
-    known = codes.CODES.get(code)
-    return known is not None and known.severity is not Severity.ERROR and not selection.has(code)
+    known = codes.find(found.span.text)
+    if known is None or known.severity is Severity.ERROR:
+        return False
+    return not selection.has(known.id)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:
@@ -118,7 +119,9 @@ def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Ite
     for name, at in names:
         span = Span(source, at, at + len(name))
         lines = None if in_head else frozenset({number})
-        yield Remark(name, match.group(2).strip(), span, lines, edit)
+        known = codes.find(name)
+        code = known.id if known else name
+        yield Remark(code, match.group(2).strip(), span, lines, edit)
 
 
 def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:

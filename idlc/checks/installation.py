@@ -80,7 +80,7 @@ def _problem(text: Text, facts: Facts) -> tuple[str, str] | None:
     script, equals, target = text.value.partition("=")
     module, colon, function = (part.strip() for part in target.partition(":"))
     if not equals or not colon or not function:
-        what = f"`{text.value}` is no entry point"
+        what = f"`{text.value}` is not an entry point"
         return what, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
     if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
         return (
@@ -139,7 +139,7 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
             report.add(
                 codes.STALE_OUTPUT.of(
                     output.path,
-                    f"the generated code is not made of these interfaces: {listed}{more} changed",
+                    f"the generated code is out of date: {listed}{more} changed",
                     hint="run idlc gen",
                 )
             )

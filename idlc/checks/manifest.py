@@ -18,16 +18,18 @@ from idlc.text.source import Span
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
 #: What rosidl adds by itself.
 _IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
-#: What a package.xml begins with; dependencies come behind it.
+#: What a package.xml begins with; dependencies come after it.
 _HEAD = frozenset(("name", "version", "description", "maintainer", "license", "url", "author"))
 _GROUP = "rosidl_interface_packages"
-_GENERATORS = "rosidl_default_generators"
-_RUNTIME = "rosidl_default_runtime"
+#: The packages that generate interfaces, and those that generated code needs, usual first.
+_GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
+_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 
 
 def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """Packages whose messages are used are declared."""
-    declared = facts.declared(*_NEEDED)
+    # what CMake does not install is there for the package's own tests
+    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
     seen = {facts.name, *declared}
     for message in sections(model):
         for field in message.fields:
@@ -47,7 +49,7 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """A package of interfaces alone declares no interfaces that it does not use."""
-    if facts.modules or facts.native or not facts.whole:
+    if facts.modules or facts.native or not facts.whole or _has_gaps(model):
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
@@ -59,6 +61,17 @@ def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
                     hint="remove the line",
                 )
             )
+
+
+def _has_gaps(model: Model) -> bool:
+    """Return whether some field is of a type that is not known, and may be of any package."""
+    elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
+    return any(
+        element.target not in model.interfaces
+        if isinstance(element, ir.Ref)
+        else isinstance(element, ir.Unknown)
+        for element in elements
+    )
 
 
 def interface_group(facts: Facts, model: Model, report: Report) -> None:
@@ -80,12 +93,12 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
     if not (facts.generates and model.own):
         return
     missing = [
-        (package, f"<{tag}>{package}</{tag}>")
-        for package, tag, others in (
+        (packages[0], f"<{tag}>{packages[0]}</{tag}>")
+        for packages, tag, others in (
             (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
             (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
         )
-        if package not in facts.declared(*others)
+        if facts.declared(*others).keys().isdisjoint(packages)
     ]
     if missing:
         needed = " and ".join(f"`{package}`" for package, _ in missing)
@@ -116,7 +129,7 @@ def declared_imports(facts: Facts, _: Model, report: Report) -> None:
 
 
 def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
-    """Return a problem with the edits that add lines to package.xml, each behind its like."""
+    """Return a problem with the edits that add lines to package.xml, each after its like."""
     edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
     return msgspec.structs.replace(found, edits=edits)
 

@@ -28,7 +28,7 @@ def interface_names(model: Model, report: Report) -> None:
         if all(names.is_message_name(part.name.name) for part in derive.sections(interface)):
             continue
         name, kind = interface.name.name, interface.name.kind
-        like = "".join(part[:1].upper() + part[1:] for part in name.replace("-", "_").split("_"))
+        like = names.message_name_like(name)
         if kind != "msg" and names.is_message_name(name):
             hint = "this ending is kept for the parts of services and actions"
         else:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import msgspec
 
 from idlc.checks.scope import sections
@@ -48,7 +50,16 @@ def chars(model: Model, report: Report) -> None:
                     "`char` is an unsigned number of one byte in ROS 2, not a character",
                     hint="write `uint8`; bytes, hash and code stay the same",
                 )
-                report.add(msgspec.structs.replace(found, edits=(Edit(span, "uint8"),)))
+                report.add(msgspec.structs.replace(found, edits=(_as_uint8(span),)))
+
+
+def _as_uint8(span: Span) -> Edit:
+    """Return the edit of a `char`, which leaves the name in its column if there is room."""
+    source = span.source
+    wide = re.compile(r"char(\S*) ( +)").match(source.text, span.start)
+    if wide is None:
+        return Edit(span, "uint8")
+    return Edit(Span(source, span.start, wide.end()), f"uint8{wide[1]}{wide[2]}")
 
 
 def _is_char(type_: ir.FieldType) -> bool:
@@ -82,13 +93,15 @@ def nested_bounds(model: Model, report: Report) -> None:
 
 
 def several_units(model: Model, report: Report) -> None:
-    """A comment has one pair of brackets: of several, ROS 2 takes none as the unit."""
+    """A comment has one unit: of several pairs of brackets, ROS 2 takes none as the unit."""
     for message in sections(model):
         for field in message.fields:
             text = "\n".join(field.comment)
             found = [inside for _, inside in brackets(text)]
-            meant = any(map(is_unit, found))
-            if len(found) > 1 and meant and field.unit is None and field.name_span:
+            meant = sum(map(is_unit, found))
+            # a remark such as [0..1] beside the unit leaves it clear to readers
+            unclear = meant > 1 or (meant and REMARK.search(text))
+            if len(found) > 1 and unclear and field.unit is None and field.name_span:
                 report.add(
                     codes.SEVERAL_UNITS.at(
                         field.name_span,
@@ -97,6 +110,6 @@ def several_units(model: Model, report: Report) -> None:
                         + (f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""),
                         hint="write the remark with round ones, as in `ignore(IDL405)`"
                         if REMARK.search(text)
-                        else "keep brackets for the unit alone",
+                        else "put one unit in brackets, and what else there is in words",
                     )
                 )

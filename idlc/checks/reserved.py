@@ -62,7 +62,7 @@ def field_names(model: Model, report: Report) -> None:
 def _python_clash(field: ir.Field, message: ir.Message) -> str | None:
     if keyword.iskeyword(field.name):
         return "a Python keyword"
-    # `builtins` hides the module of that name from the fields behind it
+    # `builtins` hides the module of that name from the fields after it
     hides_builtins = field.name == "builtins" and field is not message.fields[-1]
     if field.name in _PYTHON_MEMBERS or hides_builtins:
         return "used by the class itself"

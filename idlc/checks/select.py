@@ -12,7 +12,8 @@ from idlc.text.diagnostics import Diagnostic, Severity
 
 CATEGORIES = ("correctness", "portability", "style", "package")
 
-#: What is asked for unless `select` says otherwise: not how much a team writes and names.
+#: Not asked for unless `select` says so: how much a team writes, what it calls things, and what
+#: works as well as its alternative.
 OFF_BY_DEFAULT = frozenset(
     code.id
     for code in (
@@ -20,6 +21,8 @@ OFF_BY_DEFAULT = frozenset(
         codes.UNDOCUMENTED_FIELD,
         codes.MISSING_UNIT,
         codes.CONSTANT_PREFIX,
+        codes.REDUNDANT_SUFFIX,
+        codes.CHAR_TYPE,
     )
 )
 
@@ -34,13 +37,18 @@ def category(code: str) -> str:
 
 def is_selector(word: str) -> bool:
     """Tell whether a word means any code: `all`, a category, a code, its beginning or its slug."""
-    return word == "all" or any(_means(word, code) for code in codes.CODES)
+    return any(_means(word, code) for code in codes.CODES)
 
 
 def _means(word: str, code: str) -> bool:
-    if word.startswith("IDL"):
-        return code.startswith(word)
-    return word in ("all", category(code), codes.CODES[code].slug)
+    found = codes.find(word)
+    if found is not None:
+        return found.id == code
+    return word in ("all", category(code)) or _begins(code, word.upper())
+
+
+def _begins(code: str, beginning: str) -> bool:
+    return beginning.startswith("IDL") and code.startswith(beginning)
 
 
 class Selection(msgspec.Struct, frozen=True):

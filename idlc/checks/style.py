@@ -14,6 +14,7 @@ from idlc.text.diagnostics import Report
 from idlc.text.source import Span
 
 HEADER = ir.Ref(ir.TypeName("std_msgs", "msg", "Header"))
+TIME = ir.Ref(ir.TypeName("builtin_interfaces", "msg", "Time"))
 _SUFFIXES = {
     "msg": ("Msg", "Message", "Msgs"),
     "srv": ("Srv", "Service"),
@@ -22,20 +23,28 @@ _SUFFIXES = {
 
 
 def stamped(model: Model, report: Report) -> None:
-    """A message called …Stamped begins with `std_msgs/Header header`."""
+    """A message called …Stamped begins with its stamp: `std_msgs/Header header`, or a time."""
     for interface in model.own:
         if not isinstance(interface, ir.Message) or not interface.name.name.endswith("Stamped"):
             continue
         first = interface.fields[0] if interface.fields else None
-        if first is None or first.name != "header" or first.type != HEADER:
+        if first is None or not _is_stamp(first, model):
             report.add(
                 codes.STAMPED_WITHOUT_HEADER.at(
                     _top(interface, first),
-                    f"`{interface.name.name}` does not begin with a header",
-                    hint="make `std_msgs/Header header` the first field; tools such as tf and "
-                    "message filters look for it",
+                    f"`{interface.name.name}` does not begin with a time stamp",
+                    hint="make `std_msgs/Header header` the first field, where tf and message "
+                    "filters look for it, or `builtin_interfaces/Time stamp`",
                 )
             )
+
+
+def _is_stamp(field: ir.Field, model: Model) -> bool:
+    """Return whether a field is a stamp, or of a type that is an error anyway."""
+    if isinstance(field.type, ir.Ref) and field.type.target not in model.interfaces:
+        return True
+    is_header = field.type == HEADER and field.name == "header"
+    return is_header or field.type in (TIME, ir.Unknown())
 
 
 def _top(interface: ir.Interface, first: ir.Field | None = None) -> Span:
@@ -68,7 +77,7 @@ def documented_fields(model: Model, report: Report) -> None:
                     codes.UNDOCUMENTED_FIELD.at(
                         field.name_span,
                         f"nothing says what `{field.name}` means",
-                        hint="write a comment before or behind it",
+                        hint="write a comment above or beside it",
                     )
                 )
 
@@ -102,10 +111,9 @@ def _says(comment: Iterable[str], unit: str) -> bool:
 def unusual_units(model: Model, report: Report) -> None:
     """Units are those of REP 103: metres, radians, seconds."""
     for field in _quantities(model):
-        on_earth = "latitude" in field.name or "longitude" in field.name
         unit = units.unit_of(field)
-        usual = units.usual(unit) if unit and not on_earth else None
-        if usual and field.name_span:
+        usual = units.usual(unit) if unit else None
+        if unit and usual and field.name_span and not units.is_known_by(field.name, unit):
             report.add(
                 codes.UNUSUAL_UNIT.at(
                     field.name_span,
@@ -144,6 +152,6 @@ def suffixes(model: Model, report: Report) -> None:
                 codes.REDUNDANT_SUFFIX.of(
                     interface.source.path,
                     f"`{name}.{kind}` says twice that it is a .{kind} file",
-                    hint=f"call it `{name.removesuffix(suffix)}.{kind}`",
+                    hint=f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use",
                 )
             )

@@ -89,6 +89,10 @@ _USUAL = {
 }
 
 
+#: Words of names of places on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
+_ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
+
+
 def expected(name: str) -> str | None:
     """Return the unit that a field of this name should have, `None` if it is no quantity."""
     words = name.split("_")
@@ -120,6 +124,14 @@ def unit_of(field: ir.Field) -> str | None:
     pairs = brackets(REMARK.sub("", "\n".join(field.comment)))
     found = [inside for _, inside in islice(pairs, 2)]
     return found[0] if len(found) == 1 else None
+
+
+def is_known_by(name: str, unit: str) -> bool:
+    """Return whether a field's name says its unit, or is of what has that unit in ROS as well."""
+    words = name.split("_")
+    if unit in words or re.sub(r"\W", "_", unit) in name:
+        return True
+    return usual(unit) == "rad" and not _ON_EARTH.isdisjoint(words)
 
 
 def is_unit(text: str) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from idlc.checks.scope import sections
-from idlc.model import ir
+from idlc.model import ir, slips
 from idlc.model.link import Model
 from idlc.model.literals import BACKSLASH_HINT, FLOAT32_MAX
 from idlc.syntax.escapes import plain_meaning
@@ -32,7 +32,7 @@ def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> list[Diagnost
             return [_breaks_python(span, "an empty default of a numeric sequence")]
         return _broken_text(value, span)
     if isinstance(value, str):
-        return [*_broken_text((value,), span), *_mangled_text(value, span)]
+        return [*_broken_text((value,), span), *_mangled_text(value, span), *_odd_text(span)]
     if isinstance(value, float):
         return _number(value, element, span)
     return []
@@ -63,6 +63,24 @@ def _mangled_text(value: str, span: Span) -> list[Diagnostic]:
         return []
     message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
     return [codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)]
+
+
+def _odd_text(span: Span) -> list[Diagnostic]:
+    """Find what looks like quotes or a comment and is part of the text."""
+    text = span.text
+    one_sided = text[:1] in ('"', "'") and (len(text) == 1 or text[-1] != text[0])
+    if slips.has_comment(text) and (one_sided or slips.is_comment(text)):
+        message = "what looks like a comment is part of the text"
+        return [codes.ODD_TEXT.at(span, message, hint=slips.COMMENT_HINT)]
+    if one_sided and text[0] not in _rest_of_line(span):  # or a `#` is to blame, see IDL109
+        message = f"the text is not closed by {text[0]}, which therefore is part of it"
+        return [codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")]
+    return []
+
+
+def _rest_of_line(span: Span) -> str:
+    line, column = span.source.position(span.end)
+    return span.source.line_text(line)[column - 1 :]
 
 
 def _breaks_python(span: Span, what: str) -> Diagnostic:

@@ -22,11 +22,12 @@ Example:
     "--select",
     metavar="RULE,...",
     shell_complete=complete.rules,
-    help="Only these: categories, codes or `all`.",
+    help="Only these: categories, codes, their names, `all`.",
 )
 @click.option("--ignore", metavar="RULE,...", shell_complete=complete.rules, help="Not these.")
-@click.option("--fix", is_flag=True, help="Mend what can be mended without harm.")
+@click.option("--fix", is_flag=True, help="Fix what can be fixed without harm.")
 @click.option("--strict", is_flag=True, help="Fail on warnings as well.")
+@click.option("--statistics", is_flag=True, help="Show only how often each rule was broken.")
 @options.package
 @options.include
 @options.exclude
@@ -37,6 +38,7 @@ def command(
     ignore: str | None,
     fix: bool,
     strict: bool,
+    statistics: bool,
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
@@ -52,5 +54,5 @@ def command(
     from idlc.cli.checking import Wishes, check_paths
 
     options.check_rules(select, ignore)
-    wishes = Wishes(select, ignore, fix, strict, package, include, exclude, style)
+    wishes = Wishes(select, ignore, fix, strict, package, include, exclude, style, statistics)
     return check_paths(paths, wishes)

@@ -25,6 +25,7 @@ class Wishes(msgspec.Struct, frozen=True):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     style: str = "text"
+    statistics: bool = False
 
 
 def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
@@ -42,7 +43,7 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
             fix=wishes.fix,
         )
         checked = check(wanted, report)
-    reports.write(report, wishes.style, checked, sys.stdout)
+    reports.write(report, wishes.style, checked, sys.stdout, numbers=wishes.statistics)
     return terminal.status(report) or int(wishes.strict and bool(len(report)))
 
 

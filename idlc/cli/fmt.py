@@ -31,10 +31,16 @@ Example:
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change, and fail if so.")
 @options.exclude
 def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str, ...]) -> int:
-    """Lay interface files out: one space after types, comments in one column.
+    """Tidy the blanks of interface files, and leave alone what was laid out with care.
 
-    Words, values and comments stay as they are, and so does the meaning. Files with errors are
-    left alone. PATH is as for `idlc check`.
+    A gap between words stays if it is one blank (or two before a comment), if it puts a word in one
+    column with another of its kind, or if the whole block has the same gap. A stray word moves
+    into the column of its neighbours, or else next to the word before it. `=` has blanks on both
+    sides or on none. Blanks at the ends of lines go, a file ends with one line end, and there are
+    at most two blank lines in a row.
+
+    Nothing else changes, so the meaning stays. Files with errors are left alone. PATH is as for
+    `idlc check`.
     """
     from idlc.cli import terminal
     from idlc.disk import config

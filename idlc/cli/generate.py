@@ -53,7 +53,8 @@ def _line(package: Generated, check: bool) -> str:
         done += [f"{package.written} written"] if package.written else []
         done += [f"{package.removed} removed"] if package.removed else []
     note = f" ({', '.join(done)})" if done else ""
+    needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{package.package}: {counted(package.interfaces, 'interface')} → "
-        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}\n"
+        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}{needs}\n"
     )

@@ -72,9 +72,14 @@ def report_style(command: Command) -> Command:
 
 def check_rules(*lists: str | None) -> None:
     """Refuse lists of rules that name one that there is not."""
-    from idlc.checks.select import is_selector
+    from idlc.checks.select import CATEGORIES, is_selector
 
     for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
-                raise click.UsageError(f"{word!r} means no rule; `idlc explain` lists the codes")
+                from idlc.text.codes import CODES
+                from idlc.text.suggest import did_you_mean
+
+                hint = did_you_mean(word, (*CATEGORIES, *(one.slug for one in CODES.values())))
+                hint = hint or "`idlc explain` lists the codes"
+                raise click.UsageError(f"{word!r} means no rule; {hint}")

@@ -7,26 +7,38 @@ from typing import TYPE_CHECKING, TextIO
 from idlc import __version__
 from idlc.cli import terminal
 from idlc.text.diagnostics import Report
-from idlc.text.present import counted, summary
+from idlc.text.present import MANY, counted, statistics, summary
 
 if TYPE_CHECKING:
     from idlc.driver.check import Checked
 
 
 def write(
-    report: Report, style: str, checked: Checked, stream: TextIO, *, command: str = "check"
+    report: Report,
+    style: str,
+    checked: Checked,
+    stream: TextIO,
+    *,
+    command: str = "check",
+    numbers: bool = False,
 ) -> None:
-    """Write a report on what was looked at; formats for machines are one whole document."""
+    """Write a report on what was looked at; formats for machines are one whole document.
+
+    `numbers` leaves out of the text what was found, and only says how often.
+    """
     files, fixed = checked.files, checked.fixed
     match style:
         case "text":
-            terminal.show(report, style, stream)
-            mended = f"{counted(fixed, 'problem')} mended, " if fixed else ""
+            if not numbers:
+                terminal.show(report, style, stream)
+            if numbers or len(report) > MANY:
+                stream.writelines(statistics(report))
+            done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
             what = counted(len(files), "file")
             if not files and checked.packages:
                 what = f"{counted(checked.packages, 'package')} without interfaces"
             rest = summary(report) if len(report) else f"no problems in {what}"
-            stream.write(f"{mended}{rest}\n")
+            stream.write(f"{done}{rest}\n")
         case "json":
             terminal.show(report, style, stream)
             facts = {"files": len(files), **({"fixed": fixed} if fixed else {})}

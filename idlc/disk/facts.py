@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -61,7 +62,7 @@ def facts(
         modules=modules,
         setup_py=_optional(folder / "setup.py"),
         setup_cfg=_optional(folder / "setup.cfg"),
-        generates=b"rosidl_generate_interfaces" in (makes or b""),
+        generates=_generates(makes or b""),
         native=any(file.suffix in _NATIVE for file in files),
         whole=bool(given.files)
         and {one.file.path.resolve() for one in given.files}
@@ -70,6 +71,13 @@ def facts(
         outputs=tuple(filter(None, map(_output, locks))),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
     )
+
+
+def _generates(cmake: bytes) -> bool:
+    """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
+    code = re.sub(rb"#[^\n]*", b"", cmake)
+    calls = re.findall(rb"rosidl_generate_interfaces\s*\(([^()]*)", code)
+    return any(b"SKIP_INSTALL" not in call.split() for call in calls)
 
 
 def _files(folder: Path) -> Iterator[Path]:

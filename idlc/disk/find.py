@@ -95,7 +95,7 @@ def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> 
 def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) -> Found:
     """Return what paths mean; a folder means everything below it.
 
-    Reports IDL601, IDL602 and IDL605.
+    Reports IDL601, IDL602, IDL605 and IDL622.
     """
     manifest.cache_clear()
     found: dict[str, InterfaceFile] = {}
@@ -109,6 +109,8 @@ def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) ->
                 continue
             if path.name == MANIFEST:
                 packages.setdefault(Path(whole).parent)
+            elif path.suffix not in KINDS:
+                report.add(_unread(path))
             else:
                 seen = True
                 found.setdefault(whole, _interface(path, whole, given))
@@ -138,6 +140,13 @@ def _under(given: str, report: Report) -> Iterator[Path]:
         yield path
 
 
+def _unread(path: Path) -> Diagnostic:
+    extension = path.suffix.lower()
+    message = f"`{path.name}` is not read, because ROS 2 knows `{extension}` only"
+    hint = f"rename it to `{path.stem}{extension}`"
+    return codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint)
+
+
 def _interface(path: Path, whole: str, given: str) -> InterfaceFile:
     kind = KINDS[path.suffix]
     root = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
@@ -162,6 +171,8 @@ def _similar(path: Path) -> str | None:
 
 def walk(folder: Path, report: Report) -> Iterator[Path]:
     """Yield each interface file and package.xml below a folder, in no particular order.
+
+    Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
     one excepted; links to folders are followed, each folder once.
@@ -192,7 +203,7 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
 
 def _is_wanted(name: str) -> bool:
     suffix = os.path.splitext(name)[1]  # noqa: PTH122 - for every file of a source tree
-    return suffix in KINDS or name == MANIFEST
+    return suffix.lower() in KINDS or name == MANIFEST
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:

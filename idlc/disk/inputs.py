@@ -69,8 +69,8 @@ def load(package: str, files: Iterable[InterfaceFile], home: Path, report: Repor
                 codes.DUPLICATE_INTERFACE.of(
                     file.shown,
                     f"`{file.key}` is defined by `{first.file.shown}` as well",
-                    hint="a package can have one interface of a kind and name; leave files out "
-                    "with --exclude, or `exclude` in [tool.idlc]",
+                    hint="a package can have only one interface of each kind and name; leave files "
+                    "out with --exclude, or `exclude` in [tool.idlc]",
                 )
             )
         elif (data := read_bytes(file.path, file.shown, report)) is not None:

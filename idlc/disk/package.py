@@ -79,7 +79,7 @@ def _broken(
     data: bytes, name: str, error: expat.ExpatError | ValueError | LookupError
 ) -> Diagnostic:
     message = f"not well-formed XML: {str(error).partition(':')[0]}"
-    hint = "mend the file, or give --package NAME"
+    hint = "fix the file, or give --package NAME"
     if not isinstance(error, expat.ExpatError):
         return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
     source = Source(name, data.decode("utf-8", errors="replace"))

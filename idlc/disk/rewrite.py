@@ -6,7 +6,7 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,8 +46,11 @@ def replace(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     return True
 
 
-def mend(edits: Iterable[Edit], report: Report) -> int:
-    """Make edits in the files that they are for; return how many were made."""
+def edit(edits: Iterable[Edit], report: Report, tidied: Callable[[str, str, str], str]) -> int:
+    """Make edits in the files that they are for; return how many were made.
+
+    `tidied` returns what to write, of a file's name, its text and the text after the edits.
+    """
     by_path: dict[str, list[Edit]] = {}
     for edit in edits:
         by_path.setdefault(edit.span.source.path, []).append(edit)
@@ -55,6 +58,6 @@ def mend(edits: Iterable[Edit], report: Report) -> int:
     for name, own in by_path.items():
         old = own[0].span.source.text
         text, number = apply(old, own)
-        if replace(Path(name), name, old, text, report):
+        if replace(Path(name), name, old, tidied(name, old, text), report):
             done += number
     return done

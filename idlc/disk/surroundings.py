@@ -14,6 +14,11 @@ def ament_prefixes() -> tuple[Path, ...]:
     return tuple(dict.fromkeys(Path(prefix) for prefix in (*listed, sys.prefix) if prefix))
 
 
+def runs_nodes() -> bool:
+    """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
+    return bool(python_folders("rclpy"))
+
+
 def python_folders(package: str) -> list[Path]:
     """Return the folders that importing a package would use, without importing it."""
     spec = PathFinder.find_spec(package, sys.path)

@@ -69,6 +69,14 @@ class Target:
         modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
         return sorted({package for package, kind in modules if not self._finds(package, kind)})
 
+    def is_at_home(self) -> bool:
+        """Return whether this Python is one that the generated code is imported with.
+
+        It is if nodes run in it, or if some package that the code needs is installed.
+        """
+        needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
+        return surroundings.runs_nodes() or any(map(surroundings.python_folders, needed))
+
     def _finds(self, package: str, kind: str) -> bool:
         """Whether a package can be imported, found without importing, or lies next to this one."""
         inside = f"{kind}/__init__.py"

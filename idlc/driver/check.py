@@ -43,18 +43,31 @@ class Checked(msgspec.Struct, frozen=True):
 def check(options: CheckOptions, report: Report) -> Checked:
     """Report what is wrong with the files that paths mean, and with their packages.
 
-    With `fix`, what can be mended without harm is mended, and the rest reported.
+    With `fix`, what can be fixed without harm is fixed, and the rest reported.
     """
     fixed = 0
     if options.fix:
-        from idlc.disk.rewrite import mend
+        from idlc.disk.rewrite import edit
 
         found = _once(options, report)[1]
         if not report.had_errors:
-            fixed = mend((edit for one in found for edit in one.edits), report)
+            fixed = edit((one for problem in found for one in problem.edits), report, _tidied)
     checked, found = _once(options, report)
     report.extend(found)
     return msgspec.structs.replace(checked, fixed=fixed)
+
+
+def _tidied(name: str, old: str, new: str) -> str:
+    """Return an edited file as `idlc fmt` has it, if it was so before."""
+    from idlc.model.ir import KINDS
+    from idlc.syntax.format import format_file
+    from idlc.syntax.parse import parse
+    from idlc.text.source import Source
+
+    is_interface = name.rpartition(".")[2] in KINDS
+    if not is_interface or format_file(parse(Source(name, old))) != old:
+        return new
+    return format_file(parse(Source(name, new)))
 
 
 def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:

@@ -35,7 +35,11 @@ class GenOptions(NamedTuple):
 
 
 class Generated(NamedTuple):
-    """What a run of `idlc gen` did to one package. `files` counts all that it consists of."""
+    """What a run of `idlc gen` did to one package.
+
+    `files` counts all that it consists of; `needs` are packages that it imports
+    and that are not here.
+    """
 
     package: str
     out: str
@@ -43,6 +47,7 @@ class Generated(NamedTuple):
     files: int
     written: int = 0
     removed: int = 0
+    needs: tuple[str, ...] = ()
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
@@ -88,8 +93,7 @@ def _made(
             for target, given in wanted.items()
         ]
         if all(current):
-            _note_missing(wanted, report)
-            return tuple(one for packages in current for one in packages)
+            return _with_needs([one for done in current for one in done], wanted, report)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -101,9 +105,7 @@ def _made(
             one.target.drift(one.plan, one.lock)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
-    if packages:
-        _note_missing(wanted, report)
-    return tuple(_generated(one) for one in packages)
+    return _with_needs(map(_generated, packages), wanted if packages else (), report)
 
 
 def _planned(
@@ -184,11 +186,20 @@ def _needed(model: Model) -> set[str]:
     return implied | {name.package for name in model.interfaces}
 
 
-def _note_missing(targets: Iterable[Target], report: Report) -> None:
-    """Report IDL617 for generated packages that need others that cannot be imported here."""
+def _with_needs(
+    done: Iterable[Generated], targets: Iterable[Target], report: Report
+) -> tuple[Generated, ...]:
+    """Report IDL617 for generated packages that need others that cannot be imported here.
+
+    Where they are not imported anyway, that is only noted in what is returned.
+    """
+    quiet: dict[str, tuple[str, ...]] = {}
     for target in targets:
         missing = target.missing()
         if not missing:
+            continue
+        if not target.is_at_home():
+            quiet[target.name] = tuple(missing)
             continue
         names = ", ".join(f"`{name}`" for name in missing)
         wheels = " ".join(f"ros-jazzy-{name.replace('_', '-')}" for name in missing)
@@ -197,9 +208,10 @@ def _note_missing(targets: Iterable[Target], report: Report) -> None:
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
                 hint=f"install it with ROS 2 or `pip install {wheels}`, or run idlc gen again "
-                "with --vendor-deps, which writes it beside",
+                "with --vendor-deps, which writes it next to this one",
             )
         )
+    return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)
 
 
 def _generated(one: Package) -> Generated:

@@ -71,8 +71,8 @@ def problem(comment: Comment) -> Problem | None:
         return Problem(
             codes.UNIT_ACROSS_LINES,
             "[",
-            "a bracket that closes in another line; ROS 2's tools fail on such a unit",
-            "close the bracket in the same line",
+            "this bracket is closed on another line; ROS 2's tools fail on such a unit",
+            "close the bracket on the same line",
         )
     for text in (*comment.lines, *filter(None, [comment.unit])):
         try:

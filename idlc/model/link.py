@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Mapping, MutableMapping
+from collections.abc import Container, Iterable, Mapping, MutableMapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
-from idlc.model import derive, ir
+from idlc.model import catalog, derive, ir, names, slips
 from idlc.model.circles import circles
 from idlc.model.pool import Pool
 from idlc.model.types import STRINGS
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.source import Source, Span
-from idlc.text.suggest import did_you_mean
+from idlc.text.suggest import did_you_mean, package_hint
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer
@@ -168,44 +168,68 @@ class _Unknown:
         self._hints -= 1
         written = span.text
         known = self._messages.get(target.package)
-        if known is None and "/" in written and not self._library.names(target.package):
-            hint = self._library.nearby(target.package)
-            hint = hint or self._near(target.package, self._library.packages)
+        packages = self._library.packages() if self._hints >= 0 else ()
+        is_known = known is not None or target.package in packages
+        if "/" in written and not is_known and not self._library.names(target.package):
             return codes.UNKNOWN_PACKAGE.at(
                 span.at(0, len(target.package)),
                 f"unknown package `{target.package}`",
-                hint=hint or f"add `-I DIR` for the folder that holds `{target.package}`",
+                hint=self._library.nearby(target.package) or package_hint(target.package, packages),
             )
-        others: dict[ir.Kind, str] = {"srv": "a service", "action": "an action"}
-        what = next((others[kind] for kind in others if self._is(target, kind)), None)
-        if what:
-            hint = f"`{target.name}` is {what}; only messages can be the type of a field"
-        else:
-            hint = None if "/" in written else self._elsewhere(target.name)
-            hint = hint or self._near(target.name, lambda: self._known(target.package))
-            hint = hint or f"there is no `{target.name}.msg` in package `{target.package}`"
         at = span.at(written.rfind("/") + 1, len(written))
+        hint = self._hint(target, qualified="/" in written)
         return codes.UNKNOWN_TYPE.at(at, f"unknown type `{written}`", hint=hint)
 
-    def _is(self, target: ir.TypeName, kind: ir.Kind) -> bool:
-        return target._replace(kind=kind) in self._interfaces
+    def _hint(self, target: ir.TypeName, *, qualified: bool) -> str:
+        others: dict[ir.Kind, str] = {"srv": "a service", "action": "an action"}
+        for kind, what in others.items():
+            other = target._replace(kind=kind)
+            if other in self._interfaces or (self._hints >= 0 and self._library.source(other)):
+                return f"`{target.name}` is {what}; only messages can be the type of a field"
+        return (
+            (None if qualified else self._elsewhere(target.name))
+            or self._misnamed(target)
+            or self._near(target)
+            or _missing(target, self._library)
+        )
 
-    def _known(self, package: str) -> Iterable[str]:
-        names = self._library.names(package)
-        return {*self._messages.get(package, ()), *names, *_PRIMITIVES}
+    def _misnamed(self, target: ir.TypeName) -> str | None:
+        """Return a hint at a file whose name is this one but for its capitals."""
+        for name in sorted(self._messages.get(target.package, ())):
+            if name.lower() == target.name.lower() and not names.is_message_name(name):
+                return f"rename `{name}.msg` to `{target.name}.msg`"
+        return None
 
-    def _near(self, name: str, known: Callable[[], Iterable[str]]) -> str | None:
-        return did_you_mean(name, known()) if self._hints >= 0 else None
+    def _near(self, target: ir.TypeName) -> str | None:
+        if self._hints < 0:
+            return None
+        own = filter(names.is_message_name, self._messages.get(target.package, ()))
+        known = {*own, *self._library.names(target.package), *_PRIMITIVES}
+        return did_you_mean(target.name, known)
 
     def _elsewhere(self, name: str) -> str | None:
-        """Return a hint at another package that has a message of exactly this name."""
+        """Return a hint at a basic type, or at a package that has a message of just this name."""
         if self._hints < 0:
             return None
         library = self._library
-        for package in sorted(library.packages(), key=lambda one: (one != "std_msgs", one)):
-            if name in library.names(package):
-                return f"did you mean `{package}/{name}`?"
-        return None
+        packages = sorted(library.packages(), key=lambda one: (one != "std_msgs", one))
+        found = next((one for one in packages if name in library.names(one)), None)
+        if name.lower() in _PRIMITIVES and name.lower() != name:
+            other = f", or the message `{found}/{name}`" if found else ""
+            return f"did you mean `{name.lower()}`{other}?"
+        return f"did you mean `{found}/{name}`?" if found else slips.type_hint(name)
+
+
+def _missing(target: ir.TypeName, library: Library) -> str:
+    """Return the hint for a name that is like none of its package."""
+    package, name = target.package, target.name
+    known = set(library.names(package))
+    if known and known == set(catalog.names(package)):
+        return (
+            f"the built-in `{package}` is that of ROS 2 Jazzy, which has no `{name}`; "
+            "if yours does, add `-I DIR` with its sources, or source your ROS 2"
+        )
+    return f"there is no `{name}.msg` in package `{package}`"
 
 
 def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
@@ -220,9 +244,9 @@ def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
     left_out = len(path) - NAMED
     shown = [name.name for name in path[:NAMED]]
     shown += [f"{left_out} more"] if left_out > 0 else []
-    names = " → ".join((*shown, path[0].name))
+    circle = " → ".join((*shown, path[0].name))
     return codes.RECURSIVE_TYPE.at(
         span,
-        f"`{path[0].name}` contains itself: {names}",
+        f"`{path[0].name}` contains itself: {circle}",
         hint="ROS 2 has no recursive types; refer to the other message by an id",
     )

@@ -42,7 +42,7 @@ def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | Text | Fault:
     if type_.name == "bool":
         return _bool(text)
     if type_.info.low is None:
-        return _float(type_, text)
+        return _float(text)
     return _integer(type_, text)
 
 
@@ -78,15 +78,15 @@ def _shown(text: str) -> str:
 def _bool(text: str) -> bool | Fault:
     if _shape("BOOLEAN").fullmatch(text):
         return text.lower() in ("true", "1")
-    message = f"{_shown(text)} is not a bool" if text else "a bool value is missing"
+    message = f"{_shown(text)} is not a bool" if text else "the value is missing"
     return _fault(codes.BAD_VALUE, text, message, "write `true`, `false`, `1` or `0`")
 
 
-def _float(type_: ir.Primitive, text: str) -> float | Fault:
+def _float(text: str) -> float | Fault:
     value = _real(text) if len(text) > LONG or _shape("REAL").fullmatch(text) else None
     if value is not None:
         return value
-    message = f"{_shown(text)} is not a number" if text else f"a {type_.name} value is missing"
+    message = f"{_shown(text)} is not a number" if text else "the value is missing"
     return _fault(codes.BAD_VALUE, text, message, "write a number such as `1`, `-0.5` or `1e-3`")
 
 
@@ -94,15 +94,13 @@ def _integer(type_: ir.Primitive, text: str) -> int | Fault:
     info = type_.info
     value = _int(text) if len(text) > LONG or _shape("INTEGER").fullmatch(text) else None
     if value is None:
-        message = (
-            f"{_shown(text)} is not an integer" if text else f"a {type_.name} value is missing"
-        )
-        hint = "write decimal digits, or `0x`, `0o`, `0b` and digits"
+        message = f"{_shown(text)} is not an integer" if text else "the value is missing"
+        hint = "write a number such as `10`, `-3`, `0xff` or `0b101`"
         return _fault(codes.BAD_VALUE, text, message, hint)
     if info.low is None or info.high is None or info.low <= value <= info.high:
         return value
     hint = f"{type_.name} holds {info.low} to {info.high}"
-    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} does not fit {type_.name}", hint)
+    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} is out of range", hint)
 
 
 def _real(text: str) -> float | None:

@@ -11,7 +11,7 @@ from idlc.model.section import lower_section
 from idlc.syntax import tree
 from idlc.syntax.escapes import EscapeError, through_idl
 from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.diagnostics import Diagnostic, Edit, Report
 from idlc.text.source import Span
 
 SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
@@ -50,13 +50,12 @@ def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
 def _check_reading(file: tree.File, report: Report) -> None:
     source = file.source
     if source.text.startswith(tree.BYTE_ORDER_MARK):
-        report.add(
-            codes.BYTE_ORDER_MARK.at(
-                Span(source, 0, 1),
-                "the file begins with a byte order mark",
-                hint="save it as UTF-8 without a byte order mark",
-            )
+        found = codes.BYTE_ORDER_MARK.at(
+            Span(source, 0, 1),
+            "the file begins with a byte order mark",
+            hint="save it as UTF-8 without a byte order mark",
         )
+        report.add(msgspec.structs.replace(found, edits=(Edit(Span(source, 0, 1), ""),)))
     for section in file.sections:
         for line in section.lines:
             if line.newline and line.newline not in ("\n", "\r\n", "\r"):
@@ -80,13 +79,14 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
         at = file.separators[needed]
         span = Span(file.source, at, at + 3)
         hint = "remove it" if needed else "put services in .srv and actions in .action files"
-        report.add(codes.SEPARATOR_COUNT.at(span, f"{rule}, this is one more", hint=hint))
+        message = f"{rule}; this is one more" if needed else rule
+        report.add(codes.SEPARATOR_COUNT.at(span, message, hint=hint))
     else:
         end = len(file.source.text)
         report.add(
             codes.SEPARATOR_COUNT.at(
                 Span(file.source, end, end),
-                f"{rule}, this one has {_NUMBERS[count]}",
+                f"{rule}; this file has {_NUMBERS[count] if count else 'none'}",
                 hint="write `---` on a line of its own between the parts",
             )
         )
@@ -95,7 +95,7 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 def _has_near_separator(file: tree.File, expected: int) -> bool:
     """Tell whether some line was meant as a separator and is reported as such.
 
-    What stands behind the `expected` sections is not looked at any more.
+    What comes after the `expected` sections is not looked at any more.
     """
     if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
         return True

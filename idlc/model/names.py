@@ -45,6 +45,11 @@ def field_name_like(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", spaced.lower()).strip("_").lstrip("0123456789_")
 
 
+def message_name_like(name: str) -> str:
+    """Return the nearest valid message name, for hints; it may still not be valid."""
+    return "".join(part[:1].upper() + part[1:] for part in re.split(r"\W|_", name))
+
+
 @lru_cache(maxsize=4096)
 def snake_case(name: str) -> str:
     """Return the module name that rosidl derives from an interface's name (spec section 7.1)."""

@@ -6,7 +6,7 @@ from itertools import takewhile
 
 import msgspec
 
-from idlc.model import ir, names
+from idlc.model import ir, names, slips
 from idlc.model.comments import Comment, condense, problem
 from idlc.model.fault import Fault
 from idlc.model.literals import Text, default, scalar
@@ -14,7 +14,7 @@ from idlc.model.types import STRINGS, as_parsed, lower_type
 from idlc.syntax import tree
 from idlc.syntax.parse import parse_definition
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Edit, Report
 from idlc.text.source import Span
 
 _BROKEN = {
@@ -98,7 +98,10 @@ class _Section:
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
             body = parse_definition(text)
-            if isinstance(body, tree.Broken):
+            slip = slips.slip(text, body, self.name.kind)
+            if slip is not None:
+                self._add(line, 0, slip)
+            elif isinstance(body, tree.Broken):
                 self._broken(line, body)
             else:
                 self._warn_hash(line, text)
@@ -125,7 +128,20 @@ class _Section:
 
     def _broken(self, line: tree.Line, body: tree.Broken) -> None:
         span = self.file.span(line, body.piece)
-        self.report.add(_BROKEN[body.slug].at(span, body.message, hint=body.hint))
+        found = _BROKEN[body.slug].at(span, body.message, hint=body.hint)
+        self.report.add(msgspec.structs.replace(found, edits=self._edits(line, body, span)))
+
+    def _edits(self, line: tree.Line, body: tree.Broken, span: Span) -> tuple[Edit, ...]:
+        """Return the edit that makes a broken line what it was meant to be, if that is sure."""
+        if body.slug == codes.INDENTED_DEFINITION.slug:
+            return (Edit(span, ""),)
+        if not _is_dashes(line) or line.comment:
+            return ()
+        lines = [one for section in self.file.sections for one in section.lines]
+        count = len(self.file.separators) + sum(map(_is_dashes, lines))
+        if count != ir.KINDS.index(self.name.kind):
+            return ()
+        return (Edit(Span(span.source, line.start, line.start + len(line.code)), "---"),)
 
     def _warn_hash(self, line: tree.Line, text: str) -> None:
         """Warn when a comment begins between quotes that the writer saw as a pair."""
@@ -143,6 +159,11 @@ class _Section:
     def _add(self, line: tree.Line, offset: int, fault: Fault) -> None:
         piece = tree.Piece(" " * max(fault.end - fault.start, 0), offset + fault.start)
         self.report.add(fault.code.at(self.file.span(line, piece), fault.message, hint=fault.hint))
+
+    def _add_value(self, line: tree.Line, piece: tree.Piece, fault: Fault) -> None:
+        if slips.has_comment(piece.text):
+            fault = msgspec.structs.replace(fault, hint=slips.COMMENT_HINT)
+        self._add(line, piece.start, fault)
 
     def _type(self, line: tree.Line, type_: tree.Type) -> ir.FieldType:
         lowered = lower_type(type_, self.name.package)
@@ -199,7 +220,7 @@ class _Section:
             return None
         found = default(type_, piece.text)
         if isinstance(found, Fault):
-            self._add(line, piece.start, found)
+            self._add_value(line, piece, found)
             return None
         return found
 
@@ -219,7 +240,7 @@ class _Section:
             return None
         value = scalar(type_, body.value.text)
         if isinstance(value, Fault):
-            self._add(line, body.value.start, value)
+            self._add_value(line, body.value, value)
             return None
         return ir.Constant(
             name=body.name.text,
@@ -245,6 +266,10 @@ class _Section:
             )
         )
         return None
+
+
+def _is_dashes(line: tree.Line) -> bool:
+    return bool(line.definition) and not line.definition.strip("-")
 
 
 def _head_text(line: tree.Line) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from idlc.model import ir, names
+from idlc.model import ir, names, slips
 from idlc.model.fault import Fault
 from idlc.syntax import tree
 from idlc.text import codes
@@ -10,6 +10,7 @@ from idlc.text.suggest import did_you_mean
 
 STRINGS = {"string": False, "wstring": True}
 ROS1_TYPES = ("time", "duration")
+_NO_FIELDS = {"srv": "services", "action": "actions"}
 
 
 def lower_type(type_: tree.Type, package: str) -> ir.FieldType | Fault:
@@ -54,6 +55,8 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
     parts = piece.text.split("/")
     if len(parts) > 2:
         hint = f"write `{parts[0]}/{parts[-1]}`" if len(parts) == 3 else "write `package/Name`"
+        if len(parts) == 3 and parts[1] in _NO_FIELDS:
+            hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
         return _fault(codes.TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
     if len(parts) == 2 and not names.is_package_name(parts[0]):
         wrong = tree.Piece(parts[0], piece.start)
@@ -67,11 +70,15 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
 
 def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
     name = piece.text
-    primitive = None if qualified else did_you_mean(name, (*ir.PRIMITIVES, *STRINGS))
-    if primitive:
-        return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", primitive)
-    capitalised = name[:1].upper() + name[1:]
-    hint = f"write `{capitalised}`" if names.is_message_name(capitalised) else names.MESSAGE_HINT
+    if not qualified:
+        meant = slips.type_hint(name) or did_you_mean(name, (*ir.PRIMITIVES, *STRINGS))
+        if meant:
+            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
+        if dotted := slips.dotted(name):
+            message = f"`{name}` cannot be a type name"
+            return _fault(codes.TYPE_NAME, piece, message, f"write `{dotted}`")
+    like = names.message_name_like(name)
+    hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
     return _fault(codes.TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 

@@ -137,14 +137,13 @@ def _broken(text: str, error: UnexpectedInput) -> tree.Broken:
             "malformed-separator",
             whole,
             "a separator must be alone on its line" if alone else f"`{type_}` is not a separator",
-            "remove the blanks or the comment behind it"
+            "remove the blanks or the comment after it"
             if alone
             else "a separator is a line of exactly three dashes, `---`",
         )
     if not space:
-        return tree.Broken(
-            "missing-name", whole, f"`{type_}` has no name behind it", "write `TYPE name`"
-        )
+        hint = "write `TYPE name`; a comment begins with `#`"
+        return tree.Broken("missing-name", whole, f"`{type_}` has no name after it", hint)
     at = min(getattr(error, "pos_in_stream", None) or 0, len(type_) - 1)
     return tree.Broken(
         "malformed-type",

@@ -94,6 +94,7 @@ MANGLED_TEXT = Code("IDL311", "mangled-text", WARNING)
 WSTRING_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
 CONSTANT_MOVED = Code("IDL313", "repeated-section-constant", WARNING)
 FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
+ODD_TEXT = Code("IDL315", "odd-text", WARNING)
 
 # style
 STAMPED_WITHOUT_HEADER = Code("IDL401", "stamped-without-header", WARNING)
@@ -170,6 +171,7 @@ NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
 STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
+UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
 

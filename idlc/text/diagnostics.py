@@ -29,7 +29,7 @@ class Label(msgspec.Struct, frozen=True):
 
 
 class Edit(msgspec.Struct, frozen=True):
-    """A replacement that mends a problem and does no harm."""
+    """A replacement that fixes a problem and does no harm."""
 
     span: Span
     text: str

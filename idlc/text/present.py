@@ -7,6 +7,7 @@ a file reaches the terminal as itself.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 
 import msgspec
@@ -17,6 +18,10 @@ from idlc.text.source import Source, Span
 from idlc.text.visible import display_width, one_line, visible
 
 LIMIT = 100
+#: More problems than these end with a count for each code, and warnings that repeat are cut.
+MANY = 10
+#: Warnings of one code that are shown whole then; the others get a line each.
+REPEATS = 3
 LINE_WIDTH = 100
 TEXT_WIDTH = 1000
 BEFORE_CARET = 40
@@ -54,19 +59,44 @@ class _Mark(msgspec.Struct, frozen=True):
 def text(
     diagnostics: Iterable[Diagnostic], *, colour: bool = False, limit: int = LIMIT
 ) -> Iterator[str]:
-    """Yield each problem as a block of lines, then a count of those beyond `limit`."""
+    """Yield each problem as a block of lines, repeated warnings as a list of lines.
+
+    Ends with a count of those beyond `limit`.
+    """
     paint = _Paint(colour)
     diagnostics = list(diagnostics)
     if len(diagnostics) > limit:  # no error is left out for a warning
         diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
-    left_out = 0
-    for number, diagnostic in enumerate(diagnostics):
-        if number < limit:
-            yield "\n".join(_block(diagnostic, paint)) + "\n"
+    repeats = REPEATS if len(diagnostics) > MANY else MANY
+    shown: Counter[str] = Counter()
+    repeated: list[str] = []
+    for diagnostic in diagnostics[:limit]:
+        shown[diagnostic.code] += 1
+        if diagnostic.severity is Severity.WARNING and shown[diagnostic.code] > repeats:
+            repeated.append(_line(diagnostic, paint))
         else:
-            left_out += 1
-    if left_out:
-        yield f"… and {left_out} more; fix the first ones and run again\n"
+            yield "\n".join(_block(diagnostic, paint)) + "\n"
+    if repeated:
+        yield "\n".join(("more of these warnings:", *repeated)) + "\n"
+    if len(diagnostics) > limit:
+        yield f"… and {len(diagnostics) - limit} more; fix the first ones and run again\n"
+
+
+def _line(diagnostic: Diagnostic, paint: _Paint) -> str:
+    """Return a problem on one line."""
+    place = one_line(diagnostic.path)
+    if diagnostic.span:
+        place = _place(_mark(diagnostic.span, "", ""))
+    code = paint(diagnostic.severity.name.lower(), diagnostic.code)
+    return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}"
+
+
+def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
+    """Yield a line for each code that was found, the most frequent first."""
+    counts = Counter(diagnostic.code for diagnostic in diagnostics)
+    width = max(map(len, map(str, counts.values())), default=0)
+    for code, number in sorted(counts.items(), key=lambda one: (-one[1], one[0])):
+        yield f"{number:>{width}}  {code} {CODES[code].slug if code in CODES else ''}\n"
 
 
 def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:

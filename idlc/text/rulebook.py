@@ -41,7 +41,7 @@ ignore = ["wide-string"]
 ```
 
 The categories are correctness, portability, style and package. In a file,
-`# idlc: ignore[IDL405] why` silences one warning: behind a definition on that line, on a line of
+`# idlc: ignore[IDL405] why` silences one warning: after a definition on that line, on a line of
 its own for the next definition, at the head for the whole file. The reason is mandatory. Beside a
 unit write `ignore(IDL405)`, because ROS 2 takes text in square brackets for the unit.
 """

@@ -19,11 +19,18 @@ def edit_distance(left: str, right: str) -> int:
     return row[-1]
 
 
+#: Ends of package names, which say nothing about how much two names are alike.
+_ENDS = ("_msgs", "_interfaces", "_srvs", "_actions")
+
+
 def closest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name that is nearest, or `None` if none is near."""
+    """Return the known name that is nearest, or `None` if none is near.
+
+    A name of three letters may have one of them wrong, a long one three.
+    """
     if len(name) > 100:
         return None
-    limit = len(name) // 3 + 1
+    limit = min(max(1, len(name) // 3), 3)
     best: tuple[int, str] | None = None
     for candidate in known:
         if abs(len(candidate) - len(name)) > limit:
@@ -32,6 +39,32 @@ def closest(name: str, known: Iterable[str]) -> str | None:
         if distance <= limit and (best is None or (distance, candidate) < best):
             best = distance, candidate
     return best[1] if best else None
+
+
+def package_hint(name: str, known: Iterable[str]) -> str:
+    """Return the hint for a package that is nowhere to be found."""
+    near = _closest_package(name, known)
+    if near is not None:
+        return f"did you mean `{near}`?"
+    return (
+        f"`{name}` is not built in; add `-I DIR` with the folder of its sources, "
+        "or source the ROS 2 workspace that has it"
+    )
+
+
+def _closest_package(name: str, known: Iterable[str]) -> str | None:
+    """Return the package of the nearest name, or `None` if none is near.
+
+    Digits are no slips of the pen: `nav2_msgs` is not `nav_msgs`.
+    """
+    end = next((end for end in _ENDS if name.endswith(end)), "")
+    digits = "".join(filter(str.isdigit, name))
+    alike = [one for one in known if "".join(filter(str.isdigit, one)) == digits]
+    same_end = {one.removesuffix(end): one for one in alike if one.endswith(end)}
+    found = closest(name.removesuffix(end), same_end)
+    if found is not None:
+        return same_end[found]
+    return closest(name, (one for one in alike if not one.endswith(end)))
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str | None:

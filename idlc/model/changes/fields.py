@@ -153,7 +153,7 @@ def _added(sides: Sides, field: ir.Field, *, is_behind: bool) -> Change:
         frozenset(levels),
         span=field.name_span,
         path=sides.path,
-        hint="a new message beside this one leaves robots in the field alone",
+        hint="add a new message instead, if old and new programs must understand each other",
     )
 
 

@@ -101,7 +101,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
                     f"the type hash of `{name}` changed",
                     frozenset({"hash"}),
                     path=source.path if source else name,
-                    hint="compare with a folder or a git revision to see what did it",
+                    hint="compare with a folder or a git revision to see what changed it",
                 )
             )
     come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)

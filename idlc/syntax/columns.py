@@ -1,0 +1,214 @@
+"""The gaps between the words of definitions: those that lay a section out stay, others go.
+
+A gap is in order if it is as narrow as such gaps are, if it puts its word into a column with
+another word of its kind, or if all gaps of its kind in the block are the same. Any other gap is
+stray: its word moves into the nearest column of its block, or else close to the word before it.
+
+When a word moves, those after it keep their columns if they were in one. So no step makes stray
+what another one has placed, and laying out twice is laying out once.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+from idlc.syntax import tree
+from idlc.syntax.parse import parse_definition
+
+#: A tab reaches to the next multiple of one of these, whichever makes more sense of a section.
+TAB_WIDTHS = (8, 4)
+#: Kinds of words in the order in which they stand, and the narrow gaps before them, usual first.
+NARROW = {
+    "name": (" ",),
+    "default": (" ",),
+    "sign": (" ", ""),
+    "value": (" ", ""),
+    "comment": ("  ", " "),
+}
+
+#: What can be in one column with another word: where it starts, or where a number ends.
+_Edge: TypeAlias = tuple[str, int]
+
+
+class _Word:
+    """A word and the gap before it, which reaches from column `after` to column `start`."""
+
+    def __init__(self, kind: str, gap: str, text: str) -> None:
+        self.kind = kind
+        self.gap = gap
+        self.text = text
+        self.after = self.start = self.end = 0
+        self.keeps_column = False
+
+    @property
+    def is_wide(self) -> bool:
+        return bool(self.gap) and self.gap not in NARROW[self.kind]
+
+    @property
+    def edges(self) -> tuple[_Edge, ...]:
+        start = ("start", self.start)
+        return (start, ("end", self.end)) if self.kind in ("default", "value") else (start,)
+
+
+class _Row:
+    """A line as words; `block` is the number of its run of definitions."""
+
+    def __init__(self, line: tree.Line, block: int, tab: int) -> None:
+        self.block = block
+        self._words = list(_words(line))
+        self._tab = tab
+        self._measure()
+
+    @property
+    def text(self) -> str:
+        return "".join(word.gap + word.text for word in self._words)
+
+    @property
+    def is_comment(self) -> bool:
+        """Whether it is a comment and nothing else."""
+        return len(self._words) == 1 and bool(self._words[0].gap)
+
+    def find(self, kind: str) -> _Word | None:
+        """Return the row's word of a kind."""
+        return next((word for word in self._words if word.kind == kind), None)
+
+    def change(self, word: _Word, gap: str) -> None:
+        """Change the gap before a word; later words that keep their columns get new gaps too."""
+        columns = [one.start for one in self._words]
+        word.gap = gap
+        self._measure()
+        for later, column in zip(self._words, columns, strict=True):
+            if later.keeps_column and later is not word and later.start != column:
+                later.gap = " " * max(column - later.after, 1)
+                self._measure()
+
+    def _measure(self) -> None:
+        text = ""
+        for word in self._words:
+            word.after = len(text.expandtabs(self._tab))
+            text += word.gap
+            word.start = len(text.expandtabs(self._tab))
+            text += word.text
+            word.end = len(text.expandtabs(self._tab))
+
+
+_Column: TypeAlias = "list[tuple[_Row, _Word]]"
+
+
+def lay_out(lines: Sequence[tree.Line]) -> list[str]:
+    """Return the texts of a section's lines, without blanks at their ends."""
+    old = [(line.code + line.comment).rstrip() for line in lines]
+    tabs = TAB_WIDTHS if any("\t" in line.code for line in lines) else TAB_WIDTHS[:1]
+    found = [_laid_out(lines, old, tab) for tab in tabs]
+    return min(found, key=lambda new: sum(map(str.__ne__, old, new)))
+
+
+def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[str]:
+    rows: dict[int, _Row] = {}
+    block = 0
+    for number, line in enumerate(lines):
+        if line.definition or line.is_indented_comment:
+            rows[number] = _Row(line, block, tab)
+        else:
+            block += 1
+    kinds = [[(row, word) for row in rows.values() if (word := row.find(kind))] for kind in NARROW]
+    for found in kinds:
+        columns = _columns(found)
+        for _, word in found:
+            in_column = bool(word.gap) and not columns.isdisjoint(word.edges)
+            word.keeps_column = word.is_wide or in_column
+    for row in rows.values():
+        _balance(row)
+    for found in kinds:
+        _place(found)
+    return [rows[number].text if number in rows else text for number, text in enumerate(old)]
+
+
+def _words(line: tree.Line) -> Iterator[_Word]:
+    text = line.definition
+    end = 0
+    for kind, piece in _pieces(text) if text else ():
+        if piece.text:
+            # what counts as a blank between words, such as a no-break space, becomes one
+            gap = re.sub(r"[^ \t]", " ", line.code[end : piece.start])
+            yield _Word(kind, gap, line.code[piece.start : piece.end])
+            end = piece.end
+    if line.comment:
+        yield _Word("comment", re.sub(r"[^ \t]", " ", line.code[end:]), line.comment.rstrip())
+
+
+def _pieces(text: str) -> Iterator[tuple[str, tree.Piece]]:
+    body = parse_definition(text)
+    if isinstance(body, tree.Broken):
+        yield "type", tree.Piece(text, 0)
+        return
+    yield "type", body.type.whole
+    yield "name", body.name
+    if isinstance(body, tree.Constant):
+        yield "sign", tree.Piece("=", text.index("=", body.type.whole.end))
+        yield "value", body.value
+    elif body.default is not None:
+        yield "default", body.default
+
+
+def _balance(row: _Row) -> None:
+    """Give `=` a blank on either side if there is one on one side."""
+    sign, value = row.find("sign"), row.find("value")
+    if sign is not None and value is not None and bool(sign.gap) != bool(value.gap):
+        row.change(value if sign.gap else sign, " ")
+
+
+def _columns(words: _Column) -> set[_Edge]:
+    """Return the edges that several words share, at least one of them after a wide gap."""
+    placed = [word for _, word in words if word.gap]
+    shared = Counter(edge for word in placed for edge in word.edges)
+    wide = {edge for word in placed if word.is_wide for edge in word.edges}
+    return {edge for edge in wide if shared[edge] > 1}
+
+
+def _place(words: _Column) -> None:
+    """Close the stray gaps before the words of one kind in a section."""
+    columns = _columns(words)
+    usual = _usual(words)
+    blocks: dict[int, _Column] = defaultdict(list)
+    for row, word in words:
+        blocks[row.block].append((row, word))
+    for block in blocks.values():
+        if _is_even(block):
+            continue
+        anchors = [(at, word.start) for at, (_, word) in enumerate(block) if _in(columns, word)]
+        for at, (row, word) in enumerate(block):
+            is_loose = word.is_wide or (not word.gap and "" not in NARROW[word.kind])
+            if is_loose and not row.is_comment and columns.isdisjoint(word.edges):
+                width = _nearest(anchors, at) - word.after
+                row.change(word, " " * width if width > 0 else usual)
+
+
+def _in(columns: set[_Edge], word: _Word) -> bool:
+    return ("start", word.start) in columns
+
+
+def _is_even(block: _Column) -> bool:
+    """Tell whether the block's gaps are the same; a comment may stand where it likes if alone."""
+    gaps = {word.gap for row, word in block if not row.is_comment}
+    alone = len(block) == 1 and block[0][1].kind != "comment"
+    return len(gaps) == 1 and "" not in gaps and not alone
+
+
+def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
+    """Return the column of the row nearest to one, the row above first; 0 if there is none."""
+    behind = bisect(anchors, (at, 0))
+    close = anchors[max(behind - 1, 0) : behind + 1]
+    return min(close, key=lambda anchor: abs(anchor[0] - at), default=(0, 0))[1]
+
+
+def _usual(words: _Column) -> str:
+    """Return the narrow gap before words of a kind: of those before comments the most common."""
+    if not words or words[0][1].kind != "comment":
+        return " "  # where `=` has a stray gap, it has one on either side
+    counts = Counter(word.gap for _, word in words)
+    return max(NARROW["comment"], key=lambda gap: counts[gap])
