@@ -36,8 +36,8 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     A gap between words stays if it is one blank (or two before a comment), if it puts a word in one
     column with another of its kind, or if the whole block has the same gap. A stray word moves
     into the column of its neighbours, or else next to the word before it. `=` has blanks on both
-    sides or on none. Blanks at the ends of lines go, a file ends with one line end, and there are
-    at most two blank lines in a row.
+    sides or on none. There are at most two blank lines in a row. A file that is changed also loses
+    the blanks at the ends of its lines; these alone, or a missing line end, change no file.
 
     Nothing else changes, so the meaning stays. Files with errors are left alone. PATH is as for
     `idlc check`.

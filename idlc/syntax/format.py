@@ -6,18 +6,24 @@ another line, so the meaning stays. Formatting twice is formatting once.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import takewhile
 
 from idlc.syntax import tree
 from idlc.syntax.columns import lay_out
 
+#: Blanks at the end of a line.
+_INVISIBLE = re.compile(r"[ \t]+$", re.MULTILINE)
 #: More blank lines than these in a row say nothing.
 BLANK_LINES = 2
 
 
 def format_file(file: tree.File) -> str:
-    """Return the text of a file in canonical layout; lines that are no definitions stay."""
+    """Return the text of a file in canonical layout; lines that are no definitions stay.
+
+    A file that differs only in what nobody sees, at the ends of lines and of the file, is in order.
+    """
     newline = _newline(file)
     out: list[str] = []
     for number, section in enumerate(file.sections):
@@ -26,7 +32,12 @@ def format_file(file: tree.File) -> str:
         out += _trimmed(_texts(section), first=number == 0)
     while out and not out[-1]:
         del out[-1]
-    return "".join(line + newline for line in out)
+    text = "".join(line + newline for line in out)
+    return file.source.text if _look_alike(text, file.source.text) else text
+
+
+def _look_alike(one: str, other: str) -> bool:
+    return _INVISIBLE.sub("", one).rstrip() == _INVISIBLE.sub("", other).rstrip()
 
 
 def _newline(file: tree.File) -> str:
