@@ -4,6 +4,7 @@
 match, and fails, so that the changes are looked at.
 """
 
+import os
 import shlex
 import shutil
 import subprocess
