@@ -54,7 +54,7 @@ def setup_file(data: bytes, _: Path) -> None:
 
 def launch_file(data: bytes, _: Path) -> None:
     """A launch file gets a node."""
-    python(data, lambda text: launch_py.add_node(text, "demo", "talker"))
+    python(data, lambda text: launch_py.add_node(text, launch_py.Started("demo", "talker")))
 
 
 def setup_cfg(data: bytes, _: Path) -> None:

@@ -100,7 +100,7 @@ def view(planned: Plan) -> TestView:
         node=node.name,
         module=f"{node.package}.{node.name}",
         imports=_imports(planned, page),
-        constants=tuple(_constants(planned)),
+        constants=(*_constants(planned), *(f"{p.goal} = {p.type}.Goal()" for p in parts if p.goal)),
         parts=tuple(parts),
         timers=tuple(
             TimerView("tick" if n == 0 else f"tick_{n + 1}", _patience(seconds))
@@ -150,7 +150,7 @@ def _part(
         create_cancellable="\n    ".join(call(*cancellable, depth=1)),
         said=said[0] if said else "",
         said_at_last=said[-1] if said else "",
-        goal=f"{type_}.Goal()",
+        goal=f"{word.upper()}_GOAL" if endpoint.role == "action_server" else "",
         ends=planned.once and len(planned.clients) == 1,
         patience=_patience(1 / (endpoint.rate or DEFAULT_RATE)),
     )

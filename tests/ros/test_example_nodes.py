@@ -112,7 +112,7 @@ def test_a_goal_whose_server_dies_is_given_up(start):
 def test_a_client_without_a_server_says_so(start, name):
     client = start(name, "--server-timeout", "0.5")
     assert client.ends() == 1
-    assert "there is no server" in client.output
+    assert "gave up waiting for a server" in client.output
 
 
 @pytest.mark.parametrize(

@@ -13,18 +13,11 @@ def generate_launch_description() -> LaunchDescription:
             Node(package='my_robot_controller', executable='sensor_subscriber', output='screen'),
             Node(package='my_robot_controller', executable='command_publisher', output='screen'),
             Node(package='my_robot_controller', executable='add_two_ints_server', output='screen'),
-            Node(package='my_robot_controller', executable='add_two_ints_client', output='screen'),
             Node(
                 package='my_robot_controller',
                 executable='countdown_action_server',
                 output='screen',
             ),
-            Node(
-                package='my_robot_controller',
-                executable='countdown_action_client',
-                output='screen',
-            ),
             Node(package='my_robot_controller', executable='execute_task_server', output='screen'),
-            Node(package='my_robot_controller', executable='execute_task_client', output='screen'),
         ]
     )

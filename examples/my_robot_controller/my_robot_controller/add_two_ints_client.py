@@ -33,11 +33,11 @@ class AddTwoIntsClient(Node):
     async def call_add_two_ints(self, request: AddTwoInts.Request) -> bool:
         """Call add_two_ints once; return whether it answered in time."""
         if not await self.until(self.add_two_ints_client.service_is_ready):
-            self.get_logger().error('add_two_ints: there is no server')
+            self.get_logger().error('add_two_ints: gave up waiting for a server')
             return False
         answer = self.add_two_ints_client.call_async(request)
         if not await self.until(answer.done):
-            self.get_logger().error('add_two_ints: no answer in time')
+            self.get_logger().error('add_two_ints: gave up waiting for an answer')
             return False
         response: AddTwoInts.Response | None = answer.result()
         if response is None:

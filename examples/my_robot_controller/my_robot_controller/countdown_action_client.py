@@ -31,33 +31,30 @@ class CountdownActionClient(Node):
         """Create what the node consists of."""
         super().__init__('countdown_action_client')
         self.timeout = timeout
-        self.countdown_goal: ClientGoalHandle | None = None
+        self.countdown_sent: Future | None = None
         self.countdown_client = ActionClient(self, Countdown, 'countdown')
 
     async def send_countdown(self, goal: Countdown.Goal) -> bool:
         """Send a goal to countdown; return whether it was reached."""
         if not await self.until(self.countdown_client.server_is_ready):
-            self.get_logger().error('countdown: there is no server')
+            self.get_logger().error('countdown: gave up waiting for a server')
             return False
-        answer = self.countdown_client.send_goal_async(
-            goal,
-            feedback_callback=self.follow_countdown,
-        )
-        if not await self.until(answer.done):
-            self.get_logger().error('countdown: no answer in time')
+        sent = self.countdown_client.send_goal_async(goal, feedback_callback=self.follow_countdown)
+        self.countdown_sent = sent
+        if not await self.until(sent.done):
+            self.get_logger().error('countdown: gave up waiting for an answer')
             return False
-        goal_handle: ClientGoalHandle = answer.result()
+        goal_handle: ClientGoalHandle = sent.result()
         if not goal_handle.accepted:
             self.get_logger().error('countdown: the goal was rejected')
             return False
-        self.countdown_goal = goal_handle
         ending = goal_handle.get_result_async()
         while not ending.done():
             if not self.countdown_client.server_is_ready():
                 self.get_logger().error('countdown: the server has gone')
                 return False
             await self.pause(0.05)
-        self.countdown_goal = None
+        self.countdown_sent = None
         result: Countdown.Result = ending.result().result
         self.get_logger().info(
             f'countdown: final_count={result.final_count!r} success={result.success!r}'
@@ -70,10 +67,10 @@ class CountdownActionClient(Node):
         self.get_logger().info(f'countdown: current_count={feedback.current_count!r}')
 
     async def cancel_countdown(self) -> None:
-        """Ask the server to cancel the goal that it works on."""
-        goal_handle = self.countdown_goal
-        if goal_handle is not None:
-            answer = goal_handle.cancel_goal_async()
+        """Ask the server to cancel the goal that it was sent."""
+        sent = self.countdown_sent
+        if sent is not None and await self.until(sent.done):
+            answer = sent.result().cancel_goal_async()
             if await self.until(answer.done):
                 self.get_logger().info('countdown: cancelled')
 

@@ -50,7 +50,7 @@ class CountdownActionServer(Node):
         return CancelResponse.ACCEPT
 
     async def execute_countdown(self, goal_handle: ServerGoalHandle) -> Countdown.Result:
-        """Work on a goal, step by step, until it is reached, cancelled or replaced."""
+        """Work on a goal, step by step, until it is reached, cancelled or given up."""
         result = Countdown.Result(
             # The last number reached; 0 unless cancelled
             final_count=0,
@@ -65,7 +65,7 @@ class CountdownActionServer(Node):
             goal_handle.publish_feedback(feedback)
             await self.pause(1.0)
             if not goal_handle.is_active:
-                self.get_logger().info('countdown: replaced')
+                self.get_logger().info('countdown: given up')
                 return result
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()

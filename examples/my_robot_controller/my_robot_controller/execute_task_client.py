@@ -31,33 +31,33 @@ class ExecuteTaskClient(Node):
         """Create what the node consists of."""
         super().__init__('execute_task_client')
         self.timeout = timeout
-        self.execute_task_goal: ClientGoalHandle | None = None
+        self.execute_task_sent: Future | None = None
         self.execute_task_client = ActionClient(self, ExecuteTask, 'execute_task')
 
     async def send_execute_task(self, goal: ExecuteTask.Goal) -> bool:
         """Send a goal to execute_task; return whether it was reached."""
         if not await self.until(self.execute_task_client.server_is_ready):
-            self.get_logger().error('execute_task: there is no server')
+            self.get_logger().error('execute_task: gave up waiting for a server')
             return False
-        answer = self.execute_task_client.send_goal_async(
+        sent = self.execute_task_client.send_goal_async(
             goal,
             feedback_callback=self.follow_execute_task,
         )
-        if not await self.until(answer.done):
-            self.get_logger().error('execute_task: no answer in time')
+        self.execute_task_sent = sent
+        if not await self.until(sent.done):
+            self.get_logger().error('execute_task: gave up waiting for an answer')
             return False
-        goal_handle: ClientGoalHandle = answer.result()
+        goal_handle: ClientGoalHandle = sent.result()
         if not goal_handle.accepted:
             self.get_logger().error('execute_task: the goal was rejected')
             return False
-        self.execute_task_goal = goal_handle
         ending = goal_handle.get_result_async()
         while not ending.done():
             if not self.execute_task_client.server_is_ready():
                 self.get_logger().error('execute_task: the server has gone')
                 return False
             await self.pause(0.05)
-        self.execute_task_goal = None
+        self.execute_task_sent = None
         result: ExecuteTask.Result = ending.result().result
         self.get_logger().info(f'execute_task: success={result.success!r}')
         return bool(ending.result().status == GoalStatus.STATUS_SUCCEEDED)
@@ -68,10 +68,10 @@ class ExecuteTaskClient(Node):
         self.get_logger().info(f'execute_task: current_status={feedback.current_status!r}')
 
     async def cancel_execute_task(self) -> None:
-        """Ask the server to cancel the goal that it works on."""
-        goal_handle = self.execute_task_goal
-        if goal_handle is not None:
-            answer = goal_handle.cancel_goal_async()
+        """Ask the server to cancel the goal that it was sent."""
+        sent = self.execute_task_sent
+        if sent is not None and await self.until(sent.done):
+            answer = sent.result().cancel_goal_async()
             if await self.until(answer.done):
                 self.get_logger().info('execute_task: cancelled')
 

@@ -50,7 +50,7 @@ class ExecuteTaskServer(Node):
         return CancelResponse.ACCEPT
 
     async def execute_execute_task(self, goal_handle: ServerGoalHandle) -> ExecuteTask.Result:
-        """Work on a goal, step by step, until it is reached, cancelled or replaced."""
+        """Work on a goal, step by step, until it is reached, cancelled or given up."""
         result = ExecuteTask.Result(
             success=False,
         )
@@ -64,7 +64,7 @@ class ExecuteTaskServer(Node):
             goal_handle.publish_feedback(feedback)
             await self.pause(1.0)
             if not goal_handle.is_active:
-                self.get_logger().info('execute_task: replaced')
+                self.get_logger().info('execute_task: given up')
                 return result
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()

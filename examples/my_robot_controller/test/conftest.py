@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-import os
 from pathlib import Path
+import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -17,51 +18,77 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
+#: How many seconds to wait for what is to happen.
+PATIENCE = 20.0
+
 
 class Running:
-    """A node in a process of its own."""
+    """A node in a process of its own, with the observer beside it."""
 
-    def __init__(self, log: Path, *words: str) -> None:
+    def __init__(self, observer: Node, log: Path, *words: str) -> None:
         """Start the node; what it prints goes into a file."""
+        self._observer = observer
         self._log = log
         command = [sys.executable, '-u', '-m', *words]
-        self.process = subprocess.Popen(command, stdout=log.open('w'), stderr=subprocess.STDOUT)
+        with log.open('w') as output:
+            self.process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
 
     @property
     def output(self) -> str:
         """Return what the node has printed up to now."""
         return self._log.read_text()
 
+    def said(self, text: str, times: int = 1) -> bool:
+        """Return whether the node has logged so many lines that begin with the text."""
+        return self.output.count(f']: {text}') >= times
+
     def ended(self) -> bool:
-        """Whether the process has ended by itself."""
+        """Return whether the process has ended by itself."""
         return self.process.poll() is not None
+
+    def until(self, condition: Callable[[], bool], seconds: float = PATIENCE) -> None:
+        """Let the observer work until a condition holds; fail if it never will."""
+        __tracebackhide__ = True
+        why = f'this did not happen within {seconds} seconds'
+        deadline = time.monotonic() + seconds
+        ended = False
+        while not condition():
+            if not ended and self.ended():
+                ended = True
+                why = f'the node ended with status {self.process.returncode} before this'
+                # what it sent at last may be on its way
+                deadline = min(deadline, time.monotonic() + 1.0)
+            if time.monotonic() > deadline:
+                pytest.fail(f'{why}; it printed:\n{self.output}')
+            rclpy.spin_once(self._observer, timeout_sec=0.05)
 
     def end(self, how: signal.Signals = signal.SIGINT) -> int:
         """Ask the node to end; return the status that it ends with."""
         self.process.send_signal(how)
-        return self.process.wait(timeout=20)
+        self.until(self.ended)
+        return self.process.returncode
 
 
 @pytest.fixture
-def start(tmp_path: Path, observer: Node) -> Iterator[Callable[..., Running]]:
-    """Yield a function that starts a node beside the observer, to be ended with the test."""
-    nodes: list[Running] = []
-
-    def started(module: str, *words: str) -> Running:
-        nodes.append(Running(tmp_path / f'{len(nodes)}.log', module, *words))
-        return nodes[-1]
-
-    yield started
-    for node in nodes:
-        node.process.kill()
-        node.process.wait()
-
-
-@pytest.fixture
-def observer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
-    """Yield a node that looks at others; nothing that is sent leaves this machine."""
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Give the test a ROS domain that no other has; nothing that is sent leaves this machine."""
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    monkeypatch.setenv('RCUTILS_CONSOLE_OUTPUT_FORMAT', '[{severity}] [{name}]: {message}')
+    monkeypatch.setenv('RCUTILS_COLORIZED_OUTPUT', '0')
+    with socket.socket() as held:  # a port for each domain, which only one test can have
+        for number in random.sample(range(1, 101), 100):
+            try:
+                held.bind(('127.0.0.1', 22119 + number))
+            except OSError:
+                continue
+            monkeypatch.setenv('ROS_DOMAIN_ID', str(number))
+            break
+        yield
+
+
+@pytest.fixture
+def observer(domain: None) -> Iterator[Node]:
+    """Yield a node that looks at others."""
     rclpy.init()
     node = rclpy.create_node('observer')
     yield node
@@ -70,13 +97,15 @@ def observer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
 
 
 @pytest.fixture
-def until(observer: Node) -> Callable[..., bool]:
-    """Return a function that lets the observer work until a condition holds."""
+def start(tmp_path: Path, observer: Node) -> Iterator[Callable[..., Running]]:
+    """Yield a function that starts a node beside the observer, to be ended with the test."""
+    nodes: list[Running] = []
 
-    def holds(condition: Callable[[], bool], seconds: float = 20.0) -> bool:
-        deadline = time.monotonic() + seconds
-        while not condition() and time.monotonic() < deadline:
-            rclpy.spin_once(observer, timeout_sec=0.05)
-        return condition()
+    def started(module: str, *words: str) -> Running:
+        nodes.append(Running(observer, tmp_path / f'{len(nodes)}.log', module, *words))
+        return nodes[-1]
 
-    return holds
+    yield started
+    for node in nodes:
+        node.process.kill()
+        node.process.wait()

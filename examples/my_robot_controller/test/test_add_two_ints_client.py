@@ -6,18 +6,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import signal
 from typing import Any
 
 from my_robot_controller.srv import AddTwoInts
+import pytest
 from rclpy.node import Node
 
 MODULE = 'my_robot_controller.add_two_ints_client'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_calls_add_two_ints(start: Start, observer: Node, until: Until) -> None:
-    """The node calls add_two_ints."""
+def test_it_calls_add_two_ints(start: Start, observer: Node) -> None:
+    """The node calls add_two_ints and says what is answered."""
     requests: list[object] = []
 
     def answer(request: object, response: object) -> object:
@@ -26,16 +27,25 @@ def test_it_calls_add_two_ints(start: Start, observer: Node, until: Until) -> No
 
     observer.create_service(AddTwoInts, 'add_two_ints', answer)
     node = start(MODULE)
-    assert until(lambda: bool(requests))
-    assert isinstance(requests[0], AddTwoInts.Request)
-    assert until(node.ended)
+    node.until(lambda: bool(requests))
+    node.until(lambda: node.said('Result: '))
+    node.until(node.ended)
     assert node.process.returncode == 0, node.output
 
 
-def test_it_says_so_when_nobody_answers(start: Start, until: Until) -> None:
+def test_it_says_so_when_nobody_answers(start: Start) -> None:
     """Without a server the node ends, with a message and a status."""
     node = start(MODULE, '--server-timeout', '0.5')
-    assert until(node.ended)
-    assert node.process.returncode == 1
-    assert 'no server' in node.output
-    assert 'Traceback' not in node.output
+    node.until(node.ended)
+    assert node.process.returncode == 1, node.output
+    assert 'gave up waiting for a server' in node.output, node.output
+    assert 'Traceback' not in node.output, node.output
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
+    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    node = start(MODULE, '--server-timeout', '1000')
+    node.until(lambda: 'add_two_ints_client' in observer.get_node_names())
+    assert node.end(how) == 130, node.output
+    assert 'Traceback' not in node.output, node.output

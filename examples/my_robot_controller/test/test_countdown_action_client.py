@@ -6,39 +6,80 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import signal
 from typing import Any
 
 from my_robot_controller.action import Countdown
-from rclpy.action.server import ActionServer, ServerGoalHandle
+import pytest
+from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
 from rclpy.node import Node
+from rclpy.task import Future
 
 MODULE = 'my_robot_controller.countdown_action_client'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_sends_countdown(start: Start, observer: Node, until: Until) -> None:
-    """The node sends a goal to countdown."""
-    goals: list[object] = []
+def test_it_sends_countdown(start: Start, observer: Node) -> None:
+    """The node sends a goal to countdown, and says what is reported and what comes of it."""
+    goals: list[ServerGoalHandle] = []
+    reached: Future = Future()
 
-    def execute(goal_handle: ServerGoalHandle) -> Countdown.Result:
-        goals.append(goal_handle.request)
+    async def execute(goal_handle: ServerGoalHandle) -> Countdown.Result:
+        goals.append(goal_handle)
+        await reached
         goal_handle.succeed()
         return Countdown.Result()
 
     server = ActionServer(observer, Countdown, 'countdown', execute)
     node = start(MODULE)
-    assert until(lambda: bool(goals))
-    assert isinstance(goals[0], Countdown.Goal)
-    assert until(node.ended)
+    node.until(lambda: bool(goals))
+
+    def reported() -> bool:
+        goals[0].publish_feedback(Countdown.Feedback())
+        return bool(node.said('countdown: current_count='))
+
+    node.until(reported)
+    reached.set_result(None)
+    node.until(lambda: node.said('countdown: final_count='))
+    node.until(node.ended)
     assert node.process.returncode == 0, node.output
     server.destroy()
 
 
-def test_it_says_so_when_nobody_answers(start: Start, until: Until) -> None:
+def test_it_cancels_countdown_when_it_is_asked_to_end(start: Start, observer: Node) -> None:
+    """The goal that the node has sent to countdown does not outlive the node."""
+    goals: list[ServerGoalHandle] = []
+
+    async def execute(goal_handle: ServerGoalHandle) -> Countdown.Result:
+        goals.append(goal_handle)
+        await Future()
+        return Countdown.Result()
+
+    def cancel(goal_handle: ServerGoalHandle) -> CancelResponse:
+        goals.remove(goal_handle)
+        return CancelResponse.ACCEPT
+
+    server = ActionServer(observer, Countdown, 'countdown', execute, cancel_callback=cancel)
+    node = start(MODULE)
+    node.until(lambda: bool(goals))
+    assert node.end() == 130, node.output
+    assert not goals, node.output
+    server.destroy()
+
+
+def test_it_says_so_when_nobody_answers(start: Start) -> None:
     """Without a server the node ends, with a message and a status."""
     node = start(MODULE, '--server-timeout', '0.5')
-    assert until(node.ended)
-    assert node.process.returncode == 1
-    assert 'no server' in node.output
-    assert 'Traceback' not in node.output
+    node.until(node.ended)
+    assert node.process.returncode == 1, node.output
+    assert 'gave up waiting for a server' in node.output, node.output
+    assert 'Traceback' not in node.output, node.output
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
+    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    node = start(MODULE, '--server-timeout', '1000')
+    node.until(lambda: 'countdown_action_client' in observer.get_node_names())
+    assert node.end(how) == 130, node.output
+    assert 'Traceback' not in node.output, node.output

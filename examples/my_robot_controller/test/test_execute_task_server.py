@@ -17,48 +17,59 @@ from rclpy.node import Node
 
 MODULE = 'my_robot_controller.execute_task_server'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
+EXECUTE_TASK_GOAL = ExecuteTask.Goal(task_name='dock')
 
 
-def test_it_reaches_execute_task(start: Start, observer: Node, until: Until) -> None:
+def test_it_reaches_execute_task(start: Start, observer: Node) -> None:
     """A goal for execute_task is reached, with feedback on the way."""
     feedback: list[object] = []
     client = ActionClient(observer, ExecuteTask, 'execute_task')
-    start(MODULE)
-    assert until(client.server_is_ready)
-    goal = ExecuteTask.Goal(task_name='dock')
-    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
-    assert until(sent.done)
-    assert sent.result().accepted
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(EXECUTE_TASK_GOAL, feedback_callback=feedback.append)
+    node.until(sent.done)
+    assert sent.result().accepted, node.output
+    node.until(lambda: node.said('execute_task: task_name='))
     ending = sent.result().get_result_async()
-    assert until(ending.done, 60.0)
-    assert ending.result().status == GoalStatus.STATUS_SUCCEEDED
-    assert feedback
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_SUCCEEDED, node.output
+    assert feedback, node.output
     client.destroy()
 
 
-def test_it_cancels_execute_task(start: Start, observer: Node, until: Until) -> None:
+def test_it_cancels_execute_task(start: Start, observer: Node) -> None:
     """A goal for execute_task can be cancelled while the node works on it."""
     feedback: list[object] = []
     client = ActionClient(observer, ExecuteTask, 'execute_task')
-    start(MODULE)
-    assert until(client.server_is_ready)
-    goal = ExecuteTask.Goal(task_name='dock')
-    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
-    assert until(lambda: bool(sent.done() and feedback))
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(EXECUTE_TASK_GOAL, feedback_callback=feedback.append)
+    node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()
-    assert until(ending.done)
-    assert ending.result().status == GoalStatus.STATUS_CANCELED
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_CANCELED, node.output
+    client.destroy()
+
+
+def test_it_gives_up_execute_task_for_a_newer_goal(start: Start, observer: Node) -> None:
+    """A goal for execute_task ends when another one comes."""
+    client = ActionClient(observer, ExecuteTask, 'execute_task')
+    node = start(MODULE)
+    node.until(client.server_is_ready)
+    sent = client.send_goal_async(EXECUTE_TASK_GOAL)
+    node.until(sent.done)
+    client.send_goal_async(EXECUTE_TASK_GOAL)
+    ending = sent.result().get_result_async()
+    node.until(ending.done)
+    assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output
     client.destroy()
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'execute_task_server' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'execute_task_server' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

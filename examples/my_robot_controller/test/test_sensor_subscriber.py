@@ -15,30 +15,24 @@ from std_msgs.msg import String
 
 MODULE = 'my_robot_controller.sensor_subscriber'
 Start = Callable[..., Any]
-Until = Callable[..., bool]
 
 
-def test_it_receives_sensor_data(start: Start, observer: Node, until: Until) -> None:
-    """The node says something when a message arrives on sensor_data."""
+def test_it_receives_sensor_data(start: Start, observer: Node) -> None:
+    """The node says something for each message that arrives on sensor_data."""
     publisher = observer.create_publisher(String, 'sensor_data', 10)
     node = start(MODULE)
-    assert until(lambda: publisher.get_subscription_count() > 0)
-    before = node.output
 
-    def said() -> bool:
+    def heard() -> bool:
         publisher.publish(String())
-        return bool(node.output != before)
+        return bool(node.said('sensor_data: data=', 2))
 
-    assert until(said)
-    assert not node.ended()
+    node.until(heard)
 
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
-def test_it_ends_when_it_is_asked_to(
-    start: Start, observer: Node, until: Until, how: signal.Signals
-) -> None:
+def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
     """Neither Ctrl-C nor a polite request to end leaves a traceback."""
     node = start(MODULE)
-    assert until(lambda: 'sensor_subscriber' in observer.get_node_names())
-    assert node.end(how) == 0
-    assert 'Traceback' not in node.output
+    node.until(lambda: 'sensor_subscriber' in observer.get_node_names())
+    assert node.end(how) == 0, node.output
+    assert 'Traceback' not in node.output, node.output

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 MODULE = 'demo.station'
 Start = Callable[..., Any]
+DOCK_GOAL = Dock.Goal()
 
 
 def test_it_reaches_dock(start: Start, observer: Node) -> None:
@@ -25,7 +26,7 @@ def test_it_reaches_dock(start: Start, observer: Node) -> None:
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    sent = client.send_goal_async(DOCK_GOAL, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
     node.until(lambda: node.said('dock: station='))
@@ -42,7 +43,7 @@ def test_it_cancels_dock(start: Start, observer: Node) -> None:
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(Dock.Goal(), feedback_callback=feedback.append)
+    sent = client.send_goal_async(DOCK_GOAL, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()
@@ -56,9 +57,9 @@ def test_it_gives_up_dock_for_a_newer_goal(start: Start, observer: Node) -> None
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(Dock.Goal())
+    sent = client.send_goal_async(DOCK_GOAL)
     node.until(sent.done)
-    client.send_goal_async(Dock.Goal())
+    client.send_goal_async(DOCK_GOAL)
     ending = sent.result().get_result_async()
     node.until(ending.done)
     assert ending.result().status == GoalStatus.STATUS_ABORTED, node.output
