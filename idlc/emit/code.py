@@ -18,6 +18,7 @@ class Line(msgspec.Struct, frozen=True):
 
     value: Node
     target: Node = ""
+    operator: str = "="
 
 
 class Put(msgspec.Struct, frozen=True):
@@ -79,8 +80,10 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
     result: list[str] = []
     for statement in body:
         match statement:
-            case Line(value, target):
-                result += assign(target, value, indent) if target else lines(value, indent)
+            case Line(value, ""):
+                result += lines(value, indent)
+            case Line(value, target, operator):
+                result += assign(target, value, indent, operator)
             case Note(target, value):
                 result += assign(target, value, indent)
             case Put(part):

@@ -15,7 +15,7 @@ from idlc.emit import layout
 from idlc.emit.code import Block, Line, Statement
 from idlc.emit.cursor import Cursor
 from idlc.emit.encode import block_code
-from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.pretty import Comprehension, Group, Node, call, tuple_of
 from idlc.emit.tables import Tables
 from idlc.model import ir
 
@@ -86,7 +86,7 @@ class _Run:
 
     def assignment(self, value: Group) -> Line:
         """Return the statement that reads the values."""
-        return Line(value, Group("", tuple(self.targets))) if self.targets else Line(value)
+        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
 
 
 class _Decoder:
@@ -297,7 +297,7 @@ class _Decoder:
         self.align(4)
         reader = self.tables.texts_reader(step)
         texts = call(reader, "data", self.here.text(), count)
-        self.line(texts, Group("", (step.place.text, "end")))
+        self.line(texts, tuple_of(step.place.text, "end"))
         self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
 
     def items(self, step: layout.Items) -> None:
@@ -324,7 +324,7 @@ class _Decoder:
         many = layout.is_many(step) and layout.is_text(step.body)
         if many and not worded and self.source == "data":
             strings = call(self.tables.strings(), "data", self.here.text())
-            self.line(strings, Group("", ("words", "chars", "to_str")))
+            self.line(strings, tuple_of("words", "chars", "to_str"))
             self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
         self.worded = worded
@@ -346,7 +346,7 @@ class _Decoder:
         reader = self.tables.rows("".join(run.fields))
         values = self.tables.local(f"{step.item}_values") if run.targets else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
-        stored = [Line(values, Group("", tuple(run.targets)))] if run.targets else []
+        stored = [Line(values, tuple_of(*run.targets))] if run.targets else []
         body = (
             Line(f"{self.makers[step.type]}()", step.item),
             Line(call(f"{step.place.local}.append", step.item)),

@@ -13,7 +13,7 @@ import re
 
 from idlc.emit import code, layout
 from idlc.emit.position import Position, aligned_to_8
-from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.pretty import Comprehension, Group, Node, call, tuple_of
 from idlc.emit.tables import Tables
 from idlc.model import ir
 
@@ -259,11 +259,11 @@ class _Encoder:
             for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
         )
         lines = [code.Line(one.text, one.local) for one in places]
-        lines.append(code.Line(Group(f"{rows} += ", tuple(parts))))
+        lines.append(code.Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
-        given = ", ".join(one.text for one in places) + ("," if len(places) == 1 else "")
+        given = tuple_of(*(one.text for one in places)).flat()
         each = self.tables.local("each")
-        texts = Comprehension(each, (loop, f"for {each} in ({given})"))
+        texts = Comprehension(each, (loop, f"for {each} in {given}"))
         unsized = call(self.tables.function("unsized", "unsized"), texts)
         self.line("[]", f"{rows}: list[str]")
         self.body.append(code.Block("try:", (code.Block(f"{loop}:", tuple(lines)),)))

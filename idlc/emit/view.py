@@ -12,7 +12,7 @@ from idlc.emit import code, documentation, fields, groups, layout, literals, pyn
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
 from idlc.emit.equality import equality
-from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines
+from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines, tuple_of
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -194,7 +194,7 @@ def _body(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
     return [
         *literals.docstring(doc, 4),
         "",
-        *_tuple("__match_args__", tuple(public)),
+        *lines(tuple_of(*public), 4, "__match_args__ = "),
         *lines(_table(types), 4, "_fields_and_field_types = "),
         *_separated(_constants(structure)),
         *_separated([_declaration(view) for view in views]),
@@ -240,12 +240,6 @@ def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         "            return",
         *(line for view in views for line in view.stores),
     ]
-
-
-def _tuple(target: str, items: tuple[str, ...]) -> list[str]:
-    if len(items) == 1:
-        return [f"    {target} = ({items[0]},)"]
-    return lines(Group("", items), 4, f"{target} = ")
 
 
 def _makers(
