@@ -68,7 +68,7 @@ def test_any_layout_is_written_and_read_as_cdr_says(packages, seed):
                 assert viewed == cls.deserialize(bytearray(raw), copy=False)
                 assert viewed.to_dict() == plain
                 assert viewed.serialize(byteorder=order) == raw
-            assert b"".join(cls._codec_("<").encode(message)) == message.serialize()
+            assert cls._codec_("<").encode(message, b"".join) == message.serialize()
 
 
 @pytest.mark.parametrize("seed", SEEDS)

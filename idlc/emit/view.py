@@ -132,7 +132,7 @@ def _message(
     steps = layout.steps(structure, messages, names)
     tables = Tables(names)
     tables.define("encapsulation", "encapsulation", "_idlc.HEADERS[order]")
-    writing = code.function(encode(steps, tables), 8)
+    writing = encode(steps, tables, 8)
     makers, needed = _makers(structure.name, steps, references, tables)
     bulk = is_bulk(steps)
     reading = code.text_of(decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8)
