@@ -100,6 +100,7 @@ class _Decoder:
         self.here = Cursor()
         self.run = _Run()
         self.limited = False
+        self.looping = False
         self.unchecked = False
         self.worded = False
 
@@ -313,16 +314,19 @@ class _Decoder:
             self.flush()
 
         count = self.begin(step)
+        least = layout.smallest(step.body)
         if step.size is None:
-            least = layout.smallest(step.body)
             wanted = count if least == 1 else f"{least} * {count}"
             self.short_if(f"{self.here.text()} + {wanted} > limit")
+        else:
+            self.short_if(f"{self.here.text(least * step.size)} > limit")
         empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded
         many = layout.is_many(step) and layout.is_text(step.body)
-        if many and not worded and self.source == "data":
+        # not within a loop: it goes over all that follows
+        if many and not worded and self.source == "data" and not self.looping:
             strings = call(self.tables.strings(), "data", self.here.text())
             self.line(strings, tuple_of("words", "chars", "to_str"))
             self.worded = True
@@ -364,6 +368,7 @@ class _Decoder:
         outside, entry = self.body, self.here
         unchecked = self.unchecked
         first = entry.at("at")
+        looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
             self.body, self.here = [], first
@@ -375,6 +380,7 @@ class _Decoder:
                 break
             first = again
             self.tables.reset(mark)
+        self.looping = looping
         self.settle(first)
         loop = Block(head, tuple(self.body))
         self.body, self.here = outside, entry

@@ -402,6 +402,8 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             item_2._a, item_2._b, item_2_c = read_4(data, at)
             item_2._c = array_uint8_3(item_2_c)
             at = at + 9
+        if at + 18 > limit:
+            raise ValueError("too short")
         pair = [new_row() for _ in range(2)]
         message._pair = pair
         for item_3 in pair:

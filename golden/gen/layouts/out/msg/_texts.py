@@ -242,19 +242,20 @@ def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 raise ValueError("too short")
             item_3_pairs = [new_pair() for _ in range(count)]
             item_3._pairs = item_3_pairs
-            words, chars, to_str = strings(data, at + 4)
             end = at + 3
             for item_4 in item_3_pairs:
-                at = end + 8 & -4
-                end = at - 1 + words[at >> 2]
+                at = end + 4 & -4
+                (size,) = read_2(data, at)
+                end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._key = to_str(chars[at:end])
-                at = end + 8 & -4
-                end = at - 1 + words[at >> 2]
+                item_4._key = text(data[at + 4 : end])
+                at = end + 4 & -4
+                (size,) = read_2(data, at)
+                end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._value = to_str(chars[at:end])
+                item_4._value = text(data[at + 4 : end])
             at = (end + 4 & -8) + 4
             (item_3._number,) = read_4(data, at)
             at = at + 8
