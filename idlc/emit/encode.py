@@ -42,7 +42,7 @@ class Frame:
 def encode(steps: tuple[layout.Step, ...], tables: Tables, indent: int) -> list[str]:
     """Return the lines that write a message; what they use is defined in `tables`."""
     encoder = _Encoder(tables, Position())
-    encoder.field("4s", 1, 4, "encapsulation")
+    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
     for step in steps:
         encoder.step(step)
     encoder.flush(1)

@@ -131,7 +131,6 @@ def _message(
     names = pynames.Locals()
     steps = layout.steps(structure, messages, names)
     tables = Tables(names)
-    tables.define("encapsulation", "encapsulation", "_idlc.HEADERS[order]")
     writing = encode(steps, tables, 8)
     makers, needed = _makers(structure.name, steps, references, tables)
     bulk = is_bulk(steps)
