@@ -75,6 +75,117 @@ def test_mutated_buffers_end_in_a_value_or_in_decode_error(name):
                 assert 0 <= offset <= len(buffer) + 16
 
 
+#: Structures that are much larger than what they take on the wire, or than what is there.
+INFLATED = {
+    "msg/Empty.msg": "",
+    "msg/Thousand.msg": "Empty[1000] e\n",
+    "msg/Million.msg": "Thousand[1000] e\n",
+    "msg/Billion.msg": "Million[1000] e\n",
+    "msg/Counted.msg": "Empty[] e\n",
+    "msg/Millions.msg": "Million[] e\n",
+    "msg/Counts.msg": "Counted[1000000] e\n",
+    "msg/Texts.msg": "string[1000000] t\nwstring[1000000] w\n",
+    "msg/Pair.msg": "string k\nstring v\n",
+    "msg/Pairs.msg": "Pair[1000000] p\n",
+    "msg/Numbers.msg": "float64[1000000] n\nbool[1000000] b\n",
+    "msg/Many.msg": "string s\nNumbers[1000] n\nTexts[1000] t\nPairs[1000] p\n",
+    "msg/Amid.msg": "Counted c\nMany[] m\nBillion b\n",
+    "msg/Outer.msg": "float64 x\nPair[] pairs\n",
+    "msg/Outers.msg": "Outer[] o\n",
+}
+
+
+DEPTH = 20
+CHAINS = {
+    "msg/Deep1.msg": "bool b\n",
+    **{f"msg/Deep{n}.msg": f"Deep{n - 1} d\n" for n in range(2, DEPTH + 1)},
+    "msg/Chains.msg": f"Deep{DEPTH}[] d\n",
+}
+
+
+@pytest.fixture(scope="module")
+def inflated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inflated")
+    generated.write_package(folder, "inflated_msgs", INFLATED | CHAINS)
+    with generated.importable(folder):
+        cls = generated.class_of("inflated_msgs/msg/Pair")
+        with suppress(ValueError):  # loads what explains an error, and numpy
+            cls.deserialize(b"")
+        cls.to_columns([cls().serialize()])
+        yield folder
+
+
+READERS = {
+    "deserialize": lambda cls, raw: cls.deserialize(raw),
+    "of a view": lambda cls, raw: cls.deserialize(memoryview(raw)),
+    "copy=False": lambda cls, raw: cls.deserialize(raw, copy=False),
+    "deserialize_many": lambda cls, raw: cls.deserialize_many([raw]),
+    "to_columns": lambda cls, raw: cls.to_columns([raw]),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("path", INFLATED)
+def test_no_structure_takes_what_the_buffer_does_not_hold(inflated, path, reader):
+    name = path.removeprefix("msg/").removesuffix(".msg")
+    cls = generated.class_of(f"inflated_msgs/msg/{name}")
+    error = __import__("inflated_msgs._idlc")._idlc.DecodeError
+    for size in (8, 800):
+        for body in (bytes(size), b"\xff" * size, b"\1\0\0\0" * (size // 4)):
+            for head in (b"\0\1\0\0", b"\0\0\0\0", b"\0\1\0\0" + size.to_bytes(4, "little")):
+                raw = head + body
+                with suppress(error):
+                    READERS[reader](cls, raw)  # makes the codec
+                tracemalloc.start()
+                with suppress(error):
+                    READERS[reader](cls, raw)
+                peak = tracemalloc.get_traced_memory()[1]
+                tracemalloc.stop()
+                assert peak < PER_BYTE * len(raw) + 30_000, (len(raw), peak)
+
+
+def test_the_largest_value_is_an_object_per_byte_and_level(inflated):
+    """No message holds more for its bytes than objects that only hold one another."""
+    cls = generated.class_of("inflated_msgs/msg/Chains")
+    raw = b"\0\1\0\0" + (500).to_bytes(4, "little") + b"\1" * 500
+    cls.deserialize(raw)
+    tracemalloc.start()
+    message = cls.deserialize(raw)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(message.d) == 500
+    assert peak < 60 * DEPTH * len(raw) + 30_000
+
+
+def test_what_prepares_for_many_texts_is_done_once(tmp_path, monkeypatch):
+    """It goes over all of the buffer, so doing it for each element would be quadratic."""
+    files = {path: INFLATED[f"msg/{path}.msg"] for path in ("Pair", "Pairs", "Outer", "Outers")}
+    files = {f"msg/{name}.msg": text for name, text in files.items()}
+    generated.write_package(tmp_path, "texts_msgs", {**files, "msg/Plain.msg": "Pair[] pairs\n"})
+    with generated.importable(tmp_path):
+        module = __import__("texts_msgs._idlc")._idlc
+        make, calls = module.strings_reader, []
+
+        def counted(*arguments):
+            prepare = make(*arguments)
+            return lambda *places: calls.append(1) or prepare(*places)
+
+        monkeypatch.setattr(module, "strings_reader", counted)
+        outer, pair = (generated.class_of(f"texts_msgs/msg/{one}") for one in ("Outer", "Pair"))
+        for name, items in (("Plain", [pair()] * 100), ("Outers", [outer(1.0, [pair()])] * 100)):
+            message = generated.class_of(f"texts_msgs/msg/{name}")(items)
+            assert type(message).deserialize(message.serialize()) == message
+    assert len(calls) == 1
+
+
+def test_columns_are_not_made_wide_by_one_text(inflated):
+    cls = generated.class_of("inflated_msgs/msg/Pair")
+    raws = [cls("x" * 1_000_000).serialize(), *[cls("x").serialize()] * 1000]
+    with pytest.raises(ValueError, match=r"1,00.* bytes for 1,0.* bytes of messages"):
+        cls.to_columns(raws)
+    assert len(cls.to_columns(raws[:20])) == 20
+
+
 def test_memory_is_bounded_by_the_buffer():
     rng = random.Random(1)
     for name in BULKY:

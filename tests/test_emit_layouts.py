@@ -10,6 +10,16 @@ import values
 PRIMITIVES = list(plain_cdr.CODES)
 NUMERIC = [name for name in PRIMITIVES if "int" in name or "float" in name]
 SEEDS = range(60)
+#: What generated code calls its own variables, what Python has, and what is long.
+NAMES = [
+    *("array", "at", "again", "bytes", "chars", "count", "data", "decode", "encode", "end", "each"),
+    *("encapsulation", "ended", "item", "item_2", "item_values", "join", "len", "limit", "list"),
+    *("listed", "low", "message", "object", "order", "pad4", "pad8", "parts", "put", "raw", "rows"),
+    *("range", "read_1", "reading", "rows_1", "self", "size", "sized", "small", "str", "strings"),
+    *("struct", "text", "to_str", "type", "values", "view", "words", "write_1", "write_rows"),
+    *("unsized", "memoryview", "value_error", "f0_count", "f0_size", "f0_rows", "f0_block", "f0"),
+    *(f"x{chr(97 + length % 26) * length}" for length in (31, 47, 52, 53, 60, 90)),
+]
 PER_SEED = 6
 
 
@@ -24,8 +34,9 @@ def random_package(rng):
             texts.append(f"T{index}")
         else:
             others = [*PRIMITIVES, "string", "string", "wstring", *shapes, *shapes]
-        for number in range(rng.choice([0, 1, 2, 3, 5, 9])):
-            name = f"f{number}"
+        names = NAMES if rng.random() < 0.5 else [f"f{number}" for number in range(300)]
+        most = rng.choice([0, 1, 2, 3, 5, 9] if shapes else [0, 1, 2, 3, 5, 50])
+        for name in rng.sample(names, most):
             element = rng.choice(others)
             suffix, size = rng.choice([("", 0), ("", 0), ("[]", None), ("[<=5]", None), ("[3]", 3)])
             if element in NUMERIC and rng.random() < 0.05:
@@ -68,7 +79,7 @@ def test_any_layout_is_written_and_read_as_cdr_says(packages, seed):
                 assert viewed == cls.deserialize(bytearray(raw), copy=False)
                 assert viewed.to_dict() == plain
                 assert viewed.serialize(byteorder=order) == raw
-            assert b"".join(cls._codec_("<").encode(message)) == message.serialize()
+            assert cls._codec_("<").encode(message, b"".join) == message.serialize()
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -82,3 +93,38 @@ def test_every_shorter_buffer_is_refused(packages, seed):
             with pytest.raises(error) as caught:
                 cls.deserialize(raw[:size])
             assert caught.value.offset <= max(size, 8) + 8
+
+
+ALL_OF_A_KIND = ["float64", "string", "wstring", "float64[]", "bool[]", "string[]", "string[2]",
+                 "wstring[]", "Words[]", "Inner", "Inner[]", "Inner[9]", "Mixed[]"]  # fmt: skip
+
+
+def test_no_name_collides_with_what_generated_code_uses(tmp_path):
+    inner = [("count", "int32"), ("item", "uint8")]
+    words = [("text", "string"), ("size", "string")]
+    mixed = [("at", "string"), ("low", ("float64", None)), ("end", inner)]
+    shapes = {"Inner": inner, "Words": words, "Mixed": mixed}
+    files = {
+        "msg/Inner.msg": "int32 count\nuint8 item\n",
+        "msg/Words.msg": "string text\nstring size\n",
+        "msg/Mixed.msg": "string at\nfloat64[] low\nInner end\n",
+    }
+    for number, kind in enumerate(ALL_OF_A_KIND):
+        element, _, size = kind.removesuffix("]").partition("[")
+        type_ = shapes.get(element, element)
+        type_ = (type_, int(size) if size else None) if "[" in kind else type_
+        # three hundred fields, each as its neighbours are and are not
+        every = (f"{name}{suffix}" for name in NAMES for suffix in ("", "_2", "_count", "_size"))
+        names = list(dict.fromkeys(every))
+        files[f"msg/Of{number}.msg"] = "".join(f"{kind} {name}\n" for name in names)
+        shapes[f"Of{number}"] = [(name, type_) for name in names]
+    generated.write_package(tmp_path, "names_msgs", files)
+    rng = random.Random(1)
+    with generated.importable(tmp_path):
+        for name, shape in shapes.items():
+            cls = generated.class_of(f"names_msgs/msg/{name}")
+            message = values.randomized(cls(), rng)
+            for order in ("little", "big"):
+                raw = message.serialize(byteorder=order)
+                assert raw == plain_cdr.encode(shape, message.to_dict(), order), name
+                assert cls.deserialize(raw) == message, name

@@ -18,6 +18,7 @@ import pytest
 import idlc.disk.inputs
 import idlc.model.pool
 from idlc.cli.main import main
+from idlc.emit.limits import MAX_DEPTH
 
 #: How much larger input is when there is time, as in `make fuzz`.
 SCALE = 5 if os.environ.get("IDLC_LONG") else 1
@@ -294,6 +295,7 @@ import contextlib, io, json, resource, sys
 resource.setrlimit(resource.RLIMIT_CPU, ({PROCESSOR_SECONDS}, {PROCESSOR_SECONDS}))
 resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY}))
 from idlc.cli.main import main
+from idlc.emit.limits import MAX_DEPTH
 for words in json.load(sys.stdin):
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
@@ -403,6 +405,45 @@ def test_a_chain_of_a_thousand_dependencies(here):
         assert status == expected, out[:300]
         assert ("IDL619" in out) == bool(expected)
         assert "nests messages 1001 deep" in out or not expected
+
+
+#: Uses a class where a program has called many functions already, as in a test or a callback.
+DEEP = """
+import copy, sys
+sys.path.insert(0, "out")
+
+def below(frames):
+    if frames:
+        return below(frames - 1)
+    from p0.msg import M
+    message = M()
+    for order in ("little", "big"):
+        assert M.deserialize(message.serialize(byteorder=order)) == message
+    assert M.from_dict(message.to_dict()) == message == copy.deepcopy(message)
+    message.validate()
+    repr(message)
+    try:
+        M.deserialize(b"\\0\\1\\0\\0")
+    except ValueError as error:
+        assert str(error).startswith("x.x.x."), error
+    return M
+
+below(300)
+"""
+
+
+def test_a_chain_of_packages_as_deep_as_they_may_be_can_be_used(here):
+    for number in range(MAX_DEPTH):
+        last = number == MAX_DEPTH - 1
+        field = "int8 x\n" if last else f"p{number + 1}/M x\n"
+        make(here / "src", {f"p{number}/msg/M.msg": field})
+    words = ["gen", "src/p0/msg", "--package", "p0", "-o", "out/p0", "-I", "src", "--vendor-deps"]
+    status, out = limited([words])[" ".join(words)]
+    assert status == 0, out
+    result = subprocess.run(
+        [sys.executable, "-c", DEEP], capture_output=True, text=True, check=False, cwd=here
+    )
+    assert (result.returncode, result.stderr) == (0, ""), result.stderr[-500:]
 
 
 def test_many_small_files_that_make_too_much_code_are_refused(here):

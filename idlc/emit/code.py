@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import msgspec
 
-from idlc.emit.pretty import Group, Node, assign, lines
+from idlc.emit.pretty import Group, Node, any_of, assign, lines
 
 
 class Line(msgspec.Struct, frozen=True):
@@ -18,6 +18,7 @@ class Line(msgspec.Struct, frozen=True):
 
     value: Node
     target: Node = ""
+    operator: str = "="
 
 
 class Put(msgspec.Struct, frozen=True):
@@ -79,8 +80,10 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
     result: list[str] = []
     for statement in body:
         match statement:
-            case Line(value, target):
-                result += assign(target, value, indent) if target else lines(value, indent)
+            case Line(value, ""):
+                result += lines(value, indent)
+            case Line(value, target, operator):
+                result += assign(target, value, indent, operator)
             case Note(target, value):
                 result += assign(target, value, indent)
             case Put(part):
@@ -102,24 +105,25 @@ def _interferes(statement: Statement, waiting: list[Put]) -> bool:
             return False
 
 
-def function(body: tuple[Statement, ...], indent: int) -> list[str]:
-    """Return the lines of a function that returns its parts as a list.
+def function(body: tuple[Statement, ...], indent: int, again: tuple[str, ...]) -> list[str]:
+    """Return the lines of a function that returns what `join` makes of its parts.
 
-    Parts are collected as long as no position that they read changes; if none does before the
-    end, the list is returned as it stands.
+    Parts are collected as long as no position that they read changes. If one of the conditions
+    of `again` is true in the end, the function begins anew.
     """
     result: list[str] = []
     waiting: list[Put] = []
     begun = False
 
-    def flush() -> None:
+    def flush(*, last: bool = False) -> None:
         nonlocal begun
         parts = tuple(put.part for put in waiting)
         waiting.clear()
         if not begun:
             begun = True
             result.extend(assign("parts", Group("", parts, brackets="[]"), indent))
-            result.extend(assign("put", "parts.append", indent))
+            if not last:
+                result.extend(assign("put", "parts.append", indent))
         else:
             for part in parts:
                 result.extend(lines(Group("put", (part,)), indent))
@@ -134,9 +138,18 @@ def function(body: tuple[Statement, ...], indent: int) -> list[str]:
             case _:
                 pass
         result += text_of((statement,), indent)
-    if not begun:
-        parts = tuple(put.part for put in waiting)
-        return result + lines(Group("", parts, brackets="[]"), indent, "return ")
     if waiting:
-        flush()
-    return [*result, " " * indent + "return parts"]
+        flush(last=True)
+    return result + _joined(again, indent)
+
+
+def _joined(again: tuple[str, ...], indent: int) -> list[str]:
+    margin = " " * indent
+    if not again:
+        return [f"{margin}return join(parts)"]
+    return [
+        f"{margin}raw = join(parts)",
+        *any_of(list(again), indent, "if ", ":"),
+        f"{margin}    return encode(message, join)",
+        f"{margin}return raw",
+    ]

@@ -15,7 +15,7 @@ from idlc.emit import layout
 from idlc.emit.code import Block, Line, Statement
 from idlc.emit.cursor import Cursor
 from idlc.emit.encode import block_code
-from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.pretty import Comprehension, Group, Node, call, tuple_of
 from idlc.emit.tables import Tables
 from idlc.model import ir
 
@@ -86,7 +86,7 @@ class _Run:
 
     def assignment(self, value: Group) -> Line:
         """Return the statement that reads the values."""
-        return Line(value, Group("", tuple(self.targets))) if self.targets else Line(value)
+        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
 
 
 class _Decoder:
@@ -100,6 +100,7 @@ class _Decoder:
         self.here = Cursor()
         self.run = _Run()
         self.limited = False
+        self.looping = False
         self.unchecked = False
         self.worded = False
 
@@ -297,7 +298,7 @@ class _Decoder:
         self.align(4)
         reader = self.tables.texts_reader(step)
         texts = call(reader, "data", self.here.text(), count)
-        self.line(texts, Group("", (step.place.text, "end")))
+        self.line(texts, tuple_of(step.place.text, "end"))
         self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
 
     def items(self, step: layout.Items) -> None:
@@ -313,18 +314,21 @@ class _Decoder:
             self.flush()
 
         count = self.begin(step)
+        least = layout.smallest(step.body)
         if step.size is None:
-            least = layout.smallest(step.body)
             wanted = count if least == 1 else f"{least} * {count}"
             self.short_if(f"{self.here.text()} + {wanted} > limit")
+        else:
+            self.short_if(f"{self.here.text(least * step.size)} > limit")
         empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded
         many = layout.is_many(step) and layout.is_text(step.body)
-        if many and not worded and self.source == "data":
+        # not within a loop: it goes over all that follows
+        if many and not worded and self.source == "data" and not self.looping:
             strings = call(self.tables.strings(), "data", self.here.text())
-            self.line(strings, Group("", ("words", "chars", "to_str")))
+            self.line(strings, tuple_of("words", "chars", "to_str"))
             self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
         self.worded = worded
@@ -346,7 +350,7 @@ class _Decoder:
         reader = self.tables.rows("".join(run.fields))
         values = self.tables.local(f"{step.item}_values") if run.targets else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
-        stored = [Line(values, Group("", tuple(run.targets)))] if run.targets else []
+        stored = [Line(values, tuple_of(*run.targets))] if run.targets else []
         body = (
             Line(f"{self.makers[step.type]}()", step.item),
             Line(call(f"{step.place.local}.append", step.item)),
@@ -364,6 +368,7 @@ class _Decoder:
         outside, entry = self.body, self.here
         unchecked = self.unchecked
         first = entry.at("at")
+        looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
             self.body, self.here = [], first
@@ -375,6 +380,7 @@ class _Decoder:
                 break
             first = again
             self.tables.reset(mark)
+        self.looping = looping
         self.settle(first)
         loop = Block(head, tuple(self.body))
         self.body, self.here = outside, entry

@@ -13,7 +13,7 @@ import re
 
 from idlc.emit import code, layout
 from idlc.emit.position import Position, aligned_to_8
-from idlc.emit.pretty import Comprehension, Group, Node, call
+from idlc.emit.pretty import Comprehension, Group, Node, call, tuple_of
 from idlc.emit.tables import Tables
 from idlc.model import ir
 
@@ -39,14 +39,15 @@ class Frame:
         return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
 
 
-def encode(steps: tuple[layout.Step, ...], tables: Tables) -> tuple[code.Statement, ...]:
-    """Return the statements that write a message; what they use is defined in `tables`."""
+def encode(steps: tuple[layout.Step, ...], tables: Tables, indent: int) -> list[str]:
+    """Return the lines that write a message; what they use is defined in `tables`."""
     encoder = _Encoder(tables, Position())
-    encoder.field("4s", 1, 4, "encapsulation")
+    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
     for step in steps:
         encoder.step(step)
     encoder.flush(1)
-    return code.prune(tuple(encoder.body), NONE)
+    body = code.prune(tuple(encoder.body), NONE)
+    return code.function(body, indent, tuple(encoder.again))
 
 
 class _Encoder:
@@ -57,6 +58,9 @@ class _Encoder:
         self.here = here
         self.body: list[code.Statement] = []
         self.frame = Frame(here)
+        #: What is true if another thread changed the length of an array that was not copied.
+        self.again: list[str] = []
+        self.looping = False
 
     def step(self, step: layout.Step) -> None:
         """Emit one step."""
@@ -183,16 +187,16 @@ class _Encoder:
         raised = code.Line(f'raise ValueError("{problem}")')
         self.body.append(code.Block(f"if {condition}:", (raised,)))
 
-    def bound(self, local: str, bound: int | None) -> None:
+    def bound(self, count: str, bound: int | None) -> None:
         """Check a sequence's upper limit."""
         if bound is not None:
-            self.check(f"len({local}) > {bound}", "too many elements")
+            self.check(f"{count} > {bound}", "too many elements")
 
     def buffer(self, place: layout.Place, value: Node, unit: int, bound: int | None = None) -> None:
         """Emit the count of a buffer's units, and the buffer."""
         local = place.local
         self.line(value, local)
-        self.bound(local, bound)
+        self.bound(f"len({local})", bound)
         count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
         self.field("I", 4, 4, count)
         self.flush(1)
@@ -203,34 +207,40 @@ class _Encoder:
     def numbers(self, step: layout.Numbers) -> None:
         """Emit a numeric sequence."""
         local = step.place.local
-        self.line(call(self.tables.sequence_writer(step), step.place.text), local)
-        self.bound(local, step.bound)
-        self.field("I", 4, 4, f"len({local})")
+        count = self.tables.local(f"{local}_count")
+        if self.looping:
+            self.line(call(self.tables.sequence_copier(step), step.place.text), local)
+            self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
+        else:
+            self.line(step.place.text, local)
+            converted = code.Line(call(self.tables.sequence_writer(step), local), local)
+            array = self.tables.function("array", "array_of(order)")
+            self.body.append(code.Block(f"if type({local}) is not {array}:", (converted,)))
+            self.line(f"len({local})", count)
+            self.again.append(f"len({local}) != {count}")
+        self.bound(count, step.bound)
+        self.field("I", 4, 4, count)
         self.flush(1)
         repeat = layout.Fixed(step.unit, step.unit, step.unit)
-        self.elements(local, local, repeat, maybe_empty=True)
+        self.elements(local, count, repeat, unless=count)
 
     def texts(self, step: layout.Texts) -> None:
-        """Emit an array or sequence of strings."""
+        """Emit an array or sequence of strings, its count included."""
         local = step.place.local
-        block = self.tables.local(f"{local}_block")
-        self.begin(step)
         self.flush(4)
         self.pad(4)
-        self.line(call(self.tables.texts_writer(step), local), block)
-        self.put(block)
-        self.here.skip(f"len({block})", 4 if step.wide else 1)
+        self.line(call(self.tables.texts_writer(step), step.place.text), local)
+        self.put(local)
+        self.here.skip(f"len({local})", 4 if step.wide else 1)
         self.settle()
 
-    def begin(self, step: layout.Texts | layout.Items) -> None:
+    def count(self, step: layout.Items, count: str) -> None:
         """Emit the check of a size, or the count."""
-        local = step.place.local
-        self.line(step.place.text, local)
-        self.bound(local, step.bound)
+        self.bound(count, step.bound)
         if step.size is None:
-            self.field("I", 4, 4, f"len({local})")
+            self.field("I", 4, 4, count)
         else:
-            self.check(f"len({local}) != {step.size}", "wrong number of elements")
+            self.check(f"{count} != {step.size}", "wrong number of elements")
 
     def pad(self, align: int, unless_empty: str = "") -> None:
         """Emit padding as a part of its own."""
@@ -248,39 +258,45 @@ class _Encoder:
         """Emit structures of strings: what goes around each is looked up, all is encoded once."""
         local = step.place.local
         rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
-        self.flush(4)
-        self.pad(4)
         sized = self.tables.function("sized", "sizes(order)")
         ended = self.tables.function("ended", "ENDS")
         places = [part.place for part in step.body if isinstance(part, layout.Text)]
-        parts = (
+        parts = [
             part
             for one in places
             for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
-        )
+        ]
         lines = [code.Line(one.text, one.local) for one in places]
-        lines.append(code.Line(Group(f"{rows} += ", tuple(parts))))
+        lines.append(code.Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
-        given = ", ".join(one.text for one in places) + ("," if len(places) == 1 else "")
+        given = tuple_of(*(one.text for one in places)).flat()
         each = self.tables.local("each")
-        texts = Comprehension(each, (loop, f"for {each} in ({given})"))
+        texts = Comprehension(each, (loop, f"for {each} in {given}"))
         unsized = call(self.tables.function("unsized", "unsized"), texts)
+        self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
-        self.body.append(code.Block("try:", (code.Block(f"{loop}:", tuple(lines)),)))
-        self.body.append(code.Block("except IndexError:", (code.Line(unsized, rows),)))
+        attempt = code.Block("try:", (code.Block(f"{loop}:", tuple(lines)),))
+        instead = code.Block("except IndexError:", (code.Line(unsized, rows),))
+        self.body.append(code.Block(f"if len({local}):", (attempt, instead)))
+        self.count(step, f"len({rows}) // {len(parts)}")
+        self.flush(4)
+        self.pad(4)
         self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
         self.put(block)
         self.here.skip(f"len({block})", 1)
         self.settle()
 
     def items(self, step: layout.Items) -> None:
-        """Emit an array or sequence of structures."""
-        self.begin(step)
+        """Emit an array or sequence of structures, as many as there are at one moment."""
         repeat = layout.fixed(step.body)
         only_texts = all(isinstance(part, layout.Text) and not part.wide for part in step.body)
         if only_texts and layout.is_many(step):
             self.rows(step)
-        elif repeat is None:
+            return
+        local = step.place.local
+        self.line(call(self.tables.function("listed", "listed"), step.place.text), local)
+        self.count(step, f"len({local})")
+        if repeat is None:
             self.loop(step)
         else:
             self.fused(step, repeat)
@@ -298,15 +314,15 @@ class _Encoder:
         gap = "\\x00" * (repeat.stride - repeat.size)
         loop = f"for {step.item} in {local}"
         self.line(Group(f'b"{gap}".join', (Comprehension(row, (loop,)),)), block)
-        self.elements(block, local, repeat, maybe_empty=step.size is None)
+        self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
 
-    def elements(self, part: str, local: str, repeat: layout.Fixed, *, maybe_empty: bool) -> None:
-        """Emit elements of constant size, of which no padding goes before if there are none."""
+    def elements(self, part: str, count: str, repeat: layout.Fixed, *, unless: str) -> None:
+        """Emit elements of constant size; no padding goes before if `unless` is false."""
         gap = repeat.stride - repeat.size
-        size = f"len({local})" if repeat.stride == 1 else f"{repeat.stride} * len({local})"
+        size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
         size += f" - {gap}" if gap else ""
         modulus = power_of_two(repeat.size, repeat.stride)
-        if not maybe_empty or (self.here.aligned(repeat.align) and not gap):
+        if not unless or (self.here.aligned(repeat.align) and not gap):
             self.pad(repeat.align)
             self.put(part)
             self.here.skip(size, modulus)
@@ -315,13 +331,13 @@ class _Encoder:
             if self.here.constant:
                 self.note("at", self.here.text)
             self.note("low", self.here.low)
-            self.pad(repeat.align, local)
+            self.pad(repeat.align, unless)
             self.put(part)
             outside, self.body = self.body, []
             start = aligned_to_8("at") if repeat.align == 8 else "at"
             self.note("at", f"{start} + {size}")
             self.note("low", size)
-            outside.append(code.Block(f"if {local}:", tuple(self.body)))
+            outside.append(code.Block(f"if {unless}:", tuple(self.body)))
             self.body = outside
             self.here = Position.variable(min(modulus, 4), 0)
         self.settle()
@@ -336,6 +352,7 @@ class _Encoder:
             self.note("low", entry.low)
         outside = self.body
         head = entry.meet(entry)
+        looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
             self.body = []
@@ -353,6 +370,7 @@ class _Encoder:
             head = met
             self.tables.reset(mark)
         outside.append(code.Block(f"for {step.item} in {step.place.local}:", tuple(self.body)))
+        self.looping = looping
         self.body = outside
         self.here = head
         self.frame = Frame(head)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from idlc.emit import literals, pynames
-from idlc.emit.pretty import WIDTH, Group, Node, assign, call, flat
+from idlc.emit.pretty import WIDTH, Group, Node, assign, call, flat, tuple_of
 from idlc.emit.references import References
 from idlc.emit.tables import numpy_name
 from idlc.model import ir
@@ -172,10 +172,6 @@ def _values(field: ir.Field) -> tuple[str, ...] | None:
     return tuple(literals.scalar(ir.element_of(field.type), value) for value in values)
 
 
-def _tuple(values: tuple[str, ...]) -> Node:
-    return f"({values[0]},)" if len(values) == 1 else Group("", values)
-
-
 def _fresh_list(field: ir.Field, references: References) -> Node:
     values = _values(field)
     if values is not None:
@@ -194,11 +190,11 @@ def _fresh_numbers(field: ir.Field) -> Node:
     assert isinstance(field.type.element, ir.Primitive)
     if isinstance(field.type, ir.Sequence):
         code = f'"{field.type.element.info.code}"'
-        return call("_array", code, *([_tuple(values)] if values else []))
+        return call("_array", code, *([tuple_of(*values)] if values else []))
     dtype = f"_arrays.{numpy_name(field.type.element.name).upper()}"
     if values is None:
         return call("_arrays.zeros", str(field.type.size), dtype)
-    return call("_arrays.array", _tuple(values), dtype)
+    return call("_arrays.array", tuple_of(*values), dtype)
 
 
 def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:

@@ -15,7 +15,8 @@ from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic
 
 MAX_FIELDS = 20_000
-MAX_DEPTH = 100
+#: Each message imports the next: ten Python frames, of which there are a thousand at most.
+MAX_DEPTH = 50
 #: Of all structures of a package together.
 MAX_PACKAGE_FIELDS = 2_000_000
 

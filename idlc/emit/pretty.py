@@ -15,21 +15,22 @@ WIDTH = 88
 
 
 class Group(msgspec.Struct, frozen=True):
-    """A call, list, tuple or subscript: `before`, the items between brackets, `after`.
+    """A call, list, dictionary or tuple: `before`, the items between brackets, `after`.
 
-    Only a subscript is broken without a trailing `comma`.
+    Round brackets with nothing before them are a tuple, also around one item.
     """
 
     before: str
     items: tuple[Node, ...]
     after: str = ""
     brackets: str = "()"
-    comma: str = ","
 
     def flat(self) -> str:
         """Return the group on one line."""
         # a list, and no call for a str: half of all rendering passes through here
         inner = ", ".join([one if isinstance(one, str) else one.flat() for one in self.items])
+        if len(self.items) == 1 and self.brackets == "()" and not self.before:
+            inner += ","
         return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}{self.after}"
 
 
@@ -45,6 +46,11 @@ class Comprehension(msgspec.Struct, frozen=True):
 
 
 Node: TypeAlias = str | Group | Comprehension
+
+
+def tuple_of(*items: Node) -> Group:
+    """Return a tuple, of values or of targets."""
+    return Group("", items)
 
 
 def call(function: str, *arguments: Node) -> Group:
@@ -71,10 +77,16 @@ def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[st
             body = lines(node.element, indent + 4)
             body += [f"{margin}    {loop}" for loop in node.loops]
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
-    result = [f"{margin}{before}{node.before}{node.brackets[0]}"]
-    for item in node.items:
-        result += lines(item, indent + 4, "", node.comma)
-    result.append(f"{margin}{node.brackets[1]}{node.after}{after}")
+    return _broken(node, indent, before, f"{node.after}{after}")
+
+
+def _broken(group: Group, indent: int, before: str = "", after: str = "") -> list[str]:
+    """Return a group with each item on a line of its own; a comma follows each."""
+    margin = " " * indent
+    result = [f"{margin}{before}{group.before}{group.brackets[0]}"]
+    for item in group.items:
+        result += lines(item, indent + 4, "", ",")
+    result.append(f"{margin}{group.brackets[1]}{after}")
     return result
 
 
@@ -127,22 +139,20 @@ def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[
     ]
 
 
-def assign(target: Node, value: Node, indent: int) -> list[str]:
-    """Return an assignment as lines; a tuple of targets is a Group without `before`."""
+def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[str]:
+    """Return an assignment as lines."""
     margin = " " * indent
-    source = flat(value)
-    if isinstance(target, Group):
-        inner = ", ".join(flat(item) for item in target.items)
-        inner += "," if len(target.items) == 1 else ""
-        bare = f"({inner})" if len(target.items) == 1 else inner
-        if len(margin) + len(bare) + 3 + len(source) <= WIDTH:
-            return [f"{margin}{bare} = {source}"]
-        return lines(target, indent, "", f" = {source}")
-    one = f"{margin}{target} = {source}"
+    left = flat(target)
+    if isinstance(target, Group) and len(target.items) > 1:
+        left = left[1:-1]  # as formatters have it
+    one = f"{margin}{left} {operator} {flat(value)}"
     if len(one) <= WIDTH:
         return [one]
+    if isinstance(target, Group):
+        *targets, last = _broken(target, indent)
+        return [*targets, *assign(last.strip(), value, indent, operator)]
     if not isinstance(value, str):
-        return lines(value, indent, f"{target} = ")
+        return lines(value, indent, f"{left} {operator} ")
     if len(margin) + 4 + len(value) <= WIDTH:
-        return [f"{margin}{target} = (", f"{margin}    {value}", f"{margin})"]
+        return [f"{margin}{left} {operator} (", f"{margin}    {value}", f"{margin})"]
     return [one]

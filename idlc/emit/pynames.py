@@ -21,8 +21,9 @@ Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
-    {"at", "chars", "count", "data", "decode", "encode", "end", "limit", "low", "message", "order"}
-    | {"parts", "put", "reading", "size", "struct", "to_str", "view", "words"}
+    {"at", "chars", "count", "data", "decode", "encode", "end", "join", "limit", "low"}
+    | {"message", "order", "parts", "put", "raw", "reading", "size", "struct", "to_str", "view"}
+    | {"words"}
 )
 
 #: The methods that a message class inherits; a field of such a name hides the method.

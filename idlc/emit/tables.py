@@ -124,9 +124,14 @@ class Tables:
         return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
 
     def sequence_writer(self, step: layout.Numbers) -> str:
-        """Return the function that turns a sequence of numbers into a buffer."""
+        """Return the function that makes an array of another sequence of numbers."""
         expression = f'_idlc.sequence_writer(order, "{step.code}")'
         return self.define(f"buffer_{step.code}", expression, expression)
+
+    def sequence_copier(self, step: layout.Numbers) -> str:
+        """Return the function that turns a sequence of numbers into bytes."""
+        expression = f'_idlc.sequence_copier(order, "{step.code}")'
+        return self.define(f"copy_{step.code}", expression, expression)
 
     def sequence_reader(self, step: layout.Numbers) -> str:
         """Return the function that turns a buffer into a sequence of numbers."""
@@ -136,8 +141,13 @@ class Tables:
     def texts_writer(self, step: layout.Texts) -> str:
         """Return the function that writes an array of strings; one for each field."""
         local = step.place.local
-        function = "wide_block" if step.wide else "text_block"
-        return self.define(f"write_{local}", f"write texts {local}", f"_idlc.{function}(order)")
+        arguments = ["order"]
+        if step.size is not None:
+            arguments.append(f"size={step.size}")
+        elif step.bound is not None:
+            arguments.append(f"bound={step.bound}")
+        expression = call("_idlc.wide_block" if step.wide else "_idlc.text_block", *arguments)
+        return self.define(f"write_{local}", f"write texts {local}", expression)
 
     def texts_reader(self, step: layout.Texts) -> str:
         """Return the function that reads an array of strings; one for each field."""

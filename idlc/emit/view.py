@@ -12,7 +12,7 @@ from idlc.emit import code, documentation, fields, groups, layout, literals, pyn
 from idlc.emit.decode import decode, is_bulk
 from idlc.emit.encode import encode
 from idlc.emit.equality import equality
-from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines
+from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines, tuple_of
 from idlc.emit.references import References, referred, wrapped
 from idlc.emit.tables import Tables
 from idlc.model import derive, ir
@@ -131,8 +131,7 @@ def _message(
     names = pynames.Locals()
     steps = layout.steps(structure, messages, names)
     tables = Tables(names)
-    tables.define("encapsulation", "encapsulation", "_idlc.HEADERS[order]")
-    writing = code.function(encode(steps, tables), 8)
+    writing = encode(steps, tables, 8)
     makers, needed = _makers(structure.name, steps, references, tables)
     bulk = is_bulk(steps)
     reading = code.text_of(decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8)
@@ -194,7 +193,7 @@ def _body(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
     return [
         *literals.docstring(doc, 4),
         "",
-        *_tuple("__match_args__", tuple(public)),
+        *lines(tuple_of(*public), 4, "__match_args__ = "),
         *lines(_table(types), 4, "_fields_and_field_types = "),
         *_separated(_constants(structure)),
         *_separated([_declaration(view) for view in views]),
@@ -240,12 +239,6 @@ def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
         "            return",
         *(line for view in views for line in view.stores),
     ]
-
-
-def _tuple(target: str, items: tuple[str, ...]) -> list[str]:
-    if len(items) == 1:
-        return [f"    {target} = ({items[0]},)"]
-    return lines(Group("", items), 4, f"{target} = ")
 
 
 def _makers(

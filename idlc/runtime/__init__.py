@@ -18,6 +18,7 @@ from .cdr import (
     flags,
     flags_writer,
     layout,
+    listed,
     octets,
     octets_writer,
     phases,
@@ -43,6 +44,8 @@ from .sequences import (
     UInt16Sequence,
     UInt32Sequence,
     UInt64Sequence,
+    array_of,
+    sequence_copier,
     sequence_reader,
     sequence_writer,
     to_array,
@@ -66,11 +69,12 @@ if TYPE_CHECKING:
     from .hints import Any as Any
     from .hints import Floats as Floats
     from .hints import Integers as Integers
+    from .hints import Join as Join
     from .hints import Options as Options
     from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
 else:
-    _HINTS = ("Any", "Floats", "Integers", "Options", "TypeAlias", "Unpack")
+    _HINTS = ("Any", "Floats", "Integers", "Join", "Options", "TypeAlias", "Unpack")
     __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS, "hints"))
 
 __all__ = [
@@ -104,6 +108,7 @@ __all__ = [
     "UInt64Sequence",
     "ValidationError",
     "array",
+    "array_of",
     "codec_for",
     "construct",
     "dataclass",
@@ -112,6 +117,7 @@ __all__ = [
     "importing",
     "layout",
     "lazily",
+    "listed",
     "maker",
     "octets",
     "octets_writer",
@@ -121,6 +127,7 @@ __all__ = [
     "read_wide_text",
     "rows_writer",
     "same",
+    "sequence_copier",
     "sequence_reader",
     "sequence_writer",
     "several",

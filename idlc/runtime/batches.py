@@ -41,7 +41,7 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
     put = result.append
     try:
         for message in messages:
-            put(join(encode(message)))
+            put(encode(message, join))
     except Exception as error:
         index = len(result)
         found = encode_error(messages[index], byteorder, error)

@@ -7,10 +7,12 @@ terminating zero), and says of everything else which field cannot be read, and w
 from __future__ import annotations
 
 from array import array
+from functools import cache
 from struct import Struct
 from typing import Any
 
 from .cdr import NATIVE
+from .codec import maker
 from .errors import DecodeError
 from .typeinfo import FieldInfo, class_of, fields_of, type_name
 
@@ -18,6 +20,23 @@ from .typeinfo import FieldInfo, class_of, fields_of, type_name
 def read_carefully(kind: type, data: bytes, order: str) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte."""
     return _Reader(data, order).message(kind, type_name(kind), "")
+
+
+@cache
+def least(name: str) -> int:
+    """Return the fewest bytes that a structure can take."""
+    fields = fields_of(name)
+    sizes = (
+        4 if one.is_sequence else (one.size or 1) * least_element(one) for one in fields
+    )
+    return sum(sizes) if fields else 1
+
+
+def least_element(field: FieldInfo) -> int:
+    """Return the fewest bytes that a value of a field, or an element of it, can take."""
+    if field.nested:
+        return least(field.nested)
+    return 4 if field.primitive is None else field.primitive.size
 
 
 class _Reader:
@@ -30,7 +49,9 @@ class _Reader:
 
     def message(self, kind: Any, name: str, path: str) -> Any:
         """Read a structure."""
-        message = kind()
+        message = maker(
+            kind
+        )()  # what a constructor makes may be larger than the buffer
         fields = fields_of(name)
         if not fields:
             self.take(1, 1, path or name)
@@ -49,7 +70,7 @@ class _Reader:
             if field.bound is not None and count > field.bound:
                 problem = f"{count} elements where at most {field.bound} are allowed"
                 raise DecodeError(problem, path, self.at - 4)
-            self.enough(count * self.least(field), path, f"{count} elements")
+        self.enough(count * least_element(field), path, f"{count} elements")
         if field.is_numeric and field.primitive is not None:
             return self.numbers(field, count, path)
         return [self.element(field, f"{path}[{index}]") for index in range(count)]
@@ -68,12 +89,6 @@ class _Reader:
         import numpy as np
 
         return np.array(result, field.primitive.name)
-
-    def least(self, field: FieldInfo) -> int:
-        """Return the fewest bytes that an element can take."""
-        if field.primitive is not None:
-            return field.primitive.size
-        return 4 if field.text else 1
 
     def element(self, field: FieldInfo, path: str) -> Any:
         """Read one value."""

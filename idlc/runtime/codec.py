@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
+    from .hints import Join
     from .message import Message
 
     #: What turns bytes into a str.
@@ -64,15 +65,16 @@ FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 class Codec:
     """The two functions of one class and byte order.
 
-    `encode(message)` returns the parts of the message in order: buffers, of which the first
-    begins with the encapsulation header. Numeric sequences are parts of their own, not copied.
+    `encode(message, join)` returns `join(parts)`: buffers, of which the first begins with the
+    encapsulation header. Numeric sequences are parts of their own, not copied; it starts again if
+    one had another length when it was joined than when it was counted.
     `decode(data)` returns a message from `bytes` that begin with the encapsulation header.
     `bulk` says that there are numeric sequences, so that a memoryview saves a copy.
     """
 
     def __init__(
         self,
-        encode: Callable[[Any], list[Any]],
+        encode: Callable[[Any, Join], Any],
         decode: Callable[[Any], Any],
         bulk: bool = False,
     ) -> None:
@@ -140,11 +142,11 @@ def _functions(owner: Any) -> Functions:
     encode, decode = little.encode, little.decode
     join = b"".join
 
-    def serialize(self: Any, byteorder: str = "little") -> bytes:
+    def serialize(self: Any, byteorder: str = "little") -> Any:
         try:
             if byteorder == "little":
-                return join(encode(self))
-            return join(codecs(ORDERS[byteorder]).encode(self))
+                return encode(self, join)
+            return codecs(ORDERS[byteorder]).encode(self, join)
         except Exception as error:
             raise encode_error(self, byteorder, error) from error
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 if TYPE_CHECKING:
@@ -22,6 +22,8 @@ else:
 #: What numeric sequences take.
 Integers: TypeAlias = Iterable[int]
 Floats: TypeAlias = Iterable[float]
+#: What a message's parts are given to.
+Join: TypeAlias = Callable[[list[Any]], Any]
 
 
 class Options(TypedDict, total=False):
@@ -31,4 +33,4 @@ class Options(TypedDict, total=False):
     check_fields: bool
 
 
-__all__ = ["Any", "Floats", "Integers", "Options", "TypeAlias", "Unpack"]
+__all__ = ["Any", "Floats", "Integers", "Join", "Options", "TypeAlias", "Unpack"]

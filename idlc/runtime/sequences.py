@@ -11,9 +11,13 @@ from .names import name_of
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
+    from functools import partial
     from typing import Any
 
     from .codec import Reading
+else:
+    # functools takes longer to import than all that is here
+    from _functools import partial
 
 Number = TypeVar("Number", int, float)
 
@@ -35,6 +39,8 @@ TYPE_CODES = {
 SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
 
 
+#: From so many numbers on, copying them takes longer than it takes not to.
+MANY = 1 << 16
 #: What `array` itself takes as rosidl means it: the memory of bytes, the elements of others.
 _TAKEN = (list, tuple, array, bytes, bytearray)
 
@@ -169,17 +175,40 @@ class Float64Sequence(NumberSequence[float]):
 
 
 def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:
-    """Return a function that turns a field's value into a buffer in the wire's byte order."""
+    """Return a function that makes a new array in the wire's byte order.
 
-    def native(values: Any) -> Any:
-        return values if type(values) is array else converted(code, values)
+    Not of a value whose type is `array_of(order)`: that is written as it is.
+    """
 
     def swapped(values: Any) -> Any:
         result = array(code, converted(code, values))
         result.byteswap()
         return result
 
-    return native if order == NATIVE else swapped
+    return partial(converted, code) if order == NATIVE else swapped
+
+
+def array_of(order: str) -> Any:
+    """Return the type of the arrays whose elements are in the wire's byte order already."""
+    return array if order == NATIVE else None
+
+
+def sequence_copier(order: str, code: str) -> Callable[[Any], Any]:
+    """Return a function that turns a field's value into bytes in the wire's byte order.
+
+    These are not copied if there are many; then the array cannot change its length meanwhile.
+    """
+    write = sequence_writer(order, code)
+    plain = array_of(order)
+
+    def copy(values: Any) -> Any:
+        if type(values) is not plain:
+            values = write(values)
+        if len(values) < MANY:
+            return values.tobytes()
+        return memoryview(values).cast("B")
+
+    return copy
 
 
 def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], Any]:

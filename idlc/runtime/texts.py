@@ -5,11 +5,11 @@ from __future__ import annotations
 from array import array
 from struct import Struct
 
-from .cdr import LONG_TEXT, NATIVE, Texts, layout
+from .cdr import LONG_TEXT, NATIVE, Texts, layout, listed
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
     from typing import Any
 
 #: Up to so many bytes, looking whether all are ASCII costs less than it saves.
@@ -51,33 +51,50 @@ def rows_writer(order: str) -> Callable[[list[str]], bytes]:
     return write
 
 
-def text_block(order: str) -> Callable[[Iterable[str]], bytes]:
-    """Return a function that writes the strings of an array, from a multiple of four on.
+def text_block(
+    order: str, size: int | None = None, bound: int | None = None
+) -> Callable[[Sequence[str]], bytes]:
+    """Return a function that writes an array of `size` strings, or a sequence and its count.
 
-    The last block is kept: what a node publishes has the same names in each message.
+    It writes from a multiple of four on. The last block is kept: what a node publishes has the
+    same names in each message.
     """
     sized = sizes(order)
     ended = ENDS
     write_rows = rows_writer(order)
-    last: tuple[list[str], bytes] = ([], b"")
+    head = counter(order, size, bound)
+    last: tuple[list[str] | None, bytes] = (None, b"")
 
-    def write(values: Iterable[str]) -> bytes:
+    def write(values: Sequence[str]) -> bytes:
         nonlocal last
         known, block = last
         if type(values) is list and values == known:
             return block
+        values = listed(values)
         rows: list[str] = []
         try:
             for value in values:
                 rows += sized[len(value)], value, ended[len(value)]
         except IndexError:
             rows = unsized(values)
-        block = write_rows(rows)
-        if type(values) is list and len(block) <= LONG_TEXT:
-            last = values[:], block
+        block = head(len(values)) + write_rows(rows)
+        if len(block) <= LONG_TEXT:
+            last = values, block
         return block
 
     return write
+
+
+def counter(order: str, size: int | None, bound: int | None) -> Callable[[int], bytes]:
+    """Return a function that checks the number of elements; it returns what goes before them."""
+    pack = layout(order, "I").pack
+
+    def count(number: int) -> bytes:
+        if number != size if size is not None else bound is not None and number > bound:
+            raise ValueError("wrong number of elements")
+        return pack(number) if size is None else b""
+
+    return count
 
 
 def wide_text(order: str) -> Callable[[str], bytes]:
@@ -99,16 +116,18 @@ def wide_text(order: str) -> Callable[[str], bytes]:
     return write
 
 
-def wide_block(order: str) -> Callable[[Iterable[str]], bytes]:
-    """Return a function that writes the wstrings of an array, from a multiple of four on."""
+def wide_block(
+    order: str, size: int | None = None, bound: int | None = None
+) -> Callable[[Sequence[str]], bytes]:
+    """Return what `text_block` returns, for wstrings."""
     write_one = wide_text(order)
     count = Struct(order + "I").pack
+    head = counter(order, size, bound)
 
-    def write(values: Iterable[str]) -> bytes:
-        raw = [write_one(value) for value in values]
-        return b"".join(
-            [part for text in raw for part in (count(len(text) // 4), text)]
-        )
+    def write(values: Sequence[str]) -> bytes:
+        raw = [write_one(value) for value in listed(values)]
+        parts = [part for text in raw for part in (count(len(text) // 4), text)]
+        return head(len(raw)) + b"".join(parts)
 
     return write
 

@@ -34,6 +34,7 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 _HEADER = 4
 #: An array with this many bytes is not copied on its way to the middleware.
 _LARGE = 16384
+_SPAN = Struct("=3Q").pack
 
 
 class Memory:
@@ -52,25 +53,38 @@ class Memory:
     #: What was received, with header; no attribute in a memory that is sent.
     received: bytes
 
+    def keep(self, parts: list[Any]) -> int:
+        """Take the parts of a message, and return their size without header."""
+        parts[0] = parts[0][_HEADER:]
+        self.body = body = b"".join(parts)
+        size = len(body)
+        self.spans = _SPAN(size, id(body) + c.BYTES_OFFSET, size)
+        return size
+
+    def keep_apart(self, parts: list[Any]) -> int:
+        """Do the same without a copy; arrays cannot change their length until it is sent."""
+        parts[0] = parts[0][_HEADER:]
+        self.body = views = [memoryview(part).cast("B") for part in parts]
+        start = _view_start() >> 3
+        words: list[int] = []
+        for view in views:
+            words += c.WORDS[(id(view) >> 3) + start], len(view)
+        size = sum(words[1::2])
+        self.spans = pack(f"={1 + len(words)}Q", size, *words)
+        return size
+
 
 def _memory_type(name: str, cls: Any, apart: bool) -> type[Memory]:
     """Return the memory of a message class; `apart`: large ones may stay in parts."""
     codec = cls._codec_(NATIVE)
     encode, bulk = codec.encode, codec.bulk and apart
-    true, content, span = c.TRUE, c.BYTES_OFFSET, Struct("=3Q").pack
+    true = c.TRUE
     large = False
 
     def store(memory: Any, message: Any) -> object:
         nonlocal large
         try:
-            parts = encode(message)
-            parts[0] = parts[0][_HEADER:]
-            if large:
-                size = _store_apart(memory, parts)
-            else:
-                memory.body = body = b"".join(parts)
-                size = len(body)
-                memory.spans = span(size, id(body) + content, size)
+            size = encode(message, memory.keep_apart if large else memory.keep)
             # what follows on a topic is as large as what came before
             large = bulk and size >= _LARGE
         except Exception as error:
@@ -81,18 +95,6 @@ def _memory_type(name: str, cls: Any, apart: bool) -> type[Memory]:
 
     namespace = {"__slots__": (), "__rmatmul__": store, "__pos__": _taker(name, cls)}
     return type("Memory", (Memory,), namespace)
-
-
-def _store_apart(memory: Memory, parts: list[Any]) -> int:
-    """Put the parts of a message into a memory, uncopied; return their size."""
-    memory.body = views = [memoryview(part).cast("B") for part in parts]
-    start = _view_start() >> 3
-    words: list[int] = []
-    for view in views:
-        words += c.WORDS[(id(view) >> 3) + start], len(view)
-    size = sum(words[1::2])
-    memory.spans = pack(f"={1 + len(words)}Q", size, *words)
-    return size
 
 
 def _offset(owner: object, word: int) -> int:

@@ -32,7 +32,7 @@ def _converter(cls: Any, name: str) -> object:
 
     def store(address: int, message: Any) -> None:
         try:
-            data = b"".join(encode(message))
+            data = encode(message, b"".join)
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
         everything.fill(transcode.Cursor(memoryview(data)[_HEADER:]), address)

@@ -18,13 +18,23 @@ import time
 from pathlib import Path
 
 import rclpy
+import std_msgs.msg
 from rclpy._rclpy_pybind11 import RCLError, RMWError
 from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import ByteMultiArray, Header, String, UInt8MultiArray
+from std_msgs.msg import (
+    ByteMultiArray,
+    Float64MultiArray,
+    Header,
+    MultiArrayDimension,
+    String,
+    UInt8MultiArray,
+)
 
 PATIENCE = 60.0
+NUMBERS = ["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64",
+           "UInt64"]  # fmt: skip
 LATCHED = QoSProfile(depth=5, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -184,6 +194,44 @@ def received_garbage_is_dropped():
     publisher.publish(String("fine"))
     eventually(lambda: received, node)
     assert received == [String("fine")]
+
+
+def large_arrays_of_every_type():
+    """The second and later of large messages take a way of their own."""
+    for kind in NUMBERS:
+        cls = getattr(std_msgs.msg, f"{kind}MultiArray")
+        for label in ("", "a", "ab", "abcdefg"):
+            message = cls(data=[number % 100 for number in range(20_000 + len(label))])
+            message.layout.dim.append(MultiArrayDimension(label=label))
+            for _ in range(3):
+                assert serialize_message(message) == message.serialize(), kind
+            assert deserialize_message(serialize_message(message), cls) == message, kind
+
+
+def arrays_that_another_thread_changes():
+    """The bytes are of one moment; of a large array, the other thread may have to wait for it."""
+    sys.setswitchinterval(1e-6)
+    for cls, size in ((Float64MultiArray, 5), (Float64MultiArray, 5000), (UInt8MultiArray, 50_000)):
+        message = cls(data=[1] * size)
+        stop = threading.Event()
+
+        def change(message=message, size=size, stop=stop):
+            while not stop.is_set():
+                with contextlib.suppress(BufferError):
+                    message.data.append(1)
+                    del message.data[size:]
+                    message.data.pop()
+                    message.data.append(1)
+
+        thread = threading.Thread(target=change)
+        thread.start()
+        for _ in range(3000):
+            data = serialize_message(message)
+            found = deserialize_message(data, cls)
+            assert abs(len(found.data) - size) <= 2
+            assert found.serialize() == data
+        stop.set()
+        thread.join()
 
 
 def memory_stays_flat(count):

@@ -14,14 +14,18 @@ from __future__ import annotations
 from struct import Struct, calcsize
 from sys import byteorder
 
+from .generics import TypeVar
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Collection, Iterator
     from typing import Any, TypeAlias
 
     BySize: TypeAlias = dict[int, Callable[..., bytes]]
 else:
     BySize = dict
+
+Value = TypeVar("Value")
 
 NATIVE = "<" if byteorder == "little" else ">"
 
@@ -98,6 +102,11 @@ def text_phases(order: str, fields: str, align: int = 1) -> tuple[Texts, ...]:
     return tuple(Texts(order, fields, start, align) for start in range(8))
 
 
+def listed(values: Collection[Value]) -> list[Value]:
+    """Return what is in a sequence at this moment; an iterator, which ends, is none."""
+    return [*values] if len(values) else []
+
+
 #: What a bool may be: True, False, 1 and 0, also of numpy. Nothing else is looked at for its truth.
 TRUTHS = {False: False, True: True}
 _truth = TRUTHS.__getitem__
@@ -107,7 +116,7 @@ def flags(values: Any) -> bytes:
     """Return one byte per bool; of a buffer of bytes, whether each is not zero."""
     raw = None if type(values) is list else _single_bytes(values)
     if raw is None:
-        return bytes(map(_truth, values))
+        return bytes(map(_truth, values) if len(values) else b"")
     return bytes(map(bool, raw))
 
 
@@ -117,7 +126,7 @@ def octets(values: Any) -> bytes:
         raw = _single_bytes(values)
         if raw is not None:
             return raw
-        values = list(values)
+    values = listed(values)
     raw = b"".join(values)
     if len(raw) != len(values) or set(map(len, values)) - {1}:
         raise ValueError("bytes of another length than 1")
@@ -145,12 +154,12 @@ def read_octets(raw: bytes | memoryview) -> list[bytes]:
     return values
 
 
-def flags_writer(size: int) -> Callable[[Iterable[Any]], bytes]:
+def flags_writer(size: int) -> Callable[[Collection[Any]], bytes]:
     """Return a function that writes exactly `size` bools."""
     return _exactly(size, flags)
 
 
-def octets_writer(size: int) -> Callable[[Iterable[bytes]], bytes]:
+def octets_writer(size: int) -> Callable[[Collection[bytes]], bytes]:
     """Return a function that writes exactly `size` bytes."""
     return _exactly(size, octets)
 

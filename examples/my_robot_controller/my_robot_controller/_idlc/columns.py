@@ -20,6 +20,10 @@ from .typeinfo import FieldInfo, fields_of, type_name
 
 #: Messages of more different layouts are not what columns are for.
 MOST_LAYOUTS = 1000
+#: Nor are texts of which few are long: all take as much room as the longest. So many bytes are
+#: always taken, and more only up to so many for each byte of the messages.
+ALWAYS_TAKEN = 1 << 28
+MOST_PER_BYTE = 100
 
 
 class Shape(NamedTuple):
@@ -68,7 +72,14 @@ def to_columns(kind: type, buffers: Iterable[Any]) -> Any:
     shape = parts[0][1].shape if parts else Shape(_absent(name))
     for rows, walk, _ in parts[1:]:
         shape = _merged(shape, walk.shape, f"[{rows[0]}]")
-    return _filled(parts, _dtype(shape), len(raws))
+    dtype = _dtype(shape)
+    wanted = len(raws) * dtype.itemsize
+    if wanted > max(ALWAYS_TAKEN, MOST_PER_BYTE * int(sizes.sum())):
+        raise ValueError(
+            f"the columns would take {wanted:,} bytes for {sizes.sum():,} bytes of messages, "
+            f"as each text takes as much as the longest of its column"
+        )
+    return _filled(parts, dtype, len(raws))
 
 
 def _filled(parts: Any, dtype: Any, count: int) -> Any:

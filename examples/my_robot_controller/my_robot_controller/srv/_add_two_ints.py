@@ -56,8 +56,9 @@ def _add_two_ints__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Co
     new_add_two_ints_request = _idlc.maker(AddTwoInts_Request)
     read_1 = _idlc.layout(order, "qq", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._a, message._b)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._a, message._b)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_add_two_ints_request()
@@ -105,8 +106,9 @@ def _add_two_ints__response_codec(order: str, reading: _idlc.Reading) -> _idlc.C
     new_add_two_ints_response = _idlc.maker(AddTwoInts_Response)
     read_1 = _idlc.layout(order, "q", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._sum)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._sum)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_add_two_ints_response()
@@ -171,6 +173,7 @@ def _add_two_ints__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Code
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "qq", start=4).pack
     pad8 = _idlc.PAD8
@@ -187,22 +190,22 @@ def _add_two_ints__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Code
     read_2 = _idlc.layout(order, "I").unpack_from
     rows_2 = _idlc.layout(order, "q", start=4).iter_unpack
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join([write_2(item._a, item._b) for item in request])
         at = 48
         if request:
             at = (at + 3 & -8) + 4 + 16 * len(request)
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         at = at + 4
         response_block = b"".join([write_4(item_2._sum) for item_2 in response])
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 info._event_type,
@@ -218,6 +221,7 @@ def _add_two_ints__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Code
             pad8[at & 7] if response else b"",
             response_block,
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

@@ -56,8 +56,9 @@ def _fill__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_fill_goal = _idlc.maker(Fill_Goal)
     read_1 = _idlc.layout(order, "f", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._level)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._level)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_goal()
@@ -105,8 +106,9 @@ def _fill__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_fill_result = _idlc.maker(Fill_Result)
     read_1 = _idlc.layout(order, "f", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._reached)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._reached)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_result()
@@ -154,8 +156,9 @@ def _fill__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_fill_feedback = _idlc.maker(Fill_Feedback)
     read_1 = _idlc.layout(order, "f", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._level)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._level)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_feedback()
@@ -223,10 +226,11 @@ def _fill__send_goal__request_codec(order: str, reading: _idlc.Reading) -> _idlc
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bf", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         goal = message._goal
-        return [write_1(encapsulation, bytes_uint8_16(goal_id._uuid), goal._level)]
+        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid), goal._level)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_send_goal_request()
@@ -292,9 +296,9 @@ def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idl
     new_time = _idlc.maker(Time)
     read_1 = _idlc.layout(order, "?iI", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         stamp = message._stamp
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 truths[message._accepted],
@@ -302,6 +306,7 @@ def _fill__send_goal__response_codec(order: str, reading: _idlc.Reading) -> _idl
                 stamp._nanosec,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_send_goal_response()
@@ -369,6 +374,7 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16Bf").pack
     write_3 = _idlc.layout(order, "I").pack
@@ -387,10 +393,10 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
     read_3 = _idlc.layout(order, "I").unpack_from
     read_4 = _idlc.layout(order, "?iI").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         parts = [
@@ -409,7 +415,7 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
             goal_id = item._goal_id
             goal = item._goal
             put(write_2(bytes_uint8_16(goal_id._uuid), goal._level))
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_3(len(response)))
@@ -422,7 +428,7 @@ def _fill__send_goal__event_codec(order: str, reading: _idlc.Reading) -> _idlc.C
                     item_2_stamp._nanosec,
                 ),
             )
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -526,9 +532,10 @@ def _fill__get_result__request_codec(order: str, reading: _idlc.Reading) -> _idl
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
-        return [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_get_result_request()
@@ -590,9 +597,10 @@ def _fill__get_result__response_codec(
     new_fill_result = _idlc.maker(Fill_Result)
     read_1 = _idlc.layout(order, "bf", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         result = message._result
-        return [write_1(encapsulation, message._status, result._reached)]
+        parts = [write_1(encapsulation, message._status, result._reached)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_get_result_response()
@@ -660,6 +668,7 @@ def _fill__get_result__event_codec(order: str, reading: _idlc.Reading) -> _idlc.
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16B", start=4).pack
     write_3 = _idlc.layout(order, "I").pack
@@ -677,16 +686,16 @@ def _fill__get_result__event_codec(order: str, reading: _idlc.Reading) -> _idlc.
     read_2 = _idlc.layout(order, "I").unpack_from
     read_3 = _idlc.layout(order, "bf", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join(
             [write_2(bytes_uint8_16(item._goal_id._uuid)) for item in request],
         )
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         parts = [
@@ -706,7 +715,7 @@ def _fill__get_result__event_codec(order: str, reading: _idlc.Reading) -> _idlc.
         for item_2 in response:
             result = item_2._result
             put(write_4(item_2._status, result._reached))
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -815,10 +824,11 @@ def _fill__feedback_message_codec(order: str, reading: _idlc.Reading) -> _idlc.C
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bf", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        return [write_1(encapsulation, bytes_uint8_16(goal_id._uuid), feedback._level)]
+        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid), feedback._level)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_feedback_message()

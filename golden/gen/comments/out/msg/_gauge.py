@@ -123,9 +123,10 @@ class Gauge(_idlc.Message):
 def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Gauge in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sfBI*I", align=4)
-    write_notes = _idlc.text_block(order)
+    write_1 = _idlc.Texts(order, "4sfBI*", align=4)
+    write_notes = _idlc.text_block(order, bound=3)
     buffer_h = _idlc.sequence_writer(order, "h")
+    array = _idlc.array_of(order)
     write_2 = _idlc.phases(order, "I")
     bytes_float64_9 = _arrays.array_writer(order, "float64", 9)
     write_3 = _idlc.phases(order, "9dc")
@@ -139,33 +140,36 @@ def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_3 = _idlc.layout(order, "9dc", start=4).unpack_from
     small = reading.small
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         label = message._label.encode()
         label_size = len(label)
-        notes = message._notes
-        if len(notes) > 3:
-            raise ValueError("too many elements")
-        at = (label_size + 20 & -4) + 4
-        notes_block = write_notes(notes)
-        at = at + len(notes_block)
-        low = len(notes_block)
-        samples = buffer_h(message._samples)
+        at = label_size + 20 & -4
+        notes = write_notes(message._notes)
+        at = at + len(notes)
+        low = len(notes)
+        samples = message._samples
+        if type(samples) is not array:
+            samples = buffer_h(samples)
+        samples_count = len(samples)
         at = (at + 3 & -4) + 4
-        at = at + 2 * len(samples)
-        return [
+        at = at + 2 * samples_count
+        parts = [
             write_1[label_size](
                 encapsulation,
                 message._rate,
                 message._level,
                 label_size + 1,
                 label,
-                len(notes),
             ),
-            notes_block,
-            write_2[low & 3].pack(len(samples)),
+            notes,
+            write_2[low & 3].pack(samples_count),
             samples,
             write_3[at & 7].pack(bytes_float64_9(message._covariance), message._flags),
         ]
+        raw = join(parts)
+        if len(samples) != samples_count:
+            return encode(message, join)
+        return raw
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

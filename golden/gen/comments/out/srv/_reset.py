@@ -53,10 +53,11 @@ def _reset__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         reason = message._reason.encode()
         reason_size = len(reason)
-        return [write_1[reason_size](encapsulation, reason_size + 1, reason)]
+        parts = [write_1[reason_size](encapsulation, reason_size + 1, reason)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_reset_request()
@@ -109,8 +110,9 @@ def _reset__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_reset_response = _idlc.maker(Reset_Response)
     read_1 = _idlc.layout(order, "?", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, truths[message._ok])]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, truths[message._ok])]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_reset_response()
@@ -175,6 +177,7 @@ def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.text_phases(order, "I*")
     write_3 = _idlc.phases(order, "I")
@@ -191,10 +194,10 @@ def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     text = reading.text
     rows_1 = _idlc.layout(order, "?", start=4).iter_unpack
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         low = 0
@@ -215,13 +218,13 @@ def _reset__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             reason_size = len(reason)
             put(write_2[low & 3][reason_size](reason_size + 1, reason))
             low = reason_size + 1
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         response_block = b"".join([write_4(truths[item_2._ok]) for item_2 in response])
         put(write_3[low & 3].pack(len(response)))
         put(response_block)
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

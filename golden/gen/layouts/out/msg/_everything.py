@@ -181,6 +181,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     truths = _idlc.TRUTHS
     wide_text = _idlc.wide_text(order)
     write_1 = _idlc.Texts(order, "4s?BdI*I")
+    listed = _idlc.listed
     write_2 = _idlc.layout(order, "I").pack
     write_3 = _idlc.text_phases(order, "BdI*I")
     bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
@@ -189,14 +190,15 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     write_5 = _idlc.phases(order, "xI")
     write_6 = _idlc.layout(order, "x", start=4).pack
     buffer_d = _idlc.sequence_writer(order, "d")
+    array = _idlc.array_of(order)
     write_7 = _idlc.phases(order, "I")
     pad8 = _idlc.PAD8
     buffer_h = _idlc.sequence_writer(order, "h")
     flags_2 = _idlc.flags
     octets_2 = _idlc.octets_writer(2)
-    write_8 = _idlc.phases(order, "2BI", align=4)
+    write_8 = _idlc.layout(order, "2B").pack
     write_texts = _idlc.text_block(order)
-    write_wides = _idlc.wide_block(order)
+    write_wides = _idlc.wide_block(order, size=2)
     write_9 = _idlc.layout(order, "iI", start=4).pack
     bytes_float32_4 = _arrays.array_writer(order, "float32", 4)
     write_10 = _idlc.phases(order, "4fq")
@@ -226,14 +228,14 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_7 = _idlc.phases(order, "4fq")
     small = reading.small
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         inner = message._inner
         c = inner._c.encode()
         c_size = len(c)
         d = wide_text(inner._d)
         at = (c_size + 28 & -4) + 4
         at = at + len(d)
-        inners = message._inners
+        inners = listed(message._inners)
         at = at + 4
         parts = [
             write_1[c_size](
@@ -265,7 +267,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             at = ((at + 4 & -8) + item_c_size + 20 & -4) + 4
             put(item_d)
             at = at + len(item_d)
-        rows = message._rows
+        rows = listed(message._rows)
         if len(rows) > 4:
             raise ValueError("too many elements")
         at = at + 4
@@ -279,7 +281,7 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         if rows:
             at = at + 12 * len(rows) - 3
             low = 12 * len(rows) - 3
-        pair = message._pair
+        pair = listed(message._pair)
         if len(pair) != 2:
             raise ValueError("wrong number of elements")
         pair_block = b"\x00\x00\x00".join(
@@ -294,58 +296,65 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         put(pad4[low & 3])
         put(pair_block)
         low = 12 * len(pair) - 3
-        nothings = message._nothings
+        nothings = listed(message._nothings)
         at = (at + 4 & -4) + 4
         nothings_block = b"".join([write_6() for item_4 in nothings])
         at = at + len(nothings)
         put(write_5[low & 3].pack(len(nothings)))
         put(nothings_block)
         low = len(nothings)
-        doubles = buffer_d(message._doubles)
+        doubles = message._doubles
+        if type(doubles) is not array:
+            doubles = buffer_d(doubles)
+        doubles_count = len(doubles)
         at = (at + 3 & -4) + 4
-        put(write_7[low & 3].pack(len(doubles)))
-        put(pad8[at & 7] if doubles else b"")
+        put(write_7[low & 3].pack(doubles_count))
+        put(pad8[at & 7] if doubles_count else b"")
         put(doubles)
-        if doubles:
-            at = (at + 3 & -8) + 4 + 8 * len(doubles)
-        shorts = buffer_h(message._shorts)
-        if len(shorts) > 3:
+        if doubles_count:
+            at = (at + 3 & -8) + 4 + 8 * doubles_count
+        shorts = message._shorts
+        if type(shorts) is not array:
+            shorts = buffer_h(shorts)
+        shorts_count = len(shorts)
+        if shorts_count > 3:
             raise ValueError("too many elements")
         at = at + 4
-        at = at + 2 * len(shorts)
-        low = 2 * len(shorts)
+        at = at + 2 * shorts_count
+        low = 2 * shorts_count
         flags = flags_2(message._flags)
         at = (at + 3 & -4) + 4
         at = at + len(flags)
-        put(write_2(len(shorts)))
+        put(write_2(shorts_count))
         put(shorts)
         put(write_7[low & 3].pack(len(flags)))
         put(flags)
         low = len(flags)
-        texts = message._texts
-        at = (at + 5 & -4) + 4
-        texts_block = write_texts(texts)
-        at = at + len(texts_block)
-        put(write_8[low & 3].pack(octets_2(message._octets), len(texts)))
-        put(texts_block)
-        low = len(texts_block)
-        wides = message._wides
-        if len(wides) != 2:
-            raise ValueError("wrong number of elements")
-        wides_block = write_wides(wides)
-        at = (at + 3 & -4) + len(wides_block)
-        stamps = message._stamps
+        at = at + 2
+        low = low + 2
+        texts = write_texts(message._texts)
+        at = (at + 3 & -4) + len(texts)
+        put(write_8(octets_2(message._octets)))
+        put(pad4[low & 3])
+        put(texts)
+        low = len(texts)
+        wides = write_wides(message._wides)
+        at = (at + 3 & -4) + len(wides)
+        stamps = listed(message._stamps)
         at = at + 4
         stamps_block = b"".join(
             [write_9(item_5._sec, item_5._nanosec) for item_5 in stamps],
         )
         at = at + 8 * len(stamps)
         put(pad4[low & 3])
-        put(wides_block)
+        put(wides)
         put(write_2(len(stamps)))
         put(stamps_block)
         put(write_10[at & 7].pack(bytes_float32_4(message._weights), message._last))
-        return parts
+        raw = join(parts)
+        if len(doubles) != doubles_count or len(shorts) != shorts_count:
+            return encode(message, join)
+        return raw
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -393,6 +402,8 @@ def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             item_2._a, item_2._b, item_2_c = read_4(data, at)
             item_2._c = array_uint8_3(item_2_c)
             at = at + 9
+        if at + 18 > limit:
+            raise ValueError("too short")
         pair = [new_row() for _ in range(2)]
         message._pair = pair
         for item_3 in pair:

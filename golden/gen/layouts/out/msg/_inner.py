@@ -67,11 +67,11 @@ def _inner_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_2 = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         c = message._c.encode()
         c_size = len(c)
         d = wide_text(message._d)
-        return [
+        parts = [
             write_1[c_size](
                 encapsulation,
                 message._a,
@@ -82,6 +82,7 @@ def _inner_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             ),
             d,
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

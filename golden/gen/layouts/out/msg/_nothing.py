@@ -34,8 +34,9 @@ def _nothing_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_nothing = _idlc.maker(Nothing)
     read_1 = _idlc.layout(order, "x", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_nothing()

@@ -51,15 +51,16 @@ def _pair_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     text = reading.text
     read_2 = _idlc.layout(order, "I").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         key = message._key.encode()
         key_size = len(key)
         value = message._value.encode()
         value_size = len(value)
-        return [
+        parts = [
             write_1[key_size](encapsulation, key_size + 1, key),
             write_2[value_size](value_size + 1, value),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_pair()

@@ -62,10 +62,11 @@ def _row_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
     read_1 = _idlc.layout(order, "IH3B", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [
             write_1(encapsulation, message._a, message._b, bytes_uint8_3(message._c)),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_row()

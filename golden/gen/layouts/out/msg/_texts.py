@@ -67,11 +67,12 @@ class Texts(_idlc.Message):
 def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Texts in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sI", align=4).pack
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
+    write_1 = _idlc.layout(order, "4sI", align=4).pack
     write_rows = _idlc.rows_writer(order)
+    listed = _idlc.listed
     write_2 = _idlc.phases(order, "I")
     write_3 = _idlc.text_phases(order, "I*", align=4)
     write_4 = _idlc.Texts(order, "I*")
@@ -87,34 +88,35 @@ def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_3 = _idlc.layout(order, "BI").unpack_from
     read_4 = _idlc.layout(order, "d", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         pairs = message._pairs
         pairs_rows: list[str] = []
-        try:
-            for item in pairs:
-                key = item._key
-                value = item._value
-                pairs_rows += (
-                    sized[len(key)],
-                    key,
-                    ended[len(key)],
-                    sized[len(value)],
-                    value,
-                    ended[len(value)],
+        if len(pairs):
+            try:
+                for item in pairs:
+                    key = item._key
+                    value = item._value
+                    pairs_rows += (
+                        sized[len(key)],
+                        key,
+                        ended[len(key)],
+                        sized[len(value)],
+                        value,
+                        ended[len(value)],
+                    )
+            except IndexError:
+                pairs_rows = unsized(
+                    [each for item in pairs for each in (item._key, item._value)],
                 )
-        except IndexError:
-            pairs_rows = unsized(
-                [each for item in pairs for each in (item._key, item._value)],
-            )
         pairs_block = write_rows(pairs_rows)
         at = len(pairs_block) + 8
         low = len(pairs_block)
-        few = message._few
+        few = listed(message._few)
         if len(few) > 2:
             raise ValueError("too many elements")
         at = (at + 3 & -4) + 4
         parts = [
-            write_1(encapsulation, len(pairs)),
+            write_1(encapsulation, len(pairs_rows) // 6),
             pairs_block,
             write_2[low & 3].pack(len(few)),
         ]
@@ -130,43 +132,44 @@ def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             put(write_4[item_2_value_size](item_2_value_size + 1, item_2_value))
             at = at + item_2_value_size + 5
             low = item_2_value_size + 1
-        titled = message._titled
+        titled = listed(message._titled)
         at = (at + 3 & -4) + 4
         put(write_2[low & 3].pack(len(titled)))
         for item_3 in titled:
             title = item_3._title.encode()
             title_size = len(title)
             item_3_pairs = item_3._pairs
+            item_3_pairs_rows: list[str] = []
+            if len(item_3_pairs):
+                try:
+                    for item_4 in item_3_pairs:
+                        item_4_key = item_4._key
+                        item_4_value = item_4._value
+                        item_3_pairs_rows += (
+                            sized[len(item_4_key)],
+                            item_4_key,
+                            ended[len(item_4_key)],
+                            sized[len(item_4_value)],
+                            item_4_value,
+                            ended[len(item_4_value)],
+                        )
+                except IndexError:
+                    item_3_pairs_rows = unsized(
+                        [
+                            each_2
+                            for item_4 in item_3_pairs
+                            for each_2 in (item_4._key, item_4._value)
+                        ],
+                    )
             put(
                 write_5[title_size](
                     item_3._level,
                     title_size + 1,
                     title,
-                    len(item_3_pairs),
+                    len(item_3_pairs_rows) // 6,
                 ),
             )
             at = (at + title_size + 12 & -4) + 4
-            item_3_pairs_rows: list[str] = []
-            try:
-                for item_4 in item_3_pairs:
-                    item_4_key = item_4._key
-                    item_4_value = item_4._value
-                    item_3_pairs_rows += (
-                        sized[len(item_4_key)],
-                        item_4_key,
-                        ended[len(item_4_key)],
-                        sized[len(item_4_value)],
-                        item_4_value,
-                        ended[len(item_4_value)],
-                    )
-            except IndexError:
-                item_3_pairs_rows = unsized(
-                    [
-                        each_2
-                        for item_4 in item_3_pairs
-                        for each_2 in (item_4._key, item_4._value)
-                    ],
-                )
             item_3_pairs_block = write_rows(item_3_pairs_rows)
             put(item_3_pairs_block)
             at = at + len(item_3_pairs_block)
@@ -175,7 +178,7 @@ def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         last = message._last.encode()
         last_size = len(last)
         put(write_4[last_size](last_size + 1, last))
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -239,19 +242,20 @@ def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 raise ValueError("too short")
             item_3_pairs = [new_pair() for _ in range(count)]
             item_3._pairs = item_3_pairs
-            words, chars, to_str = strings(data, at + 4)
             end = at + 3
             for item_4 in item_3_pairs:
-                at = end + 8 & -4
-                end = at - 1 + words[at >> 2]
+                at = end + 4 & -4
+                (size,) = read_2(data, at)
+                end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._key = to_str(chars[at:end])
-                at = end + 8 & -4
-                end = at - 1 + words[at >> 2]
+                item_4._key = text(data[at + 4 : end])
+                at = end + 4 & -4
+                (size,) = read_2(data, at)
+                end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._value = to_str(chars[at:end])
+                item_4._value = text(data[at + 4 : end])
             at = (end + 4 & -8) + 4
             (item_3._number,) = read_4(data, at)
             at = at + 8

@@ -66,10 +66,10 @@ class Titled(_idlc.Message):
 def _titled_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Titled in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sBI*I", align=4)
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
+    write_1 = _idlc.Texts(order, "4sBI*I", align=4)
     write_rows = _idlc.rows_writer(order)
     write_2 = _idlc.phases(order, "d")
     new_titled = _idlc.maker(Titled)
@@ -80,41 +80,43 @@ def _titled_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     strings = _idlc.strings_reader(order, reading.text)
     read_3 = _idlc.layout(order, "d", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         title = message._title.encode()
         title_size = len(title)
         pairs = message._pairs
-        at = (title_size + 16 & -4) + 4
         pairs_rows: list[str] = []
-        try:
-            for item in pairs:
-                key = item._key
-                value = item._value
-                pairs_rows += (
-                    sized[len(key)],
-                    key,
-                    ended[len(key)],
-                    sized[len(value)],
-                    value,
-                    ended[len(value)],
+        if len(pairs):
+            try:
+                for item in pairs:
+                    key = item._key
+                    value = item._value
+                    pairs_rows += (
+                        sized[len(key)],
+                        key,
+                        ended[len(key)],
+                        sized[len(value)],
+                        value,
+                        ended[len(value)],
+                    )
+            except IndexError:
+                pairs_rows = unsized(
+                    [each for item in pairs for each in (item._key, item._value)],
                 )
-        except IndexError:
-            pairs_rows = unsized(
-                [each for item in pairs for each in (item._key, item._value)],
-            )
+        at = (title_size + 16 & -4) + 4
         pairs_block = write_rows(pairs_rows)
         at = at + len(pairs_block)
-        return [
+        parts = [
             write_1[title_size](
                 encapsulation,
                 message._level,
                 title_size + 1,
                 title,
-                len(pairs),
+                len(pairs_rows) // 6,
             ),
             pairs_block,
             write_2[at & 7].pack(message._number),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

@@ -55,11 +55,11 @@ def _any_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_quaternion = _idlc.maker(Quaternion)
     read_1 = _idlc.layout(order, "ddddddd", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         pose = message._pose
         position = pose._position
         orientation = pose._orientation
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 position._x,
@@ -71,6 +71,7 @@ def _any_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 orientation._w,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_any()

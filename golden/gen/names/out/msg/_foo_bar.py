@@ -46,9 +46,10 @@ def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_foo_bar_2 = _idlc.maker(FooBar)
     read_1 = _idlc.layout(order, "i", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         inner = message._inner
-        return [write_1(encapsulation, inner._a)]
+        parts = [write_1(encapsulation, inner._a)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_foo_bar()

@@ -44,8 +44,9 @@ def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_foo_bar = _idlc.maker(FooBar)
     read_1 = _idlc.layout(order, "i", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._a)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._a)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_foo_bar()

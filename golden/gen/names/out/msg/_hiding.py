@@ -93,9 +93,10 @@ def _hiding_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Hiding in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     buffer_f = _idlc.sequence_writer(order, "f")
+    array = _idlc.array_of(order)
     write_1 = _idlc.layout(order, "4sddBI").pack
     bytes_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_2 = _idlc.layout(order, "3iI", align=4).pack
+    write_2 = _idlc.layout(order, "3i", align=4).pack
     write_to_dict = _idlc.text_block(order)
     new_hiding = _idlc.maker(Hiding)
     new_point = _idlc.maker(Point)
@@ -107,23 +108,29 @@ def _hiding_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_to_dict = _idlc.texts_reader(order, text)
     small = reading.small
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         validate = message._validate
-        deserialize = buffer_f(message._deserialize)
-        to_dict = message._to_dict
-        to_dict_block = write_to_dict(to_dict)
-        return [
+        deserialize = message._deserialize
+        if type(deserialize) is not array:
+            deserialize = buffer_f(deserialize)
+        deserialize_count = len(deserialize)
+        to_dict = write_to_dict(message._to_dict)
+        parts = [
             write_1(
                 encapsulation,
                 validate._x,
                 validate._y,
                 message._serialize,
-                len(deserialize),
+                deserialize_count,
             ),
             deserialize,
-            write_2(bytes_int32_3(message._from_dict), len(to_dict)),
-            to_dict_block,
+            write_2(bytes_int32_3(message._from_dict)),
+            to_dict,
         ]
+        raw = join(parts)
+        if len(deserialize) != deserialize_count:
+            return encode(message, join)
+        return raw
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

@@ -174,8 +174,9 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     """Return what writes and reads Odd in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.Texts(order, "4siiiiiI*c?fI", align=4)
+    write_1 = _idlc.Texts(order, "4siiiiiI*c?f", align=4)
     write_str_2 = _idlc.text_block(order)
+    listed = _idlc.listed
     write_2 = _idlc.phases(order, "iiiI")
     write_3 = _idlc.layout(order, "dd", start=4).pack
     pad8 = _idlc.PAD8
@@ -192,15 +193,14 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
     read_4 = _idlc.layout(order, "dd3i", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         list_2 = message._list.encode()
         list_2_size = len(list_2)
-        str_2 = message._str
-        at = (list_2_size + 34 & -4) + 8
-        str_2_block = write_str_2(str_2)
-        at = at + len(str_2_block)
-        low = len(str_2_block)
-        item = message._item
+        at = (list_2_size + 34 & -4) + 4
+        str_2 = write_str_2(message._str)
+        at = at + len(str_2)
+        low = len(str_2)
+        item = listed(message._item)
         at = (at + 3 & -4) + 16
         item_block = b"".join([write_3(item_2._x, item_2._y) for item_2 in item])
         parts = [
@@ -216,9 +216,8 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 message._bytes,
                 truths[message._bool],
                 message._float,
-                len(str_2),
             ),
-            str_2_block,
+            str_2,
             write_2[low & 3].pack(
                 message._message,
                 message._data,
@@ -233,7 +232,7 @@ def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             at = (at + 3 & -8) + 4 + 16 * len(item)
         array = message._array
         put(write_4[at & 7].pack(array._x, array._y, bytes_int32_3(message._order)))
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_odd()

@@ -48,8 +48,9 @@ def _point_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_point = _idlc.maker(Point)
     read_1 = _idlc.layout(order, "dd", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._x, message._y)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._x, message._y)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_point()

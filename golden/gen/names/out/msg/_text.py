@@ -69,6 +69,7 @@ def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
         from geometry_msgs.msg import Pose, Quaternion
 
     encapsulation = _idlc.HEADERS[order]
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sdddddI").pack
     write_2 = _idlc.layout(order, "ddddddd", start=4).pack
     pad8 = _idlc.PAD8
@@ -81,10 +82,10 @@ def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     read_1 = _idlc.layout(order, "dddddI", start=4).unpack_from
     rows_1 = _idlc.layout(order, "ddddddd", start=4).iter_unpack
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         other = message._other
         own = message._own
-        any_2 = message._any
+        any_2 = listed(message._any)
         if len(any_2) > 2:
             raise ValueError("too many elements")
         any_2_block = b"".join(
@@ -101,7 +102,7 @@ def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
                 for item in any_2
             ],
         )
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 other._x,
@@ -114,6 +115,7 @@ def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             pad8[0] if any_2 else b"",
             any_2_block,
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

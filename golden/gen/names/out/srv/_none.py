@@ -42,8 +42,9 @@ def _none__request_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_none_request = _idlc.maker(None_Request)
     read_1 = _idlc.layout(order, "x", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_none_request()
@@ -81,8 +82,9 @@ def _none__response_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_none_response = _idlc.maker(None_Response)
     read_1 = _idlc.layout(order, "x", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_none_response()
@@ -147,6 +149,7 @@ def _none__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "x", start=4).pack
     write_3 = _idlc.phases(order, "I")
@@ -160,19 +163,19 @@ def _none__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
     read_2 = _idlc.layout(order, "I").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join([write_2() for item in request])
         low = len(request)
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         response_block = b"".join([write_2() for item_2 in response])
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 info._event_type,
@@ -186,6 +189,7 @@ def _none__event_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             write_3[low & 3].pack(len(response)),
             response_block,
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)

@@ -56,8 +56,9 @@ def _countdown__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     read_1 = _idlc.layout(order, "i", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._target_count)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._target_count)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_goal()
@@ -115,8 +116,9 @@ def _countdown__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     new_countdown_result = _idlc.maker(Countdown_Result)
     read_1 = _idlc.layout(order, "i?", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._final_count, truths[message._success])]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._final_count, truths[message._success])]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_result()
@@ -164,8 +166,9 @@ def _countdown__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.Code
     new_countdown_feedback = _idlc.maker(Countdown_Feedback)
     read_1 = _idlc.layout(order, "i", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, message._current_count)]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, message._current_count)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_feedback()
@@ -238,12 +241,13 @@ def _countdown__send_goal__request_codec(
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         goal = message._goal
-        return [
+        parts = [
             write_1(encapsulation, bytes_uint8_16(goal_id._uuid), goal._target_count),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_send_goal_request()
@@ -311,9 +315,9 @@ def _countdown__send_goal__response_codec(
     new_time = _idlc.maker(Time)
     read_1 = _idlc.layout(order, "?iI", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         stamp = message._stamp
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 truths[message._accepted],
@@ -321,6 +325,7 @@ def _countdown__send_goal__response_codec(
                 stamp._nanosec,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_send_goal_response()
@@ -390,6 +395,7 @@ def _countdown__send_goal__event_codec(
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16Bi").pack
     write_3 = _idlc.layout(order, "I").pack
@@ -408,10 +414,10 @@ def _countdown__send_goal__event_codec(
     read_3 = _idlc.layout(order, "I").unpack_from
     read_4 = _idlc.layout(order, "?iI").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         parts = [
@@ -430,7 +436,7 @@ def _countdown__send_goal__event_codec(
             goal_id = item._goal_id
             goal = item._goal
             put(write_2(bytes_uint8_16(goal_id._uuid), goal._target_count))
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_3(len(response)))
@@ -443,7 +449,7 @@ def _countdown__send_goal__event_codec(
                     item_2_stamp._nanosec,
                 ),
             )
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -549,9 +555,10 @@ def _countdown__get_result__request_codec(
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
-        return [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_get_result_request()
@@ -614,9 +621,9 @@ def _countdown__get_result__response_codec(
     new_countdown_result = _idlc.maker(Countdown_Result)
     read_1 = _idlc.layout(order, "bi?", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         result = message._result
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 message._status,
@@ -624,6 +631,7 @@ def _countdown__get_result__response_codec(
                 truths[result._success],
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_get_result_response()
@@ -693,6 +701,7 @@ def _countdown__get_result__event_codec(
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16B", start=4).pack
     write_3 = _idlc.layout(order, "I").pack
@@ -711,16 +720,16 @@ def _countdown__get_result__event_codec(
     read_2 = _idlc.layout(order, "I").unpack_from
     read_3 = _idlc.phases(order, "bi?")
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join(
             [write_2(bytes_uint8_16(item._goal_id._uuid)) for item in request],
         )
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         low = 0
@@ -748,7 +757,7 @@ def _countdown__get_result__event_codec(
                 ),
             )
             low = 1
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -864,16 +873,17 @@ def _countdown__feedback_message_codec(
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 bytes_uint8_16(goal_id._uuid),
                 feedback._current_count,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_feedback_message()

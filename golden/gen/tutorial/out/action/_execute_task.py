@@ -57,10 +57,11 @@ def _execute_task__goal_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
-        return [write_1[task_name_size](encapsulation, task_name_size + 1, task_name)]
+        parts = [write_1[task_name_size](encapsulation, task_name_size + 1, task_name)]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_goal()
@@ -113,8 +114,9 @@ def _execute_task__result_codec(order: str, reading: _idlc.Reading) -> _idlc.Cod
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
     read_1 = _idlc.layout(order, "?", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
-        return [write_1(encapsulation, truths[message._success])]
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
+        parts = [write_1(encapsulation, truths[message._success])]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_result()
@@ -163,16 +165,17 @@ def _execute_task__feedback_codec(order: str, reading: _idlc.Reading) -> _idlc.C
     read_1 = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         current_status = message._current_status.encode()
         current_status_size = len(current_status)
-        return [
+        parts = [
             write_1[current_status_size](
                 encapsulation,
                 current_status_size + 1,
                 current_status,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_feedback()
@@ -250,12 +253,12 @@ def _execute_task__send_goal__request_codec(
     read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         goal = message._goal
         task_name = goal._task_name.encode()
         task_name_size = len(task_name)
-        return [
+        parts = [
             write_1[task_name_size](
                 encapsulation,
                 bytes_uint8_16(goal_id._uuid),
@@ -263,6 +266,7 @@ def _execute_task__send_goal__request_codec(
                 task_name,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_send_goal_request()
@@ -334,9 +338,9 @@ def _execute_task__send_goal__response_codec(
     new_time = _idlc.maker(Time)
     read_1 = _idlc.layout(order, "?iI", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         stamp = message._stamp
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 truths[message._accepted],
@@ -344,6 +348,7 @@ def _execute_task__send_goal__response_codec(
                 stamp._nanosec,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_send_goal_response()
@@ -413,6 +418,7 @@ def _execute_task__send_goal__event_codec(
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.text_phases(order, "16BI*")
     write_3 = _idlc.phases(order, "I")
@@ -432,10 +438,10 @@ def _execute_task__send_goal__event_codec(
     read_3 = _idlc.layout(order, "I").unpack_from
     read_4 = _idlc.layout(order, "?iI").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         low = 0
@@ -464,7 +470,7 @@ def _execute_task__send_goal__event_codec(
                 ),
             )
             low = task_name_size + 1
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         put(write_3[low & 3].pack(len(response)))
@@ -477,7 +483,7 @@ def _execute_task__send_goal__event_codec(
                     item_2_stamp._nanosec,
                 ),
             )
-        return parts
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -589,9 +595,10 @@ def _execute_task__get_result__request_codec(
     array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
     read_1 = _idlc.layout(order, "16B", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
-        return [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_get_result_request()
@@ -654,9 +661,10 @@ def _execute_task__get_result__response_codec(
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
     read_1 = _idlc.layout(order, "b?", start=4).unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         result = message._result
-        return [write_1(encapsulation, message._status, truths[result._success])]
+        parts = [write_1(encapsulation, message._status, truths[result._success])]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_get_result_response()
@@ -726,6 +734,7 @@ def _execute_task__get_result__event_codec(
 
     encapsulation = _idlc.HEADERS[order]
     bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    listed = _idlc.listed
     write_1 = _idlc.layout(order, "4sBiI16BqI").pack
     write_2 = _idlc.layout(order, "16B", start=4).pack
     write_3 = _idlc.layout(order, "I").pack
@@ -744,16 +753,16 @@ def _execute_task__get_result__event_codec(
     read_2 = _idlc.layout(order, "I").unpack_from
     rows_2 = _idlc.layout(order, "b?", start=4).iter_unpack
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
         stamp = info._stamp
-        request = message._request
+        request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join(
             [write_2(bytes_uint8_16(item._goal_id._uuid)) for item in request],
         )
-        response = message._response
+        response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         response_block = b"".join(
@@ -762,7 +771,7 @@ def _execute_task__get_result__event_codec(
                 for item_2 in response
             ],
         )
-        return [
+        parts = [
             write_1(
                 encapsulation,
                 info._event_type,
@@ -776,6 +785,7 @@ def _execute_task__get_result__event_codec(
             write_3(len(response)),
             response_block,
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
@@ -889,12 +899,12 @@ def _execute_task__feedback_message_codec(
     read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         feedback = message._feedback
         current_status = feedback._current_status.encode()
         current_status_size = len(current_status)
-        return [
+        parts = [
             write_1[current_status_size](
                 encapsulation,
                 bytes_uint8_16(goal_id._uuid),
@@ -902,6 +912,7 @@ def _execute_task__feedback_message_codec(
                 current_status,
             ),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_feedback_message()

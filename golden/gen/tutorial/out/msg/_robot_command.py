@@ -83,12 +83,12 @@ def _robot_command_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
     text = reading.text
     read_2 = _idlc.layout(order, "ffI").unpack_from
 
-    def encode(message: _idlc.Any) -> list[_idlc.Any]:
+    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         command_type = message._command_type.encode()
         command_type_size = len(command_type)
         frame_id = message._frame_id.encode()
         frame_id_size = len(frame_id)
-        return [
+        parts = [
             write_1[command_type_size](
                 encapsulation,
                 command_type_size + 1,
@@ -98,6 +98,7 @@ def _robot_command_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
             ),
             write_2[frame_id_size](frame_id_size + 1, frame_id),
         ]
+        return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_robot_command()
