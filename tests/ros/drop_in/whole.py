@@ -165,6 +165,7 @@ ON_MESSAGES = {
     "types": lambda cls: kinds(cls()),
     "types of values": lambda cls: kinds(invented(cls)),
     "types as read": lambda cls: kinds(deserialize_message(serialize_message(invented(cls)), cls)),
+    "checks as read": lambda cls: deserialize_message(serialize_message(cls()), cls)._check_fields,
     "value as read": lambda cls: repr(deserialize_message(serialize_message(invented(cls)), cls)),
     "fields": lambda cls: fields_of(cls),
     "slot types": lambda cls: {name: str(shape) for name, shape in shape_of(cls).items()},
