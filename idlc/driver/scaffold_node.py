@@ -70,8 +70,11 @@ def _planned(
         source = name and library.source(name)
         if not name or source is None:
             continue
-        model = compile_package(name.package, [(name, source)], library, report)
-        if not report.had_errors:
+        problems = Report()
+        model = compile_package(name.package, [(name, source)], library, problems)
+        if problems.had_errors:
+            report.extend(problems)  # warnings were shown when the interface was written
+        else:
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
     return None if report.had_errors else plan(wanted, interfaces, messages)

@@ -15,7 +15,7 @@ DEFAULT_RATE = 1.0
 #: Fields that are named in a line of the log.
 LOGGED = 6
 #: As much of a line of the log as tests look for.
-HEAD = 60
+HEAD = 50
 #: Longer names of topics are shown shortened.
 SHOWN = 40
 

@@ -20,7 +20,7 @@ Start = Callable[..., Any]
 
 
 def test_it_sends_countdown(start: Start, observer: Node) -> None:
-    """The node sends a goal to countdown, and says what is reported and what comes of it."""
+    """The node sends a goal to countdown and follows it to its end."""
     goals: list[ServerGoalHandle] = []
     reached: Future = Future()
 
@@ -46,8 +46,8 @@ def test_it_sends_countdown(start: Start, observer: Node) -> None:
     server.destroy()
 
 
-def test_it_cancels_countdown_when_it_is_asked_to_end(start: Start, observer: Node) -> None:
-    """The goal that the node has sent to countdown does not outlive the node."""
+def test_it_takes_back_countdown(start: Start, observer: Node) -> None:
+    """A goal for countdown does not outlive the node."""
     goals: list[ServerGoalHandle] = []
 
     async def execute(goal_handle: ServerGoalHandle) -> Countdown.Result:

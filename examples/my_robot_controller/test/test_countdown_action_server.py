@@ -26,7 +26,8 @@ def test_it_reaches_countdown(start: Start, observer: Node) -> None:
     client = ActionClient(observer, Countdown, 'countdown')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(COUNTDOWN_GOAL, feedback_callback=feedback.append)
+    goal = COUNTDOWN_GOAL
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
     node.until(lambda: node.said('countdown: target_count='))
@@ -39,12 +40,13 @@ def test_it_reaches_countdown(start: Start, observer: Node) -> None:
 
 
 def test_it_cancels_countdown(start: Start, observer: Node) -> None:
-    """A goal for countdown can be cancelled while the node works on it."""
+    """A goal for countdown can be cancelled on the way."""
     feedback: list[object] = []
     client = ActionClient(observer, Countdown, 'countdown')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(COUNTDOWN_GOAL, feedback_callback=feedback.append)
+    goal = COUNTDOWN_GOAL
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()
@@ -53,7 +55,7 @@ def test_it_cancels_countdown(start: Start, observer: Node) -> None:
     client.destroy()
 
 
-def test_it_gives_up_countdown_for_a_newer_goal(start: Start, observer: Node) -> None:
+def test_it_replaces_countdown(start: Start, observer: Node) -> None:
     """A goal for countdown ends when another one comes."""
     client = ActionClient(observer, Countdown, 'countdown')
     node = start(MODULE)

@@ -20,7 +20,7 @@ Start = Callable[..., Any]
 
 
 def test_it_sends_execute_task(start: Start, observer: Node) -> None:
-    """The node sends a goal to execute_task, and says what is reported and what comes of it."""
+    """The node sends a goal to execute_task and follows it to its end."""
     goals: list[ServerGoalHandle] = []
     reached: Future = Future()
 
@@ -46,8 +46,8 @@ def test_it_sends_execute_task(start: Start, observer: Node) -> None:
     server.destroy()
 
 
-def test_it_cancels_execute_task_when_it_is_asked_to_end(start: Start, observer: Node) -> None:
-    """The goal that the node has sent to execute_task does not outlive the node."""
+def test_it_takes_back_execute_task(start: Start, observer: Node) -> None:
+    """A goal for execute_task does not outlive the node."""
     goals: list[ServerGoalHandle] = []
 
     async def execute(goal_handle: ServerGoalHandle) -> ExecuteTask.Result:

@@ -18,7 +18,7 @@ Start = Callable[..., Any]
 
 
 def test_it_receives_sensor_data(start: Start, observer: Node) -> None:
-    """The node says something for each message that arrives on sensor_data."""
+    """The node says something for each message on sensor_data."""
     publisher = observer.create_publisher(String, 'sensor_data', 10)
     node = start(MODULE)
 

@@ -18,7 +18,7 @@ Start = Callable[..., Any]
 
 
 def test_it_receives_chatter(start: Start, observer: Node) -> None:
-    """The node says something for each message that arrives on chatter."""
+    """The node says something for each message on chatter."""
     publisher = observer.create_publisher(String, 'chatter', 10)
     node = start(MODULE)
 

@@ -77,7 +77,7 @@ def test_it_publishes_beat(start: Start, observer: Node) -> None:
 
 
 def test_it_receives_beat(start: Start, observer: Node) -> None:
-    """The node says something for each message that arrives on beat."""
+    """The node says something for each message on beat."""
     publisher = observer.create_publisher(Empty, 'beat', 10)
     node = start(MODULE)
     activate(node, observer)

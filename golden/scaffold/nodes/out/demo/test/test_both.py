@@ -35,7 +35,7 @@ def test_it_calls_ask(start: Start, observer: Node) -> None:
 
 
 def test_it_sends_dock(start: Start, observer: Node) -> None:
-    """The node sends a goal to dock, and says what is reported and what comes of it."""
+    """The node sends a goal to dock and follows it to its end."""
     goals: list[ServerGoalHandle] = []
     reached: Future = Future()
 

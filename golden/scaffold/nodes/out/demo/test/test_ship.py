@@ -20,7 +20,7 @@ Start = Callable[..., Any]
 
 
 def test_it_sends_dock(start: Start, observer: Node) -> None:
-    """The node sends a goal to dock, and says what is reported and what comes of it."""
+    """The node sends a goal to dock and follows it to its end."""
     goals: list[ServerGoalHandle] = []
     reached: Future = Future()
 
@@ -46,8 +46,8 @@ def test_it_sends_dock(start: Start, observer: Node) -> None:
     server.destroy()
 
 
-def test_it_cancels_dock_when_it_is_asked_to_end(start: Start, observer: Node) -> None:
-    """The goal that the node has sent to dock does not outlive the node."""
+def test_it_takes_back_dock(start: Start, observer: Node) -> None:
+    """A goal for dock does not outlive the node."""
     goals: list[ServerGoalHandle] = []
 
     async def execute(goal_handle: ServerGoalHandle) -> Dock.Result:

@@ -26,7 +26,8 @@ def test_it_reaches_dock(start: Start, observer: Node) -> None:
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(DOCK_GOAL, feedback_callback=feedback.append)
+    goal = DOCK_GOAL
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(sent.done)
     assert sent.result().accepted, node.output
     node.until(lambda: node.said('dock: station='))
@@ -38,12 +39,13 @@ def test_it_reaches_dock(start: Start, observer: Node) -> None:
 
 
 def test_it_cancels_dock(start: Start, observer: Node) -> None:
-    """A goal for dock can be cancelled while the node works on it."""
+    """A goal for dock can be cancelled on the way."""
     feedback: list[object] = []
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)
     node.until(client.server_is_ready)
-    sent = client.send_goal_async(DOCK_GOAL, feedback_callback=feedback.append)
+    goal = DOCK_GOAL
+    sent = client.send_goal_async(goal, feedback_callback=feedback.append)
     node.until(lambda: bool(sent.done() and feedback))
     sent.result().cancel_goal_async()
     ending = sent.result().get_result_async()
@@ -52,7 +54,7 @@ def test_it_cancels_dock(start: Start, observer: Node) -> None:
     client.destroy()
 
 
-def test_it_gives_up_dock_for_a_newer_goal(start: Start, observer: Node) -> None:
+def test_it_replaces_dock(start: Start, observer: Node) -> None:
     """A goal for dock ends when another one comes."""
     client = ActionClient(observer, Dock, 'dock')
     node = start(MODULE)

@@ -36,7 +36,7 @@ def test_it_publishes_command(start: Start, observer: Node) -> None:
 
 
 def test_it_receives_words(start: Start, observer: Node) -> None:
-    """The node says something for each message that arrives on words."""
+    """The node says something for each message on words."""
     publisher = observer.create_publisher(String, 'talker/words', qos_profile_sensor_data)
     node = start(MODULE)
 
