@@ -76,6 +76,7 @@ def folder(tmp_path_factory):
     )
     with generated.importable(folder):
         yield folder
+    sys.modules.pop("users", None)  # its classes are of these packages
 
 
 USERS = ["Decorated", "Slotted", "DecoratedArrays", "Subclass", "Made"]

@@ -40,7 +40,7 @@ class Command(NamedTuple):
 COMMANDS = {
     "fmt": Command(("fmt", "work"), at_once=False),
     "check --fix": Command(
-        ("check", "work", "--fix"),
+        ("check", "work", "--fix", "--select", "char-type"),
         at_once=False,
         files={"msg/A.msg": "char a\nchar b\n", "msg/B.msg": "char a\n"},
     ),

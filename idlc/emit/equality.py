@@ -24,12 +24,23 @@ def equality(structure: ir.Message, receiver: str, references: References) -> li
         differences = [_compared(field, receiver, "!=") for field in scalars]
         head += [*any_of(differences, 8, "if ", ":"), "            return False"]
     parts = [fields.comparison(field, receiver, references) for field in others]
-    calls = [part for part in parts if isinstance(part, Group)]
+    calls: list[str | Group] = [part for part in parts if isinstance(part, Group)]
     plain = [part for part in parts if isinstance(part, str)]
-    last = all_of(plain, 8) if plain else lines(calls.pop(), 8, "return ")
+    if plain and all(_is_foreign(field, references) for field in others):
+        # another package's class may have no types
+        calls += plain[:-1]
+        last = lines(call("bool", plain[-1]), 8, "return ")
+    else:
+        last = all_of(plain, 8) if plain else lines(calls.pop(), 8, "return ")
     for part in calls:
         head += [*lines(part, 8, "if not ", ":"), "            return False"]
     return [*head, *last]
+
+
+def _is_foreign(field: ir.Field, references: References) -> bool:
+    """Return whether what two values are compared by may be of another package."""
+    element = ir.element_of(field.type)
+    return not isinstance(element, ir.Ref) or element.target.package != references.package
 
 
 def _is_short_scalar(field: ir.Field, receiver: str) -> bool:

@@ -4,6 +4,7 @@ import json
 import sys
 from pathlib import Path
 
+from idlc.disk.scope import Scope
 from idlc.driver.query import describe
 from idlc.text.diagnostics import Report
 
@@ -19,6 +20,6 @@ def test_descriptions_are_those_installed():
     for path in INSTALLED:
         name = f"{path.parent.parent.name}/{path.parent.name}/{path.stem}"
         report = Report()
-        found = describe(name, None, (), report)
+        found = describe(name, Scope(), report)
         assert not report.had_errors, [one.message for one in report]
         assert json.dumps(found, indent=2) == path.read_text(encoding="utf-8"), name

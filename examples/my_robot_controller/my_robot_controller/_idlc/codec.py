@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 
 from .cdr import HEADERS, NATIVE
+from .construction import CHECK_FIELDS, checking
 from .errors import DecodeError, ValidationError
 from .objects import owner_of
 
@@ -101,16 +102,16 @@ def codec_for(kind: Any) -> Callable[[Make], Make]:
     return give
 
 
-def maker(kind: type) -> Callable[[], Any]:
+def maker(kind: Any) -> Callable[[], Any]:
     """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
-    if "_check_fields" not in getattr(kind, "__slots__", ()) or hasattr(
-        kind, "_codec_"
-    ):
+    if hasattr(kind, "_codec_"):
+        return partial(object.__new__, checking(kind) if CHECK_FIELDS else kind)
+    if "_check_fields" not in getattr(kind, "__slots__", ()):
         return partial(object.__new__, kind)
 
     def make() -> Any:
         made: Any = object.__new__(kind)
-        made._check_fields = False
+        made._check_fields = CHECK_FIELDS
         return made
 
     return make

@@ -32,6 +32,13 @@ def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     return message
 
 
+def checking(kind: Any) -> Any:
+    """Return the subclass of a message class whose instances check their fields."""
+    from . import checked
+
+    return checked.checked_class(kind)
+
+
 def is_checked(kind: type) -> bool:
     """Return whether the instances of a class check their fields."""
     # only what has imported `checked` has such instances

@@ -116,7 +116,7 @@ class Gauge(_idlc.Message):
             return False
         if not _idlc.same(self._covariance, other._covariance):
             return False
-        return self._notes == other._notes
+        return bool(self._notes == other._notes)
 
 
 @_idlc.codec_for(Gauge)

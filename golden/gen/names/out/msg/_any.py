@@ -38,7 +38,7 @@ class Any(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Any):
             return NotImplemented
-        return self._pose == other._pose
+        return bool(self._pose == other._pose)
 
 
 @_idlc.codec_for(Any)
