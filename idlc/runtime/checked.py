@@ -66,7 +66,7 @@ def _assign(message: Any, fields: tuple[FieldInfo, ...], given: dict[str, Any]) 
     message.__class__ = checked_class(kind)
     for field in fields:
         value = given[field.public]
-        if value is None:
+        if value is None and (field.is_list or field.nested):
             value = getattr(default, field.slot)
         elif field.is_sequence and field.is_numeric:
             value = array(field.primitive.code, value)  # type: ignore[union-attr]
