@@ -177,9 +177,9 @@ def test_files_keep_their_mode(package):
         (["node", "a", "--publisher", "String:a"], "or `std_msgs/String`?"),
         (["node", "a", "--publisher", "std_srvs/SetBool:a"], "service: use --service or --client"),
         (["node", "a", "--client", "std_msgs/String:a"], "message: use --publisher or --subscri"),
-        (["package", "Demo"], "cannot be a package: use lower-case letters"),
-        (["package", "test"], "cannot be a package: a folder or a module"),
-        (["package", "launch"], "cannot be a package: a folder or a module"),
+        (["package", "Demo"], "is not a package name: lower-case letters"),
+        (["package", "test"], "is the name of a folder or a module"),
+        (["package", "launch"], "is the name of a folder or a module"),
         (["package", "x", "--interfaces-only", "--build-type", "ament_python"], "is for ament_cm"),
     ],
 )

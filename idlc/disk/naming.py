@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import keyword
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from importlib.machinery import BuiltinImporter, FrozenImporter
 from pathlib import Path
 
 from idlc.disk import lock
@@ -14,16 +11,8 @@ from idlc.disk.find import InterfaceFile, look
 from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
-from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Report
-
-#: Modules that a starting Python has loaded, frozen or not, before it looks anywhere else.
-_LOADED = frozenset(
-    ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
-)
-#: What generated code imports beside the standard library.
-_NEEDED = frozenset(("numpy",))
 
 
 def by_home(files: Iterable[InterfaceFile]) -> dict[Path, list[InterfaceFile]]:
@@ -104,15 +93,10 @@ def locks(place: Path) -> tuple[lock.Lock, ...]:
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
     """Return whether a package can be called so and imported; reports IDL607."""
-    if not is_package_name(name):
-        what = "is not a package name: lower-case letters, digits and single underscores"
-    elif keyword.iskeyword(name):
-        what = "is a keyword of Python and cannot be imported"
-    elif name in _LOADED or FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
-        what = "is a module of Python itself, which would be imported instead"
-    elif name in sys.stdlib_module_names or name in _NEEDED:
-        what = "is the name of a module that programs import: they would get this package instead"
-    else:
+    from idlc.emit.pynames import why_not_package  # a check needs no emitter
+
+    what = why_not_package(name)
+    if not what:
         return True
     hint = "choose another name with --package NAME"
     report.add(codes.UNIMPORTABLE.of("", f"`{name}` (from {origin}) {what}", hint=hint))

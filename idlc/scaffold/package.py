@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import keyword
-import sys
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
+from idlc.emit.pynames import why_not_package
 from idlc.emit.render import environment
-from idlc.model import names
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -120,21 +118,17 @@ _CMAKE_FILES = {
 }
 #: What would not be found any more next to a package of such a name.
 _TAKEN = frozenset(
-    "action idlc launch launch_ros msg numpy pytest rclpy resource setuptools srv test".split()
+    "action idlc launch launch_ros msg pytest rclpy resource setuptools srv test".split()
 )
 
 
 def check_name(name: str) -> str:
     """Return the name of a new package; one that hides another module is refused."""
-    if not names.is_package_name(name):
-        raise ValueError(
-            f"`{name}` cannot be a package: use lower-case letters, digits and single underscores, "
-            "a letter first"
-        )
-    if keyword.iskeyword(name) or name in _TAKEN or name in sys.stdlib_module_names:
-        raise ValueError(
-            f"`{name}` cannot be a package: a folder or a module that it needs has that name"
-        )
+    why = why_not_package(name)
+    if not why and name in _TAKEN:
+        why = "is the name of a folder or a module that it needs"
+    if why:
+        raise ValueError(f"`{name}` {why}")
     return name
 
 

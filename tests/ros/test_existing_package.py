@@ -10,6 +10,7 @@ import time
 import venv
 from pathlib import Path
 
+import programs
 import pytest
 
 from idlc.cli.main import main
@@ -107,18 +108,7 @@ def workspace(tmp_path_factory) -> Path:
 
 
 def run(*command: object, cwd: Path, **environment: str) -> str:
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=cwd,
-        env={**os.environ, **environment},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, f"{command} failed:\n{done.stdout}"
-    return done.stdout
+    return programs.run(*command, cwd=cwd, environment={**os.environ, **environment})
 
 
 def works(program: Path, tmp_path: Path, environment: dict[str, str]) -> None:

@@ -7,6 +7,7 @@ import sys
 import venv
 from pathlib import Path
 
+import programs
 import pytest
 from catkin_pkg.package import parse_package
 
@@ -16,18 +17,7 @@ GENERATED = ("msg", "srv", "action", "_idlc", "idlc.lock", "py.typed")
 
 
 def run(*command: object, cwd: Path, **environment: str) -> str:
-    done = subprocess.run(
-        [str(word) for word in command],
-        cwd=cwd,
-        env={**os.environ, **environment},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, f"{command} failed:\n{done.stdout}"
-    return done.stdout
+    return programs.run(*command, cwd=cwd, environment={**os.environ, **environment})
 
 
 @pytest.fixture(scope="module")
@@ -161,17 +151,8 @@ def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp
 
 def colcon_tested(*command: object, cwd: Path) -> tuple[int, str]:
     """Return the status of a run of tests, and what it says."""
-    done = subprocess.run(
-        [str(word) for word in command],
-        cwd=cwd,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    return done.returncode, done.stdout
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return programs.ended(*command, cwd=cwd, environment=environment)
 
 
 def test_colcon_tests_the_interfaces(scaffolded, tmp_path):

@@ -6,11 +6,11 @@ printed. `make test` takes every sixth mutant, `IDLC_LONG=1` all of them.
 
 import os
 import shutil
-import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import programs
 import pytest
 
 from idlc.cli.main import main
@@ -189,17 +189,9 @@ def run(package: Path, folder: Path, node: str, change: tuple[str, str]) -> tupl
         assert shorter != conftest
         (folder / "test/conftest.py").write_text(shorter)
     (folder / module).write_text(broken)
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test],
-        cwd=folder,
-        env={**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONDONTWRITEBYTECODE": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    return done.returncode, done.stdout
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
+    plain = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+    return programs.ended(*command, cwd=folder, environment={**os.environ, **plain})
 
 
 def test_nodes_that_nobody_broke_pass(package, tmp_path):
