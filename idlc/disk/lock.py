@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 
@@ -17,6 +18,8 @@ from idlc.model.names import is_package_name
 from idlc.text import codes
 from idlc.text.diagnostics import Diagnostic, Report
 from idlc.text.visible import one_line
+
+Content = TypeVar("Content")
 
 FILE = "idlc.lock"
 #: Raised when an older idlc could not read what a newer one writes.
@@ -101,20 +104,26 @@ def load(out: Path, name: str, report: Report) -> Lock | None:
         return None
     try:
         return decode(data)
-    except ValueError as error:  # msgspec's errors, too
+    except ValueError as error:
         report.add(_bad(shown, str(error)))
         return None
 
 
-def decode(data: bytes) -> Lock:
-    """Return a lock from a file's content; raise ValueError for one that cannot be used."""
+def _decoded(data: bytes, kind: type[Content]) -> Content:
     try:
-        header = msgspec.json.decode(data, type=_Header)
+        return msgspec.json.decode(data, type=kind)
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
+    except msgspec.MsgspecError as error:  # no ValueError in older versions
+        raise ValueError(str(error)) from error
+
+
+def decode(data: bytes) -> Lock:
+    """Return a lock from a file's content; raise ValueError for one that cannot be used."""
+    header = _decoded(data, _Header)
     if header.format > FORMAT:
         raise ValueError(f"it was written by idlc {header.idlc}, which is newer than this one")
-    lock = msgspec.json.decode(data, type=Lock)
+    lock = _decoded(data, Lock)
     for path in lock.outputs:
         if not may_be_own(path):
             raise ValueError(f"it lists a file that idlc cannot have written: {path}")
