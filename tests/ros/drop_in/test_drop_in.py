@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -46,7 +47,10 @@ def classes(tmp_path_factory):
 
 
 def outcomes(classes, environment, folder, names):
-    """Return every operation with both outcomes, bytes as idlc writes what they say."""
+    """Return every operation with both outcomes, bytes as idlc writes what they say.
+
+    rosidl's classes are installed, or where the environment's PYTHONPATH says.
+    """
     official, idlc = folder / "official.jsonl", folder / "idlc.jsonl"
     theirs = environment | {"PYTHONPATH": str(classes)}
     both = [start(official, names, environment), start(idlc, names, theirs)]
@@ -81,8 +85,11 @@ def agree(case):
     if not refuses(case.official) or not refuses(case.idlc):
         return case.official == case.idlc
     raised, ours = case.official.get("raised"), case.idlc.get("raised")
-    # what is refused when it is assigned can be caught there as the same exception
-    return raised is None or (ours is not None and raised[0] in ours)
+    if raised is None or ours is None:
+        return raised is None
+    # what is refused when it is assigned can be caught there as the same exception; rosidl's
+    # check of bounded strings stumbles over what has no length
+    return raised[0] in ours or (case.is_checked and ours[0] == "AssertionError")
 
 
 def same(official, idlc):
@@ -133,6 +140,19 @@ def test_the_environment_lets_all_messages_check(classes, ros_environment, tmp_p
     assert "unknown_keywords" not in compared(cases)
     taken = [case.key for case in cases if reason_of(case) == "wrong_values"]
     assert [key for key in taken if "append" not in key] == []  # lists cannot check
+
+
+def test_invented_messages_of_every_kind(classes, ros_environment, tmp_path):
+    """rosidl's classes without its C code: all but what is sent."""
+    source, theirs = tmp_path / "source", tmp_path / "rosidl" / "every_kind"
+    shutil.copytree(HERE.parent / "every_kind" / "msg", source / "msg")
+    (source / "msg" / "Keywords.msg").unlink()  # rosidl's Python cannot be imported
+    command = [sys.executable, str(HERE / "rosidl_package.py"), str(source), str(theirs)]
+    subprocess.run(command, check=True, capture_output=True)
+    generate(source, classes / "every_kind")
+    names = [f"every_kind/msg/{path.stem}" for path in sorted(source.glob("msg/*.msg"))]
+    environment = ros_environment | {"PYTHONPATH": str(theirs.parent), "IDLC_NO_WIRE": "1"}
+    assert compared(outcomes(classes, environment, tmp_path, names))["the same"] > 10_000
 
 
 def test_the_document_lists_the_differences():
