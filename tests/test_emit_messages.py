@@ -164,7 +164,7 @@ def test_arrays_are_copied_and_converted():
         ("ids", 5, TypeError, "ids: must be a sequence, not 5"),
         ("ids", {"a": 1}, TypeError, "ids: "),
         ("ids", b"abc", ValueError, "ids: has 3 bytes, needs a multiple of 4"),
-        ("ids", np.array([1.5]), TypeError, "ids: "),
+        ("ids", np.array([1.5]), TypeError, "ids[0]: must be an integer"),
         ("ids", iter(["a"]), TypeError, "ids: "),
     ],
 )

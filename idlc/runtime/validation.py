@@ -151,7 +151,11 @@ def refused(
             f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
         )
         found = ValidationError(name, "whole numbers of bytes", values, problem)
-    elif isinstance(values, (list, tuple)) or not hasattr(values, "__len__"):
+    elif (
+        isinstance(values, (list, tuple))
+        or getattr(values, "ndim", 0) == 1
+        or not hasattr(values, "__len__")
+    ):
         try:
             _list(values, field, name, wire_only=True)
         except ValidationError as exact:
