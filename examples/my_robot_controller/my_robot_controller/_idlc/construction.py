@@ -25,6 +25,8 @@ def construct(message: Any, options: Mapping[str, Any], given: dict[str, Any]) -
 
 def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     """Make a message that checks its fields, as the environment asks for."""
+    if "check_fields" in cls._fields_and_field_types:
+        return type.__call__(cls, *values, **named)  # the name is a field's
     if "_codec_" in cls.__dict__:
         return type.__call__(cls, *values, **{"check_fields": True, **named})
     message = type.__call__(cls, *values, **named)
