@@ -48,6 +48,10 @@ KINDS = {
         ".data": Kind(1, flags=3),
     },
 }
+#: What the loader is told, besides the libraries that are needed: SONAME, HASH, STRTAB, SYMTAB,
+#: STRSZ, SYMENT, RELA, RELASZ, RELAENT, RELACOUNT, FLAGS, FLAGS_1, NULL.
+TAGS = (14, 4, 5, 6, 10, 11, 7, 8, 9, 0x6FFFFFF9, 30, 0x6FFFFFFB, 0)
+NOW, NODELETE = 1, 8  # rclcpp closes the library before it uses its handles for the last time
 HEADERS = HEADER + SEGMENT * (len(KINDS) + 6)
 
 
@@ -65,7 +69,7 @@ class _File:
         self.names = [*image.needed, name, *self.symbols]
         starts, text = _strings(self.names)
         self.start = dict(zip(self.names, starts, strict=True))
-        words = len(image.needed) + 14
+        words = len(image.needed) + len(TAGS)
         relocations = sum(len(s.pointers) for s in self.pointed) + len(image.imports)
         self.sections = {
             ".note.gnu.property": _section(image.machine.properties),
@@ -166,24 +170,13 @@ class _File:
     def _fill_dynamic(self) -> None:
         at = {name: section.address for name, section in self.sections.items()}
         size = {name: len(section.data) for name, section in self.sections.items()}
-        words = [(1, self.start[name]) for name in self.image.needed]  # DT_NEEDED
-        words += [
-            (14, self.start[self.soname]),  # DT_SONAME
-            (4, at[".hash"]),
-            (5, at[".dynstr"]),
-            (6, at[".dynsym"]),
-            (10, size[".dynstr"]),
-            (11, SYMBOL),
-            (7, at[".rela.dyn"]),
-            (8, size[".rela.dyn"]),
-            (9, RELOCATION),
-            (0x6FFFFFF9, size[".rela.dyn"] // RELOCATION - len(self.image.imports)),  # relative
-            (30, 8),  # DT_FLAGS: BIND_NOW
-            # DT_FLAGS_1: NOW, NODELETE, because rclcpp closes it before the last use of its handles
-            (0x6FFFFFFB, 1 | 8),
-            (0, 0),
-        ]
-        self.sections[".dynamic"].data[:] = pack(f"<{2 * len(words)}Q", *chain(*words))
+        relative = size[".rela.dyn"] // RELOCATION - len(self.image.imports)
+        values = [self.start[self.soname], at[".hash"], at[".dynstr"], at[".dynsym"]]
+        values += [size[".dynstr"], SYMBOL, at[".rela.dyn"], size[".rela.dyn"], RELOCATION]
+        values += [relative, 8, NOW | NODELETE, 0]  # 8: BIND_NOW
+        words = [(1, self.start[name]) for name in self.image.needed]  # NEEDED
+        words += zip(TAGS, values, strict=True)
+        pack_into(f"<{2 * len(words)}Q", self.sections[".dynamic"].data, 0, *chain(*words))
 
     def _segments(self) -> bytes:
         def of(kind: int, flags: int, name: str, size: int | None = None) -> tuple[int, ...]:

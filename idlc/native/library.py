@@ -36,10 +36,14 @@ ROOM = 72
 def libraries(
     model: Model, machine: Machine, layout: Layout = LAYOUTS["jazzy"]
 ) -> dict[str, bytes]:
-    """Return the content of each library of a package by the name of its file."""
+    """Return the content of each library of a package by the name of its file.
+
+    Whoever has one open must not see it change: write it beside, and move it there.
+    """
     return {
         f"lib{model.package}__{identifier}.so": _library(model, Image(machine), layout, identifier)
         for identifier in (OWN, FIELDS_CPP)
+        if model.own
     }
 
 
