@@ -49,7 +49,7 @@ HOSTILE = {
     },
     "a chain": {
         "msg/M0.msg": "int8 a\n",
-        **{f"msg/M{i}.msg": f"M{i - 1} next\n" for i in range(1, 300)},
+        **{f"msg/M{i}.msg": f"M{i - 1} next\n" for i in range(1, 120)},
     },
     "texts": {
         "msg/M.msg": '# \x01 \u202e \U0001f600\nwstring w \'\U0001f600\'\nstring s "\\0 % \\" "\n'
