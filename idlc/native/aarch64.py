@@ -118,16 +118,9 @@ ENTRIES = {
 
 #: Where an address is missing, and of what.
 HOLES = {
-    0x84: "identifier",
-    0x88: "identifier",
-    0x8C: "function",
-    0x94: "target",
-    0x98: "target",
-    0xC4: "message",
-    0xC8: "message",
-    0xCC: "function",
-    0xD0: "function",
-}
+    0x84: "identifier", 0x88: "identifier", 0x8C: "function", 0x94: "target", 0x98: "target",
+    0xC4: "message", 0xC8: "message", 0xCC: "function", 0xD0: "function",
+}  # fmt: skip
 
 
 def _fill(code: bytearray, at: int, here: int, target: int) -> None:

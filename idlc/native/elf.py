@@ -52,7 +52,8 @@ KINDS = {
 #: STRSZ, SYMENT, RELA, RELASZ, RELAENT, RELACOUNT, FLAGS, FLAGS_1, NULL.
 TAGS = (14, 4, 5, 6, 10, 11, 7, 8, 9, 0x6FFFFFF9, 30, 0x6FFFFFFB, 0)
 NOW, NODELETE = 1, 8  # rclcpp closes the library before it uses its handles for the last time
-HEADERS = HEADER + SEGMENT * (len(KINDS) + 6)
+#: Besides what is loaded, segments that say where something is, or what holds.
+SEGMENTS = len(KINDS) + 6
 
 
 def shared_library(image: Image, name: str) -> bytes:
@@ -63,36 +64,34 @@ def shared_library(image: Image, name: str) -> bytes:
 class _File:
     def __init__(self, image: Image, name: str) -> None:
         self.image = image
-        self.page = image.machine.page
+        self.name = name
         self.symbols = [*sorted(image.imports), *sorted(image.exports)]
         self.pointed = [s for s in (image.tables, image.data) if s.pointers]
-        self.names = [*image.needed, name, *self.symbols]
-        starts, text = _strings(self.names)
-        self.start = dict(zip(self.names, starts, strict=True))
+        names = [*image.needed, name, *self.symbols]
+        starts, text = _strings(names)
+        self.start = dict(zip(names, starts, strict=True))
         words = len(image.needed) + len(TAGS)
         relocations = sum(len(s.pointers) for s in self.pointed) + len(image.imports)
         self.sections = {
-            ".note.gnu.property": _section(image.machine.properties),
-            ".note.gnu.build-id": _section(NOTE_OF_CONTENT, 4),
-            ".hash": _section(_hash_table(self.symbols)),
-            ".dynsym": _section(bytes(SYMBOL * (1 + len(self.symbols)))),
-            ".dynstr": _section(text, 1),
-            ".rela.dyn": _section(bytes(RELOCATION * relocations)),
+            ".note.gnu.property": Section(image.machine.properties),
+            ".note.gnu.build-id": Section(NOTE_OF_CONTENT, 4),
+            ".hash": Section(_hash_table(self.symbols)),
+            ".dynsym": Section(bytes(SYMBOL * (1 + len(self.symbols)))),
+            ".dynstr": Section(text, 1),
+            ".rela.dyn": Section(bytes(RELOCATION * relocations)),
             ".rodata": image.constants,
             ".text": image.code,
-            ".dynamic": _section(bytes(16 * words)),
+            ".dynamic": Section(bytes(16 * words)),
             ".data.rel.ro": image.tables,
             ".data": image.data,
         }
         self.offsets: dict[str, int] = {}
         self.loaded: list[tuple[int, ...]] = []
-        self.soname = name
 
     def link(self) -> bytes:
         """Return the file."""
         end = self._lay_out()
         self._relocate()
-        self._fill_code()
         self._fill_symbols()
         self._fill_dynamic()
         names = [*self.sections, ".shstrtab"]
@@ -100,7 +99,7 @@ class _File:
         table = end + len(text) + -(end + len(text)) % 8
         header = pack(
             "<4s5B7x2HI3QI6H", b"\x7fELF", 2, 1, 1, 0, 0, 3, self.image.machine.number, 1, 0,
-            HEADER, table, 0, HEADER, SEGMENT, len(KINDS) + 6, SECTION, len(names) + 1, len(names),
+            HEADER, table, 0, HEADER, SEGMENT, SEGMENTS, SECTION, len(names) + 1, len(names),
         )  # fmt: skip
         file = bytearray(table)
         parts: list[tuple[int, bytes | bytearray]] = [(0, header + self._segments()), (end, text)]
@@ -122,16 +121,25 @@ class _File:
         for index, (flags, kinds) in enumerate(KINDS.items()):
             at += -at % 16
             if flags & WRITE:
-                at += -(at + self._constant_size()) % self.page
+                at += -(at + self._constant_size()) % self.image.machine.page
             start = at
-            at += 0 if index else HEADERS
+            at += 0 if index else HEADER + SEGMENT * SEGMENTS
             for name in kinds:
                 section = self.sections[name]
                 at += -at % section.align
                 self.offsets[name] = at
-                section.address = at + index * self.page
+                section.address = at + index * self.image.machine.page
                 at += len(section.data)
-            self.loaded.append((1, flags, start, index * self.page + start, at - start, self.page))
+            self.loaded.append(
+                (
+                    1,
+                    flags,
+                    start,
+                    index * self.image.machine.page + start,
+                    at - start,
+                    self.image.machine.page,
+                )
+            )
         return at
 
     def _constant_size(self) -> int:
@@ -140,6 +148,7 @@ class _File:
         return size + -size % 8
 
     def _relocate(self) -> None:
+        """Put addresses where they are missing, and note those that the loader changes."""
         machine, table, at = self.image.machine, self.sections[".rela.dyn"].data, 0
         for section in self.pointed:
             for where, place in section.pointers:
@@ -152,11 +161,9 @@ class _File:
             info = index << 32 | machine.absolute
             pack_into("<2Qq", table, at, self.image.imports[name].address, info, 0)
             at += RELOCATION
-
-    def _fill_code(self) -> None:
         code = self.image.code
         for at, place in self.image.holes:
-            self.image.machine.fill(code.data, at, code.address + at, place.address)
+            machine.fill(code.data, at, code.address + at, place.address)
 
     def _fill_symbols(self) -> None:
         text = 1 + list(self.sections).index(".text")
@@ -171,7 +178,7 @@ class _File:
         at = {name: section.address for name, section in self.sections.items()}
         size = {name: len(section.data) for name, section in self.sections.items()}
         relative = size[".rela.dyn"] // RELOCATION - len(self.image.imports)
-        values = [self.start[self.soname], at[".hash"], at[".dynstr"], at[".dynsym"]]
+        values = [self.start[self.name], at[".hash"], at[".dynstr"], at[".dynsym"]]
         values += [size[".dynstr"], SYMBOL, at[".rela.dyn"], size[".rela.dyn"], RELOCATION]
         values += [relative, 8, NOW | NODELETE, 0]  # 8: BIND_NOW
         words = [(1, self.start[name]) for name in self.image.needed]  # NEEDED
@@ -209,12 +216,6 @@ class _File:
             refers = (link, local, section.align, kind.entry)
             rows += pack("<2I4Q2I2Q", start, kind.type, kind.flags, *where, *refers)
         return rows
-
-
-def _section(data: bytes, align: int = 8) -> Section:
-    section = Section(align)
-    section.put(data)
-    return section
 
 
 def _strings(names: list[str]) -> tuple[list[int], bytes]:

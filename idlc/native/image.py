@@ -11,9 +11,9 @@ from idlc.native.machine import Machine
 class Section:
     """Content of one kind. `pointers` are the words of it that will hold an address."""
 
-    def __init__(self, align: int = 8) -> None:
+    def __init__(self, data: bytes = b"", align: int = 8) -> None:
         self.align = align
-        self.data = bytearray()
+        self.data = bytearray(data)
         self.address = 0
         self.pointers: list[tuple[int, Place]] = []
 

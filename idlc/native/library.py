@@ -113,14 +113,13 @@ class _TypeSupport:
             for field, offset in zip(message.wire_fields, offsets, strict=True)
             for word in self._member(field, offset)
         ]
-        key = [0] * (self.layout.members == LAYOUTS["jazzy"].members)
         separator = "::" if self.cpp else "__"
         data = image.tables.words(
             image.string(f"{name.package}{separator}{name.kind}"),
             image.string(name.name),
             len(offsets),
             size,
-            *key,
+            *[0] * (self.layout.members // 8 - 4),  # whether there is a key
             image.tables.words(*rows),
             *self._memory(name),
         )

@@ -118,12 +118,8 @@ ENTRIES = {
 
 #: Where an address is missing, and of what.
 HOLES = {
-    0x67: "identifier",
-    0x6C: "function",
-    0x77: "target",
-    0xA7: "message",
-    0xAD: "function",
-}
+    0x67: "identifier", 0x6C: "function", 0x77: "target", 0xA7: "message", 0xAD: "function",
+}  # fmt: skip
 
 
 def _fill(code: bytearray, at: int, here: int, target: int) -> None:
