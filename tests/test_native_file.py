@@ -51,6 +51,10 @@ HOSTILE = {
         "msg/M0.msg": "int8 a\n",
         **{f"msg/M{i}.msg": f"M{i - 1} next\n" for i in range(1, 120)},
     },
+    "large numbers": {
+        "msg/M.msg": f"uint8[{2**32 - 1}] a\nuint8[{2**70}] b\nstring<={2**70}[<={2**70}] c\n",
+        "msg/N.msg": f"M[{2**32 - 1}] a\nM[{2**32 - 1}] b\n",
+    },
     "texts": {
         "msg/M.msg": '# \x01 \u202e \U0001f600\nwstring w \'\U0001f600\'\nstring s "\\0 % \\" "\n'
     },

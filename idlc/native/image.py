@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from idlc.native.machine import Machine
 
+_WORD = 0xFFFF_FFFF_FFFF_FFFF
+
 
 class Section:
     """Content of one kind. `pointers` are the words of it that will hold an address."""
@@ -27,9 +29,10 @@ class Section:
     def words(self, *values: int | Place | None) -> Place:
         """Add words of 8 bytes: numbers, addresses, NULL; return where they are.
 
-        C structures are rows of words. What is smaller lies in the low bytes of its word.
+        C structures are rows of words. What is smaller lies in the low bytes of its word, and what
+        is too large wraps, as in C.
         """
-        numbers = [value if isinstance(value, int) else 0 for value in values]
+        numbers = [value & _WORD if isinstance(value, int) else 0 for value in values]
         place = self.put(pack(f"<{len(values)}Q", *numbers), 8)
         for index, value in enumerate(values):
             if isinstance(value, Place):
