@@ -1,11 +1,10 @@
-"""Carries messages between two domains in serialized form: native_bridge.py ONE TWO FILE
+"""Carries messages between two namespaces in serialized form: native_bridge.py FAR FILE
 
 What it knows of their types it knows from the libraries along AMENT_PREFIX_PATH alone, as a C++
-bridge does. FILE holds {"names": [...]}: what the peer "one" publishes in domain ONE reaches domain
-TWO, and the other way. It ends with its standard input.
+bridge does. FILE holds {"names": [...]}: what the peer "one" publishes reaches the namespace FAR,
+and what "two" publishes there comes from it. It ends with its standard input.
 """
 
-import contextlib
 import ctypes
 import json
 import os
@@ -16,8 +15,7 @@ from pathlib import Path
 
 import rclpy
 from peer import LATCHED
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 
 INDEX = "share/ament_index/resource_index/packages"
 DISPATCH = "rosidl_typesupport_cpp"
@@ -51,41 +49,29 @@ def raw_type(name):
     return type(name, (type,), {"_TYPE_SUPPORT": capsule, **never})("Raw", (), {})
 
 
-def carry(source, target, name, topic, qos=LATCHED):
-    """Publish in one node what another one receives."""
+def carry(node, name, source, target, qos=LATCHED):
+    """Publish on one topic what is received on another."""
     kind = raw_type(name)
-    publisher = target.create_publisher(kind, topic, qos)
-    return source.create_subscription(kind, topic, publisher.publish, qos, raw=True)
+    publisher = node.create_publisher(kind, target, qos)
+    return node.create_subscription(kind, source, publisher.publish, qos, raw=True)
 
 
-def node_in(domain):
-    context = Context()
-    rclpy.init(context=context, domain_id=int(domain))
-    return rclpy.create_node(f"bridge_{domain}", context=context, enable_rosout=False)
-
-
-def spin(node):
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    with contextlib.suppress(ExternalShutdownException):
-        executor.spin()
-
-
-def main(one, two, file):
-    nodes = {"one": node_in(one), "two": node_in(two)}
+def main(far, file):
+    rclpy.init()
+    node = rclpy.create_node("bridge")
     names = json.loads(Path(file).read_text(encoding="utf-8"))["names"]
     for name in names:
-        for me, other in (("one", "two"), ("two", "one")):
-            carry(nodes[me], nodes[other], name, f"{me}/{name}")
-    threads = [threading.Thread(target=spin, args=(node,)) for node in nodes.values()]
-    for thread in threads:
-        thread.start()
+        carry(node, name, f"/one/{name}", f"{far}/one/{name}")
+        carry(node, name, f"{far}/two/{name}", f"/two/{name}")
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
     print("looked at", len(names), flush=True)
     sys.stdin.read()
-    for node in nodes.values():
-        node.context.try_shutdown()
-    for thread in threads:
-        thread.join()
+    executor.shutdown()
+    thread.join()
+    rclpy.shutdown()
 
 
 if __name__ == "__main__":

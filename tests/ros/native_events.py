@@ -1,11 +1,10 @@
 """Events and feedback of idlc's nodes, seen through the library: native_events.py FAR
 
 A node serves and calls, with introspection; a bridge that has nothing but the library carries what
-it tells of that to a domain that is FAR away. What arrives there must be what arrives here. Then
-type support is used and given back a hundred times.
+it tells of that to the namespace FAR. What arrives there must be what arrives here. Then type
+support is used and given back a hundred times.
 """
 
-import os
 import sys
 import time
 
@@ -13,7 +12,7 @@ import rclpy
 from my_robot_controller.action import Countdown
 from my_robot_controller.msg import RobotCommand
 from my_robot_controller.srv import AddTwoInts
-from native_bridge import carry, node_in, raw_type
+from native_bridge import carry, raw_type
 from peer import EVENTS
 from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import SingleThreadedExecutor
@@ -34,29 +33,20 @@ TOPICS = {
 CALLS = 5
 
 
-class Domain:
-    """A node in a domain of its own."""
-
-    def __init__(self, number):
-        self.node = node_in(number)
-        self.executor = SingleThreadedExecutor(context=self.node.context)
-        self.executor.add_node(self.node)
-
-    def listen(self):
-        """Return lists by topic that fill with what is received."""
-        heard = {topic: [] for topic in TOPICS}
-        for topic, (cls, _, qos) in TOPICS.items():
-            self.node.create_subscription(cls, topic, heard[topic].append, qos)
-        return heard
+def listen(node, start):
+    """Return lists by topic that fill with what is received."""
+    heard = {topic: [] for topic in TOPICS}
+    for topic, (cls, _, qos) in TOPICS.items():
+        node.create_subscription(cls, start + topic, heard[topic].append, qos)
+    return heard
 
 
-def wait(domains, done, what):
+def wait(executor, done, what):
     end = time.monotonic() + PATIENCE
     while not done():
         if time.monotonic() > end:
             sys.exit(f"not in time: {what}")
-        for domain in domains:
-            domain.executor.spin_once(timeout_sec=0.01)
+        executor.spin_once(timeout_sec=0.1)
 
 
 def add(request, response):
@@ -71,9 +61,8 @@ def count_down(handle):
     return Countdown.Result()
 
 
-def events(one, two):
-    """Compare what is heard in each domain."""
-    node = one.node
+def events(node, executor, far):
+    """Compare what is heard here and there."""
     service = node.create_service(AddTwoInts, "add", add)
     client = node.create_client(AddTwoInts, "add")
     for each in (service, client):
@@ -81,68 +70,69 @@ def events(one, two):
         each.configure_introspection(node.get_clock(), EVENTS, contents)
     server = ActionServer(node, Countdown, "count", count_down)
     goals = ActionClient(node, Countdown, "count")
-    here, there = one.listen(), two.listen()
+    here, there = listen(node, ""), listen(node, far)
     for topic, (_, name, qos) in TOPICS.items():
-        carry(node, two.node, name, topic, qos)
+        carry(node, name, topic, far + topic, qos)
     ready = lambda: (  # noqa: E731
         client.service_is_ready()
         and goals.server_is_ready()
         and node.count_subscribers(FEEDBACK) >= 2
-        and two.node.count_publishers(FEEDBACK) == 1
-        and two.node.count_subscribers(FEEDBACK) == 1
+        and node.count_publishers(far + FEEDBACK) == 1
+        and node.count_subscribers(far + FEEDBACK) == 1
     )
-    wait((one, two), ready, "discovery")
+    wait(executor, ready, "discovery")
     for number in range(CALLS):
         future = client.call_async(AddTwoInts.Request(number, 1 << 40))
-        wait((one, two), future.done, "a call")
+        wait(executor, future.done, "a call")
     sent = goals.send_goal_async(Countdown.Goal())
-    wait((one, two), sent.done, "a goal")
+    wait(executor, sent.done, "a goal")
     done = sent.result().get_result_async()
-    wait((one, two), done.done, "a result")
+    wait(executor, done.done, "a result")
     told = {EVENT: 4 * CALLS, FEEDBACK: CALLS}
     enough = lambda: all(  # noqa: E731
         len(heard[topic]) >= count for heard in (here, there) for topic, count in told.items()
     )
-    wait((one, two), enough, "what was heard")
+    wait(executor, enough, "what was heard")
     for topic in TOPICS:
         # introspection has two publishers here, client and service, whose order is open
         texts = [sorted(str(message) for message in heard[topic]) for heard in (here, there)]
         assert texts[0] == texts[1], topic
-        assert hashes(one, topic) == hashes(two, topic), topic
-        assert len(hashes(one, topic)) == 1
+        assert hashes(node, topic) == hashes(node, far + topic), topic
+        assert len(hashes(node, topic)) == 1
     server.destroy()
 
 
-def hashes(domain, topic):
-    found = domain.node.get_publishers_info_by_topic(topic)
+def hashes(node, topic):
+    found = node.get_publishers_info_by_topic(topic)
     return {(info.topic_type, str(info.topic_type_hash)) for info in found}
 
 
-def cycles(one, count):
+def cycles(node, executor, count):
     """Return how many messages arrived at type support that was made for each of them."""
     sent = RobotCommand()
     received = []
     for number in range(count):
         kind = raw_type("my_robot_controller/msg/RobotCommand")
         topic = f"cycle_{number}"
-        publisher = one.node.create_publisher(kind, topic, 10)
-        subscription = one.node.create_subscription(kind, topic, received.append, 10, raw=True)
-        wait((one,), lambda own=publisher: own.get_subscription_count() == 1, "a subscription")
+        publisher = node.create_publisher(kind, topic, 10)
+        subscription = node.create_subscription(kind, topic, received.append, 10, raw=True)
+        wait(executor, lambda own=publisher: own.get_subscription_count() == 1, "a subscription")
         publisher.publish(sent.serialize())
-        wait((one,), lambda own=number: len(received) == own + 1, "a message")
-        one.node.destroy_subscription(subscription)
-        one.node.destroy_publisher(publisher)
+        wait(executor, lambda own=number: len(received) == own + 1, "a message")
+        node.destroy_subscription(subscription)
+        node.destroy_publisher(publisher)
     return sum(RobotCommand.deserialize(data) == sent for data in received)
 
 
 def main(far):
-    number = int(os.environ["ROS_DOMAIN_ID"])
-    one, two = Domain(number), Domain(number + int(far))
-    events(one, two)
-    print("cycles", cycles(one, 100))
-    for domain in (one, two):
-        domain.node.destroy_node()
-        rclpy.shutdown(context=domain.node.context)
+    rclpy.init()
+    node = rclpy.create_node("events")
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    events(node, executor, far)
+    print("cycles", cycles(node, executor, 100))
+    node.destroy_node()
+    rclpy.shutdown()
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ from native import install, model_of
 from sides import OURS, PACKAGES, STANDARD, Side
 from tools import run
 
-#: How far the second domain is from the first one.
-FAR = 100
+#: The namespace of the second side.
+FAR = "/far"
 
 
 @pytest.fixture(scope="module")
@@ -28,22 +28,21 @@ def prefix(tmp_path_factory):
 
 @pytest.fixture
 def talk(ros_environment, tmp_path, path_of, prefix, shapes):
-    """Let two sides in different domains talk over a bridge; fail on any complaint."""
+    """Let two sides in different namespaces talk over a bridge; fail on any complaint."""
     sides = []
 
-    def start(domain, path, *command):
-        environment = {**ros_environment, "ROS_DOMAIN_ID": str(domain)}
-        environment["AMENT_PREFIX_PATH"] = str(prefix)
+    def start(path, *command):
+        environment = {**ros_environment, "AMENT_PREFIX_PATH": str(prefix)}
         sides.append(Side(command, environment, path))
 
     def run(names, ours, theirs):
         file = tmp_path / "known.json"
         file.write_text(json.dumps({"names": names, "shapes": shapes[0]}), encoding="utf-8")
-        one = int(ros_environment["ROS_DOMAIN_ID"])
         peer = (HERE / "peer.py", "messages")
-        start(one, path_of(*ours), *peer, "one", "two", file)
-        start(one + FAR, path_of(*theirs), *peer, "two", "one", file)
-        start(one, str(HERE), HERE / "native_bridge.py", one, one + FAR, file)
+        far = ("--ros-args", "--remap", f"__ns:={FAR}")
+        start(path_of(*ours), *peer, "one", "two", file)
+        start(path_of(*theirs), *peer, "two", "one", file, *far)
+        start(str(HERE), HERE / "native_bridge.py", FAR, file)
         assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
         assert [side.finish() for side in reversed(sides)] == [[], [], []]
 
