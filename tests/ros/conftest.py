@@ -1,13 +1,18 @@
 """Tests with the real ROS 2 from the wheels; `make test ROS=no` leaves them out."""
 
+import json
 import os
 import random
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 import pytest
+from installed import SHARE, generate, interfaces, interfaces_in, names_in
+from sides import OURS, PACKAGES
 
 HERE = Path(__file__).parent
 
@@ -40,3 +45,39 @@ def _bound(held: socket.socket, domain: int) -> bool:
     except OSError:
         return False
     return True
+
+
+@pytest.fixture(scope="session")
+def classes(tmp_path_factory) -> Path:
+    """Return a folder with idlc's classes of all packages, each in a folder of its own."""
+    folder = tmp_path_factory.mktemp("classes")
+    for package in PACKAGES:
+        generate(SHARE / package, folder / package / package)
+    for package, files in OURS.items():
+        generate(files, folder / package / package)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def path_of(classes):
+    """Return the PYTHONPATH on which `packages` are idlc's."""
+
+    def path(*packages: str) -> str:
+        return ":".join([str(HERE), *(str(classes / package) for package in packages)])
+
+    return path
+
+
+@pytest.fixture(scope="session")
+def shapes(path_of, ros_environment):
+    """Return the shape of every message, and the names of messages of idlc's own packages."""
+    own_names = names_in(OURS, interfaces_in(OURS.values()))
+    names = [*names_in(interfaces(), interfaces()), *own_names]
+    done = subprocess.run(
+        [sys.executable, str(HERE / "shapes.py"), *names],
+        env={**ros_environment, "PYTHONPATH": path_of(*OURS)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout), own_names

@@ -22,6 +22,7 @@ from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.service_introspection import ServiceIntrospectionState
+from rclpy.utilities import remove_ros_args
 from trees import Values, class_of
 
 COUNT = 4
@@ -101,7 +102,7 @@ def compare_graph(peer, name):
     told = [
         [
             (info.topic_type, str(info.topic_type_hash))
-            for info in peer.node.get_publishers_info_by_topic(f"/{side}/{name}")
+            for info in peer.node.get_publishers_info_by_topic(f"{side}/{name}")
         ]
         for side in (peer.me, peer.other)
     ]
@@ -261,7 +262,7 @@ def call_action(peer, name, finish):
 
 
 if __name__ == "__main__":
-    step, *arguments = sys.argv[1:]
+    step, *arguments = remove_ros_args(sys.argv)[1:]
     rclpy.init()
     peer = Peer(*arguments)
     end = {"messages": messages, "serve": serve, "call": call}[step](peer)

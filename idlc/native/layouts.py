@@ -1,0 +1,82 @@
+"""Where the C structures of a distribution of ROS 2 differ from those of others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from idlc.model import ir
+
+STRING, WSTRING, MESSAGE = 16, 17, 18
+#: How introspection calls each primitive.
+TYPE_IDS = {
+    "float32": 1, "float64": 2, "bool": 6, "byte": 7, "char": 8, "uint8": 8, "int8": 9,
+    "uint16": 10, "int16": 11, "uint32": 12, "int32": 13, "uint64": 14, "int64": 15,
+}  # fmt: skip
+
+
+class Layout(NamedTuple):
+    """Sizes and offsets in bytes. Whoever has the headers can measure each of them."""
+
+    members: int = 40  #: the offset of `members_` in MessageMembers
+    member: int = 112  #: the size of a MessageMember
+    is_array: int = 33  #: the offset of `is_array_` in it
+    primitive_sequence: int = 24
+    string_sequence: int = 24
+    message_sequence: int = 24
+
+
+LAYOUTS = {
+    "humble": Layout(members=32, is_array=32),
+    "iron": Layout(members=32, is_array=32),
+    "jazzy": Layout(),
+    "kilted": Layout(),
+    "lyrical": Layout(member=120, primitive_sequence=32, string_sequence=32),
+    "rolling": Layout(member=120, primitive_sequence=32, string_sequence=32),
+}
+
+
+class Structure(NamedTuple):
+    """A message's C structure, as rosidl's C generator lays it out."""
+
+    offsets: tuple[int, ...]
+    size: int
+    align: int
+
+
+class Structures:
+    """The C structures of messages: `add` them with those first that others hold."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self._known: dict[ir.TypeName, Structure] = {}
+
+    def add(self, name: ir.TypeName, fields: Iterable[ir.Field]) -> Structure:
+        """Return the structure of a message."""
+        offsets, end, most = [], 0, 1
+        for field in fields:
+            size, align = self._field(field.type)
+            start = end + -end % align
+            offsets.append(start)
+            end, most = start + size, max(most, align)
+        structure = Structure(tuple(offsets), end + -end % most, most)
+        self._known[name] = structure
+        return structure
+
+    def _field(self, type_: ir.FieldType) -> tuple[int, int]:
+        """Return the size and alignment of a field."""
+        layout, element = self._layout, ir.element_of(type_)
+        match element:
+            case ir.Primitive():
+                size = align = element.info.size
+                sequence = layout.primitive_sequence
+            case ir.String():
+                size, align, sequence = 24, 8, layout.string_sequence
+            case ir.Ref():
+                _, size, align = self._known[element.target]
+                sequence = layout.message_sequence
+            case ir.Unknown():
+                raise ValueError("an unknown type has no layout")
+        if isinstance(type_, ir.Sequence):
+            return sequence, 8
+        return (size * type_.size if isinstance(type_, ir.Array) else size), align

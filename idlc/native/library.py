@@ -1,0 +1,185 @@
+"""The type support of a package's messages, in two libraries as C++ tools look for them.
+
+A handle answers who asks for another identifier with another handle, or with NULL:
+
+    rosidl_typesupport_cpp                what rclcpp, rosbag2 and the like load
+    ├─ rosidl_typesupport_fastrtps_c      what Fast DDS asks for: a name, no bound, no codec
+    └─ rosidl_typesupport_introspection_c what others ask for: fields with types and offsets
+    rosidl_typesupport_introspection_cpp  what tools load that only want to know the fields
+
+So messages travel in serialized form only, which is what these tools do with types that they were
+not compiled with. There is no service and no action among the symbols: each tool copes with a
+symbol that is missing, none with half a service.
+"""
+
+from __future__ import annotations
+
+from idlc.model import derive, ir
+from idlc.model.link import Model
+from idlc.native import aarch64, x86_64
+from idlc.native.descriptions import Descriptions
+from idlc.native.elf import shared_library
+from idlc.native.image import Image, Place
+from idlc.native.layouts import LAYOUTS, MESSAGE, STRING, TYPE_IDS, WSTRING, Layout, Structures
+from idlc.native.machine import Machine
+
+MACHINES = {"x86_64": x86_64.MACHINE, "aarch64": aarch64.MACHINE}
+
+OWN = "rosidl_typesupport_cpp"
+FASTRTPS = "rosidl_typesupport_fastrtps_c"
+FIELDS = "rosidl_typesupport_introspection_c"
+FIELDS_CPP = "rosidl_typesupport_introspection_cpp"
+#: Zeros after the callbacks for Fast DDS: later distributions read more of them.
+ROOM = 72
+
+
+def libraries(
+    model: Model, machine: Machine, layout: Layout = LAYOUTS["jazzy"]
+) -> dict[str, bytes]:
+    """Return the content of each library of a package by the name of its file.
+
+    Whoever has one open must not see it change: write it beside, and move it there.
+    """
+    return {
+        f"lib{model.package}__{identifier}.so": _library(model, Image(machine), layout, identifier)
+        for identifier in (OWN, FIELDS_CPP)
+        if model.own
+    }
+
+
+def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
+    support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
+    for interface in model.own:
+        for message in derive.messages(interface):
+            handle = support.fields[message.name]
+            if identifier == OWN:
+                handle = support.own(message.name, handle)
+            symbol = "__".join((identifier, "get_message_type_support_handle", *message.name))
+            image.exports[symbol] = image.function("get", target=handle)
+    return shared_library(image, f"lib{model.package}__{identifier}.so")
+
+
+class _TypeSupport:
+    """The handles of one library. `fields` has those of FIELDS, or with `cpp` of FIELDS_CPP."""
+
+    def __init__(self, model: Model, image: Image, layout: Layout, *, cpp: bool) -> None:
+        self.image = image
+        self.layout = layout
+        self.cpp = cpp
+        self.descriptions = Descriptions(model, image)
+        self.structures = Structures(layout)
+        self.refuse = image.function("refuse")
+        self.fields: dict[ir.TypeName, Place] = {}
+        for message in _reached(model):
+            self.fields[message.name] = self._fields(message)
+
+    def own(self, name: ir.TypeName, fields: Place) -> Place:
+        """Return the handle that answers for all others."""
+        image = self.image
+        answers = {FASTRTPS: self._fastrtps(name), FIELDS: fields}
+        rows = [word for key, handle in answers.items() for word in (image.string(key), handle)]
+        # the table holds the handle itself, which follows: its place is known before
+        handle = Place(image.data, len(image.data.data))
+        table = image.tables.words(*rows, image.string(OWN), handle, None, None)
+        return self._handle(OWN, table, image.function("resolve"), name)
+
+    def _handle(self, identifier: str, data: Place, find: Place, name: ir.TypeName) -> Place:
+        about = self.descriptions.about(str(name))
+        return self.image.data.words(self.image.string(identifier), data, find, *about)
+
+    def _single(self, identifier: str, data: Place, name: ir.TypeName) -> Place:
+        """Return a handle that knows its own identifier only."""
+        image = self.image
+        places = {"identifier": image.string(identifier), "function": image.function("same")}
+        return self._handle(identifier, data, image.function("knows", **places), name)
+
+    def _fastrtps(self, name: ir.TypeName) -> Place:
+        string, refuse = self.image.string, self.refuse
+        data = self.image.tables.words(
+            string(f"{name.package}::{name.kind}"),
+            string(name.name),
+            *(refuse, refuse, refuse),  # serialize, deserialize, size
+            self.image.function("unbounded"),
+            None,  # no key
+            *[0] * (ROOM // 8),
+        )
+        return self._single(FASTRTPS, data, name)
+
+    def _fields(self, message: ir.Message) -> Place:
+        image, name = self.image, message.name
+        offsets, size, _ = self.structures.add(name, message.wire_fields)
+        rows = [
+            word
+            for field, offset in zip(message.wire_fields, offsets, strict=True)
+            for word in self._member(field, offset)
+        ]
+        separator = "::" if self.cpp else "__"
+        data = image.tables.words(
+            image.string(f"{name.package}{separator}{name.kind}"),
+            image.string(name.name),
+            len(offsets),
+            size,
+            *[0] * (self.layout.members // 8 - 4),  # whether there is a key
+            image.tables.words(*rows),
+            *self._memory(name),
+        )
+        return self._single(FIELDS_CPP if self.cpp else FIELDS, data, name)
+
+    def _member(self, field: ir.Field, offset: int) -> tuple[int | Place | None, ...]:
+        kind, bound, nested = _element(ir.element_of(field.type))
+        count, bounded, resize = 0, 0, None
+        if isinstance(field.type, ir.Array):
+            count = field.type.size
+        elif isinstance(field.type, ir.Sequence):
+            count, bounded = field.type.bound or 0, int(field.type.bound is not None)
+            resize = self.refuse
+        many = isinstance(field.type, (ir.Array, ir.Sequence))
+        return (
+            self.image.string(field.name),
+            kind,
+            bound,
+            self.fields[nested] if nested else None,
+            many << 8 * (self.layout.is_array - 32),
+            count,
+            bounded | offset << 32,
+            *(None, None, None, None, None, None),  # default, size, get, get, fetch, assign
+            resize,
+            *[0] * (self.layout.member // 8 - 14),
+        )
+
+    def _memory(self, name: ir.TypeName) -> tuple[Place | None, Place | None]:
+        """Return the functions that begin and end a message in memory: C++ cannot have any."""
+        if not self.cpp:
+            return None, None
+        image = self.image
+        text = f"{name} was compiled by idlc, not in C++: it can only be handled in serialized form"
+        slot = image.imported("_ZSt21__throw_runtime_errorPKc", "libstdc++.so.6")
+        throw = image.function("throw", message=image.string(text), function=slot)
+        return throw, image.function("nothing")
+
+
+def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
+    """Return how introspection calls a type, its bound, and which message it is."""
+    match element:
+        case ir.Primitive():
+            return TYPE_IDS[element.name], 0, None
+        case ir.String():
+            return (WSTRING if element.wide else STRING), element.bound or 0, None
+        case ir.Ref():
+            return MESSAGE, 0, element.target
+        case ir.Unknown():
+            raise ValueError("an unknown type has no type support")
+
+
+def _reached(model: Model) -> list[ir.Message]:
+    """Return a package's messages and all that they refer to, those first that others hold."""
+    held: dict[str, int] = {}
+    for interface in model.own:
+        for message in derive.messages(interface):
+            full = model.describer.description(str(message.name))
+            references = (one["type_name"] for one in full["referenced_type_descriptions"])
+            held.update(dict.fromkeys((str(message.name), *references), 0))
+    for name in held:
+        held[name] = len(model.describer.description(name)["referenced_type_descriptions"])
+    names = sorted(held, key=lambda name: (held[name], name))
+    return [model.messages[ir.TypeName.parse(name)] for name in names]

@@ -1,0 +1,35 @@
+"""Prefixes that hold the libraries that idlc writes, and nothing else of a package."""
+
+from pathlib import Path
+
+from idlc.disk.find import look
+from idlc.disk.inputs import packages
+from idlc.disk.scope import Scope
+from idlc.driver.stages import models_of
+from idlc.native.layouts import LAYOUTS
+from idlc.native.library import MACHINES, libraries
+from idlc.text.diagnostics import Report
+
+INDEX = "share/ament_index/resource_index/packages"
+
+
+def model_of(folder):
+    """Return the model of the package in a folder; what it refers to is found in the wheels."""
+    report = Report()
+    scope = Scope()
+    found = packages(look((str(folder),), report, scope.exclude).files, scope, report)
+    ((_, model),) = models_of(found, scope, report)
+    assert not report.had_errors, list(report)
+    return model
+
+
+def install(model, prefix, machine="x86_64", layout=LAYOUTS["jazzy"]):
+    """Write a package's libraries into a prefix; return them."""
+    (prefix / INDEX).mkdir(parents=True, exist_ok=True)
+    (prefix / INDEX / model.package).write_text("")
+    (prefix / "lib").mkdir(exist_ok=True)
+    paths = []
+    for name, content in libraries(model, MACHINES[machine], layout).items():
+        paths.append(Path(prefix, "lib", name))
+        paths[-1].write_bytes(content)
+    return paths

@@ -1,0 +1,70 @@
+"""Programs of the system that tests need, for this machine and for others."""
+
+import os
+import platform
+import shutil
+import subprocess
+
+import pytest
+
+#: The Debian packages that have them.
+PACKAGES = {
+    "as": "binutils-{0}-linux-gnu",
+    "eu-elflint": "elfutils",
+    "g++": "g++-{0}-linux-gnu",
+    "gcc": "gcc-{0}-linux-gnu",
+    "ld": "binutils-{0}-linux-gnu",
+    "nm": "binutils-{0}-linux-gnu",
+    "objcopy": "binutils-{0}-linux-gnu",
+    "strip": "binutils-{0}-linux-gnu",
+    "patchelf": "patchelf",
+    "qemu-aarch64": "qemu-user",
+    "readelf": "binutils",
+    "valgrind": "valgrind",
+}
+MACHINES = ("x86_64", "aarch64")
+
+
+def is_foreign(machine):
+    return platform.machine() != machine
+
+
+def tool(name, machine=None):
+    """Return the full name of a program that works for a machine.
+
+    Without it the test is left out, unless TOOLS=yes says that nothing is, as in CI.
+    """
+    foreign = machine is not None and is_foreign(machine)
+    full = f"{machine}-linux-gnu-{name}" if foreign else name
+    if not shutil.which(full):
+        package = PACKAGES[name].format((machine or "").replace("_", "-"))
+        complain = pytest.fail if os.environ.get("TOOLS") == "yes" else pytest.skip
+        complain(f"no {full}: install {package}")
+    return full
+
+
+def emulator(machine, *options):
+    """Return the words by which programs for a machine are run."""
+    if not is_foreign(machine):
+        return []
+    return [tool(f"qemu-{machine}"), "-L", f"/usr/{machine}-linux-gnu", *options]
+
+
+def run(*words, **options):
+    """Run a program that must succeed and has nothing to complain about; return what it says."""
+    command = [str(word) for word in words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    assert done.returncode == 0, (command, done.stdout[-2000:], done.stderr)
+    assert done.stderr == "", command
+    return done.stdout
+
+
+def assemble(machine, text, folder):
+    """Return the object file of an assembler text, the code in it and its symbols' values."""
+    source, made, code = folder / "code.s", folder / "code.o", folder / "code"
+    source.write_text(text)
+    run(tool("as", machine), source, "-o", made)
+    run(tool("objcopy", machine), "-O", "binary", "-j", ".text", made, code)
+    lines = run(tool("nm", machine), made).splitlines()
+    symbols = dict(line.split()[::-2] for line in lines if len(line.split()) == 3)
+    return made, code.read_bytes(), {name: int(value, 16) for name, value in symbols.items()}
