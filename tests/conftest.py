@@ -19,6 +19,14 @@ settings.register_profile(
 settings.load_profile("idlc")
 
 
+def pytest_terminal_summary(terminalreporter):
+    """Print what tests recorded as found, in whichever process they ran."""
+    for report in terminalreporter.getreports("passed"):
+        for name, value in report.user_properties:
+            if name == "found":
+                terminalreporter.write_line(f"{report.nodeid}: {value}")
+
+
 @pytest.fixture(scope="session")
 def standard_folder(tmp_path_factory):
     """A folder with the catalogue and the recorded packages, generated."""

@@ -110,7 +110,7 @@ def reason_of(case):
     return next((one.__name__ for one in DIFFERENCES if one(case)), None)
 
 
-def compared(cases):
+def compared(cases, record_property):
     """Return how often each difference is seen; fail at one that is not known."""
     seen, unknown = Counter(), {}
     for case in cases:
@@ -120,29 +120,35 @@ def compared(cases):
             kind = (str(case.field), case.value or case.key.partition(" ")[2], "(" in case.key)
             text = f"{case.key}\n    {case.official}\n    {case.idlc}"
             unknown.setdefault(kind, []).append(text)
-    print(f"{len(cases)} operations:", dict(seen))
+    told = ", ".join(f"{count:,} {reason}" for reason, count in seen.most_common())
+    record_property("found", f"{len(cases):,} operations with both classes: {told}")
     examples = [f"{len(texts)} x {texts[0]}" for texts in unknown.values()]
     assert not unknown, f"{len(unknown)} kinds of differences:\n" + "\n".join(examples[:60])
     return seen
 
 
-def test_every_difference_is_known_and_every_known_one_is_seen(classes, ros_environment, tmp_path):
+def test_every_difference_is_known_and_every_known_one_is_seen(
+    classes, ros_environment, record_property, tmp_path
+):
     found = interfaces()
     names = names_in(sorted(found), found)
     assert len(names) > 200
-    seen = compared(outcomes(classes, ros_environment, tmp_path, names))
+    cases = outcomes(classes, ros_environment, tmp_path, names)
+    seen = compared(cases, record_property)
     assert {one.__name__ for one in DIFFERENCES} <= set(seen)
 
 
-def test_the_environment_lets_all_messages_check(classes, ros_environment, tmp_path):
+def test_the_environment_lets_all_messages_check(
+    classes, ros_environment, record_property, tmp_path
+):
     environment = ros_environment | {"ROS_PYTHON_CHECK_FIELDS": "1"}
     cases = outcomes(classes, environment, tmp_path, CHECKED)
-    assert "unknown_keywords" not in compared(cases)
+    assert "unknown_keywords" not in compared(cases, record_property)
     taken = [case.key for case in cases if reason_of(case) == "wrong_values"]
     assert [key for key in taken if "append" not in key] == []  # lists cannot check
 
 
-def test_invented_messages_of_every_kind(classes, ros_environment, tmp_path):
+def test_invented_messages_of_every_kind(classes, ros_environment, record_property, tmp_path):
     """rosidl's classes without its C code: all but what is sent."""
     source, theirs = tmp_path / "source", tmp_path / "rosidl" / "every_kind"
     shutil.copytree(HERE.parent / "every_kind" / "msg", source / "msg")
@@ -152,7 +158,8 @@ def test_invented_messages_of_every_kind(classes, ros_environment, tmp_path):
     generate(source, classes / "every_kind")
     names = [f"every_kind/msg/{path.stem}" for path in sorted(source.glob("msg/*.msg"))]
     environment = ros_environment | {"PYTHONPATH": str(theirs.parent), "IDLC_NO_WIRE": "1"}
-    assert compared(outcomes(classes, environment, tmp_path, names))["the same"] > 10_000
+    cases = outcomes(classes, environment, tmp_path, names)
+    assert compared(cases, record_property)["the same"] > 10_000
 
 
 def test_the_document_lists_the_differences():
