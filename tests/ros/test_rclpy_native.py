@@ -27,12 +27,18 @@ def prefix(tmp_path_factory):
 
 
 @pytest.fixture
-def talk(ros_environment, tmp_path, path_of, prefix, shapes):
+def environment(ros_environment, prefix):
+    """Return an environment in which the libraries are found, and endpoints for certain."""
+    profiles = {"FASTDDS_DEFAULT_PROFILES_FILE": str(HERE / "no_type_lookup.xml")}
+    return {**ros_environment, **profiles, "AMENT_PREFIX_PATH": str(prefix)}
+
+
+@pytest.fixture
+def talk(environment, tmp_path, path_of, shapes):
     """Let two sides in different namespaces talk over a bridge; fail on any complaint."""
     sides = []
 
     def start(path, *command):
-        environment = {**ros_environment, "AMENT_PREFIX_PATH": str(prefix)}
         sides.append(Side(command, environment, path))
 
     def run(names, ours, theirs):
@@ -63,8 +69,7 @@ def test_every_message_of_own_packages(talk):
     talk(names_in(OURS, found), OURS, (*OURS, *STANDARD))
 
 
-def test_events_feedback_and_a_hundred_creations(ros_environment, path_of, prefix):
-    environment = {**ros_environment, "AMENT_PREFIX_PATH": str(prefix)}
+def test_events_feedback_and_a_hundred_creations(environment, path_of):
     environment["PYTHONPATH"] = path_of("my_robot_controller")
     said = run(sys.executable, HERE / "native_events.py", FAR, env=environment)
     assert said == "cycles 100\n"
