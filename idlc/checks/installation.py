@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from idlc.checks.facts import Facts
 from idlc.model.link import Model
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Report, first_few
 from idlc.text.source import Span
 
 if TYPE_CHECKING:
@@ -134,12 +134,11 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
             if output.inputs.get(name) != facts.inputs.get(name)
         }
         if changed:
-            listed = ", ".join(f"`{name}`" for name in sorted(changed)[:3])
-            more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+            listed = first_few((f"`{name}`" for name in sorted(changed)), 3)
             report.add(
                 codes.STALE_OUTPUT.of(
                     output.path,
-                    f"the generated code is out of date: {listed}{more} changed",
+                    f"the generated code is out of date: {listed} changed",
                     hint="run idlc gen",
                 )
             )

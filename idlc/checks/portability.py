@@ -12,7 +12,7 @@ from idlc.model import ir
 from idlc.model.comments import brackets
 from idlc.model.link import Model
 from idlc.text import codes
-from idlc.text.diagnostics import Edit, Report
+from idlc.text.diagnostics import Edit, Report, first_few
 from idlc.text.source import Span
 
 #: Pairs of brackets that a message names.
@@ -106,8 +106,7 @@ def several_units(model: Model, report: Report) -> None:
                     codes.SEVERAL_UNITS.at(
                         field.name_span,
                         f"`{field.name}` has no unit for ROS 2, because its comment has several "
-                        f"pairs of brackets: {', '.join(f'[{one}]' for one in found[:SHOWN])}"
-                        + (f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""),
+                        f"pairs of brackets: {first_few((f'[{one}]' for one in found), SHOWN)}",
                         hint="write the remark with round ones, as in `ignore(IDL405)`"
                         if REMARK.search(text)
                         else "put one unit in brackets, and what else there is in words",

@@ -116,13 +116,14 @@ def _show(report: Report, verdict: Verdict | None, style: str) -> None:
 
 
 def _summary(verdict: Verdict) -> str:
+    from idlc.text.diagnostics import first_few
+
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
     if verdict.allowed:
         text += f"; allowed: {verdict.allowed}"
     if verdict.added:
-        more = f" and {len(verdict.added) - 5} more" if len(verdict.added) > 5 else ""
-        text += f"; added: {', '.join(verdict.added[:5])}{more}"
+        text += f"; added: {first_few(verdict.added, 5)}"
     if verdict.part is None:
         return f"{text}; the versions are the same"
     if verdict.next_version:

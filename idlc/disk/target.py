@@ -15,7 +15,7 @@ from idlc.disk.lock import FILE, Lock, digest, encode, load
 from idlc.disk.plan import Change, Plan, plan
 from idlc.disk.read import absolute, is_file, is_folder
 from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.diagnostics import Diagnostic, Report, first_few
 
 
 class Target:
@@ -149,5 +149,4 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
         common = sorted(before.keys() & after.keys())
         found += [f"`{name}` changed" for name in common if before[name] != after[name]]
-    shown = ", ".join(found[:3])
-    return f"{shown} and {len(found) - 3} more" if len(found) > 3 else shown
+    return first_few(found, 3)

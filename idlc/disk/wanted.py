@@ -19,7 +19,7 @@ from idlc.disk.scope import Scope
 from idlc.disk.target import Target
 from idlc.model import ir
 from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.text.diagnostics import Report, first_few
 
 
 def wanted(
@@ -82,12 +82,11 @@ def _mixed(homes: Sequence[Path], report: Report) -> bool:
     loose = [home for home in homes if not manifest(home)]
     if not any(set(home.parents) & set(homes) for home in loose):
         return False
-    names = ", ".join(f"`{shown(home)}`" for home in homes[:5])
-    more = f" and {len(homes) - 5} more" if len(homes) > 5 else ""
+    names = first_few((f"`{shown(home)}`" for home in homes), 5)
     report.add(
         codes.SEVERAL_PACKAGES.of(
             shown(homes[0]),
-            f"these may be one package or {len(homes)}: {names}{more}",
+            f"these may be one package or {len(homes)}: {names}",
             hint="give --package NAME to compile them as one, or each folder a package.xml",
         )
     )

@@ -11,7 +11,7 @@ from idlc.disk.library import Library
 from idlc.disk.read import shown
 from idlc.model import ir
 from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
+from idlc.text.diagnostics import Diagnostic, Report, first_few
 from idlc.text.suggest import closest, did_you_mean
 
 _DIVIDER = re.compile(r"/|\.|::")
@@ -115,10 +115,9 @@ def _found(name: ir.TypeName, library: Library) -> Meant | None:
 
 
 def _several(text: str, meant: Sequence[Meant]) -> Diagnostic:
-    names = ", ".join(f"`{one.name}`" for one in meant[:_LISTED])
-    more = f" and {len(meant) - _LISTED} more" if len(meant) > _LISTED else ""
+    names = first_few((f"`{one.name}`" for one in meant), _LISTED)
     message = f"`{text}` may be {len(meant)} types"
-    return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}{more}")
+    return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}")
 
 
 def _nothing(text: str, library: Library) -> Diagnostic:

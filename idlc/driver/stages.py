@@ -15,7 +15,7 @@ from idlc.disk.library import Library
 from idlc.disk.scope import Scope
 from idlc.model import derive, ir
 from idlc.text import codes
-from idlc.text.diagnostics import Report, Severity
+from idlc.text.diagnostics import Report, Severity, first_few
 from idlc.text.source import Source
 
 if TYPE_CHECKING:
@@ -147,9 +147,8 @@ def sound_models(
         found.append((sound, [name for one in mine for name in derived_names(one)]))
         left_out += sorted(given.names - {one.name for one in mine})
     if left_out:
-        names = ", ".join(f"`{name}`" for name in left_out[:5])
-        more = f" and {len(left_out) - 5} more" if len(left_out) > 5 else ""
-        report.notes.append(f"left out, because of errors: {names}{more}")
+        names = first_few((f"`{name}`" for name in left_out), 5)
+        report.notes.append(f"left out, because of errors: {names}")
     return found
 
 

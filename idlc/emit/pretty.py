@@ -96,11 +96,16 @@ def all_of(conditions: list[str], indent: int) -> list[str]:
     text = " and ".join(conditions) or "True"
     if len(margin) + len(text) + 7 <= WIDTH:
         return [f"{margin}return {text}"]
-    if len(margin) + len(text) + 4 <= WIDTH:
-        inner = [text]
-    else:
-        inner = [conditions[0], *(f"and {one}" for one in conditions[1:])]
-    return [f"{margin}return (", *(f"{margin}    {one}" for one in inner), f"{margin})"]
+    return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
+
+
+def _spread(conditions: list[str], word: str, indent: int) -> list[str]:
+    """Return conditions joined by a word, on one line, or on one each."""
+    margin = " " * indent
+    one = f"{margin}{f' {word} '.join(conditions)}"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
 
 
 def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
@@ -114,27 +119,20 @@ def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
         result = lines(rest, indent, before, ":")
         items = ", ".join(map(flat, rest.items))
         return result if len(result) == 1 else [result[0], f"{margin}    {items}", result[-1]]
-    inner = [either]
-    if len(margin) + 4 + len(either) > WIDTH:
-        inner = [conditions[0], *(f"or {one}" for one in conditions[1:])]
     end = f"{margin}) and {flat(rest)}:"
-    return [f"{margin}if (", *(f"{margin}    {one}" for one in inner), end]
+    return [f"{margin}if (", *_spread(conditions, "or", indent + 4), end]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
     """Return the lines of `before`, whether any condition is true, and `after`."""
     margin = " " * indent
-    text = " or ".join(conditions)
-    one = f"{margin}{before}{text}{after}"
+    one = f"{margin}{before}{' or '.join(conditions)}{after}"
     if len(one) <= WIDTH:
         return [one]
-    inner = [text]
-    if len(margin) + len(text) + 4 > WIDTH:
-        inner = [conditions[0], *(f"or {condition}" for condition in conditions[1:])]
     brackets = ("", "") if before.endswith("(") else ("(", ")")
     return [
         f"{margin}{before}{brackets[0]}",
-        *(f"{margin}    {line}" for line in inner),
+        *_spread(conditions, "or", indent + 4),
         f"{margin}{brackets[1]}{after}",
     ]
 

@@ -102,3 +102,10 @@ class Report:
     def had_errors(self) -> bool:
         """Whether any problem rejects its file."""
         return self._had_errors
+
+
+def first_few(texts: Iterable[str], most: int) -> str:
+    """Return the first texts of a list, for a sentence, and how many more there are."""
+    found = list(texts)
+    shown = ", ".join(found[:most])
+    return f"{shown} and {len(found) - most} more" if len(found) > most else shown
