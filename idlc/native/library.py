@@ -67,7 +67,7 @@ class _TypeSupport:
         self.layout = layout
         self.cpp = cpp
         self.descriptions = Descriptions(model, image)
-        self.structures = Structures(layout)
+        self.structures = Structures(layout.of_cpp() if cpp else layout)
         self.refuse = image.function("refuse")
         self.fields: dict[ir.TypeName, Place] = {}
         for message in _reached(model):
