@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from installed import SHARE, generate, interfaces, interfaces_in, names_in
-from sides import OURS, PACKAGES
+from sides import OURS
 
 HERE = Path(__file__).parent
 
@@ -51,7 +51,7 @@ def _bound(held: socket.socket, domain: int) -> bool:
 def classes(tmp_path_factory) -> Path:
     """Return a folder with idlc's classes of all packages, each in a folder of its own."""
     folder = tmp_path_factory.mktemp("classes")
-    for package in PACKAGES:
+    for package in interfaces():
         generate(SHARE / package, folder / package / package)
     for package, files in OURS.items():
         generate(files, folder / package / package)
