@@ -93,6 +93,17 @@ def _inline(kind: str, lines: list[str], number: int) -> Iterator[Example]:
         yield Example(f"line {number + count}", code.rstrip(), (said,), kind, path, inline=True)
 
 
+def idl_shown(book: str) -> tuple[Example, str]:
+    """Return the example whose .idl file is shown, and that file's text."""
+    before, _, after = book.partition("\n```idl\n")
+    return list(examples(before))[-1], after.partition("```")[0]
+
+
+def idl_text(text: str) -> str:
+    """Return an .idl file without its head and blank lines."""
+    return "".join(f"{line}\n" for line in text.splitlines() if line and line[:2] != "//")
+
+
 def rewritten(book: str, found: dict[str, tuple[str, ...]]) -> str:
     """Return the book with arrows as they were found, each example given by its place."""
     known = {example.place: example for example in examples(book)}

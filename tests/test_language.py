@@ -14,6 +14,7 @@ from generated import model_of
 
 from idlc.model import derive, ir
 from idlc.model.describe import individual
+from idlc.model.idl import idl
 from idlc.model.names import snake_case
 from idlc.text.codes import CODES
 
@@ -47,6 +48,13 @@ def test_examples_mean_what_they_say():
         language_book.BOOK.write_text(text, encoding="utf-8")
         refresh.refreshed()
     assert text == TEXT
+
+
+def test_the_idl_file():
+    example, shown = language_book.idl_shown(TEXT)
+    model, _ = rosidl_view.compile_case(example.case)
+    written = idl(model.interfaces[ir.TypeName("demo", "msg", "Example")])
+    assert language_book.idl_text(written) == shown
 
 
 def test_bytes_are_the_recorded_ones():
