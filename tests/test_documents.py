@@ -4,11 +4,12 @@
 """
 
 import re
-import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import command_line_page
+import programs
 import pytest
 import refresh
 
@@ -121,21 +122,14 @@ def generated(tmp_path_factory) -> Path:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
     (line,) = re.findall(r"^idlc (gen .*)$", API, re.MULTILINE)
-    run(folder, "-m", "idlc", *line.split())
+    programs.run(sys.executable, "-m", "idlc", *line.split(), cwd=folder)
     return folder / "out"
-
-
-def run(folder: Path, *words: str) -> str:
-    command = [sys.executable, *words]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def test_the_examples_of_the_api(generated):
     blocks = re.findall(r"^```python\n(.*?)^```$", API, re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 8
-    run(generated, "-c", "\n".join(blocks))
+    programs.run(sys.executable, "-c", "\n".join(blocks), cwd=generated)
 
 
 def test_every_public_name_is_documented(generated):
@@ -147,7 +141,7 @@ def test_every_public_name_is_documented(generated):
         "for kind in (Drive, Add, Count, Count.Impl):\n"
         "    print(*(name for name in dir(kind) if name[0] != '_'))\n"
     )
-    names = set(run(generated, "-c", code).split())
+    names = set(programs.run(sys.executable, "-c", code, cwd=generated).split())
     assert len(names) > 20
     assert {name for name in names if not re.search(rf"\b{name}\b", API)} == set()
 
@@ -184,3 +178,15 @@ def test_links_lead_somewhere(page):
 def test_the_index_lists_every_page():
     linked = {(DOCS / link.partition("#")[0]).resolve() for link in links(DOCS / "index.md")}
     assert set(DOCS.rglob("*.md")) - {DOCS / "index.md"} <= linked
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a repository")
+def test_what_is_generated_is_marked():
+    git = partial(programs.run, "git", cwd=ROOT)
+    paths = git("ls-files", "examples", "golden", "idlc", "templates").splitlines()
+    marks = git("check-attr", "linguist-generated", "--", *paths).splitlines()
+    marked = {line.split(": ")[0] for line in marks if line.endswith(": set")}
+    generated = {path for path in paths if "/_idlc/" in path or path.endswith("/idlc.lock")}
+    assert len(generated) > 30
+    assert generated <= marked
+    assert not any(path.startswith(("idlc/", "templates/")) for path in marked)

@@ -138,6 +138,25 @@ def spelled(type_: ir.FieldType) -> str:
     return type_.target.name if own else str(type_.target)
 
 
+def test_the_table_of_reserved_words():
+    """idlc's warnings are held to what was compiled by test_spec_cases."""
+    for words, *fails in table("a field called"):
+        for word in code(words):
+            text = f"int32 {word}\nint32 other\n"
+            example = language_book.Example("", text, (), "msg")
+            warned = " ".join(language_book.told_by_idlc(example))
+            python, c, cpp = (cell.endswith("fails") for cell in fails)
+            assert python == ("IDL220" in warned), word
+            assert c == ("IDL221" in warned), word
+            # what is said to break C needs not be said to break C++ as well
+            assert c or cpp == ("IDL222" in warned), word
+
+
+def test_every_rule_of_the_language_is_in_it():
+    rules = {code for code in CODES if code[3] in "123"}
+    assert {code for code in rules if code not in TEXT} == set()
+
+
 def test_codes_are_called_so():
     for id_, slug in re.findall(r"\b(IDL\d{3})(?: ([a-z]+(?:-[a-z0-9]+)+))?", TEXT):
         assert id_ in CODES
