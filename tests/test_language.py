@@ -61,15 +61,14 @@ def test_bytes_are_the_recorded_ones():
     """What idlc writes is held to the same records by test_emit_rosidl."""
     lines = (ROOT / "golden/rosidl/cdr.jsonl").read_text(encoding="utf-8").splitlines()
     known = {
-        (record["definition"], json.dumps(record["value"], sort_keys=True)): record["hex"]
+        (record["definition"], json.dumps(record["value"], sort_keys=True), record["hex"])
         for record in map(json.loads, lines)
-        if record["endian"] == "LE"
     }
     blocks = re.findall(r"^```cdr\n((?:\w.*\n)+)(\{.*\})\n→ (.*)\n```$", TEXT, re.MULTILINE)
     assert len(blocks) == TEXT.count("```cdr\n") > 5
     for definition, value, shown in blocks:
-        key = definition, json.dumps(json.loads(value), sort_keys=True)
-        assert re.sub(r"[ |]", "", shown) == known[key]
+        data = re.sub(r"[ |]", "", shown)
+        assert (definition, json.dumps(json.loads(value), sort_keys=True), data) in known
 
 
 def test_the_table_of_types():
