@@ -21,8 +21,8 @@ import rosidl_view
 
 from idlc.checks.lint import lint
 from idlc.checks.select import Selection, category
-from idlc.text.codes import CODES
-from idlc.text.diagnostics import Severity
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.report import Severity
 
 BOOK = Path(__file__).parents[1] / "docs" / "language.md"
 ARROW = "→ "

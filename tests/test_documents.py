@@ -13,10 +13,10 @@ import programs
 import pytest
 import refresh
 
+from idlc.breaking.allow import Allowance
 from idlc.checks.select import OFF_BY_DEFAULT
 from idlc.cli.main import main
-from idlc.disk.config import Config
-from idlc.model.changes.allow import Allowance
+from idlc.disk.pyproject import Config
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

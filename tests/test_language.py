@@ -12,11 +12,11 @@ import refresh
 import rosidl_view
 from generated import model_of
 
+from idlc.diagnostics.codes import CODES
+from idlc.export.idl import idl
 from idlc.model import derive, ir
 from idlc.model.describe import individual
-from idlc.model.idl import idl
 from idlc.model.names import snake_case
-from idlc.text.codes import CODES
 
 ROOT = Path(__file__).parents[1]
 TEXT = language_book.BOOK.read_text(encoding="utf-8")
