@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from idlc import __version__
-from idlc.cli.ending import PipeClosedError
-from idlc.cli.lazy import LazyGroup
+from idlc.cli.exit_status import PipeClosedError
+from idlc.cli.lazy_group import LazyGroup
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {
@@ -80,7 +80,7 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
 @click.group(
     cls=App,
     overview=COMMANDS,
-    modules="idlc.cli.",
+    modules="idlc.cli.commands.",
     meant=MEANT,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,

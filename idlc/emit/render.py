@@ -46,9 +46,12 @@ def _template(name: str) -> jinja2.Template:
 @cache
 def runtime_files() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
+    runtime = PACKAGE / "runtime"
     return tuple(
-        RenderedFile(f"_idlc/{path.name}", path.read_text(encoding="utf-8"))
-        for path in sorted((PACKAGE / "runtime").glob("*.py"))
+        RenderedFile(
+            f"_idlc/{path.relative_to(runtime).as_posix()}", path.read_text(encoding="utf-8")
+        )
+        for path in sorted(runtime.rglob("*.py"))
     )
 
 
@@ -57,7 +60,7 @@ def module_file(
 ) -> RenderedFile:
     """Return the module of one interface."""
     page = view.module(interface, model.messages, modules)
-    return RenderedFile(page.path, _template("module.py.jinja").render(module=page))
+    return RenderedFile(page.path, _template("message/module.py.jinja").render(module=page))
 
 
 def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
@@ -69,7 +72,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
     files = [module_file(interface, model, modules) for interface in model.own]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = listing.package(model, kind, modules)
-        text = _template("package.py.jinja").render(package=page)
+        text = _template("message/package_init.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
     files.append(RenderedFile("_idlc/type_data.py", type_data.source(model)))
     # a package without it would lose to any other of its name, wherever that stands on the path
