@@ -4,7 +4,7 @@ Everything given to C must live as long as the process, so it is handed to `keep
 exception that leaves a ctypes callback leaves the result *uninitialised*, so callbacks
 whose result is a pointer are built from C callables only (`constant`, `resolver`): no
 bytecode runs in them, hence no signal handler either. All others are made by
-`typesupport_callbacks`.
+`callbacks`.
 """
 
 from __future__ import annotations

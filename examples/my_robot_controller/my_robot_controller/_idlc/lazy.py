@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
-from .generics import Generic, TypeVar
 from .names import public_name
+from .typing_stub import Generic, TypeVar
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from . import typesupport_c as c
-from .typesupport_descriptions import load
+from . import c
+from .descriptions import load
 
 #: Packages whose messages rcl, rcl_action and rcl_lifecycle know as C structures.
 OF_RCL = {"action_msgs", "lifecycle_msgs", "type_description_interfaces"}

@@ -11,9 +11,9 @@ from functools import cache
 from struct import Struct
 from typing import Any
 
-from .cdr import NATIVE
-from .codec import maker
-from .errors import DecodeError
+from ..cdr import NATIVE
+from ..codec import maker
+from ..errors import DecodeError
 from .typeinfo import FieldInfo, class_of, fields_of, type_name
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import Any
 
-from .errors import ValidationError
+from ..errors import ValidationError
 from .typeinfo import FieldInfo, class_of, fields_of, type_name
 from .validation import validate
 

@@ -11,10 +11,10 @@ from ctypes import c_size_t, c_void_p
 from functools import cache
 from typing import NamedTuple
 
-from . import typesupport_c as c
-from . import typesupport_native as native
-from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field
-from .typesupport_layout import element_type, placed_fields
+from . import c
+from . import machine_code as native
+from .c_layout import element_type, placed_fields
+from .descriptions import ARRAY, NESTED, SCALAR, Field
 
 
 class Functions(NamedTuple):

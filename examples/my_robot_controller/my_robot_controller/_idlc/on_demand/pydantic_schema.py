@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .message import Message
+from ..message import Message
 
 
 def message_schema(fields: Any) -> Any:

@@ -24,8 +24,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from . import typeinfo
-from . import typesupport_c as c
+from ..on_demand import typeinfo
+from . import c
 
 NESTED, UINT8, BOOL, BYTE, WSTRING = 1, 3, 15, 16, 18
 SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)

@@ -11,9 +11,8 @@ from ctypes import PYFUNCTYPE, c_bool, c_char, c_size_t, c_void_p, py_object
 from functools import cache
 from typing import Any
 
-from . import typesupport_c as c
-from . import typesupport_callbacks as callbacks
-from .typesupport_fastcdr import fast_cdr
+from . import c, callbacks
+from .fastcdr import fast_cdr
 
 _HEADER = 4
 

@@ -15,7 +15,7 @@ from ctypes import PYFUNCTYPE, c_char_p, c_int, c_size_t, c_void_p
 from functools import cache
 from typing import Any, NamedTuple
 
-from . import typesupport_c as c
+from . import c
 
 _LIBRARIES = ("libfastcdr.so.2", "libfastcdr.2.dylib")
 _CDR = "_ZN8eprosima7fastcdr3Cdr"

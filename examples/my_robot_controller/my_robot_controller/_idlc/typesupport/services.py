@@ -20,10 +20,8 @@ from ctypes import (
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from . import typesupport_c as c
-from . import typesupport_callbacks as callbacks
-from . import typesupport_introspection as introspection
-from .typesupport_descriptions import about
+from . import c, callbacks, introspection
+from .descriptions import about
 
 
 class _EventInfo(ctypes.Structure):

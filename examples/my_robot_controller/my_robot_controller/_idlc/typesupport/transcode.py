@@ -16,9 +16,9 @@ from functools import cache
 from struct import Struct
 from typing import Any, NamedTuple, Protocol
 
-from . import typesupport_c as c
-from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field
-from .typesupport_layout import element_type, placed_fields
+from . import c
+from .c_layout import element_type, placed_fields
+from .descriptions import ARRAY, NESTED, SCALAR, Field
 
 _HEADER = 4
 _COUNT = Struct("=I")

@@ -6,7 +6,7 @@ import math
 from array import array
 from typing import Any
 
-from .errors import FieldRangeError, FieldTypeError, ValidationError
+from ..errors import FieldRangeError, FieldTypeError, ValidationError
 from .typeinfo import PRIMITIVES, FieldInfo, Primitive, fields_of, type_name
 
 

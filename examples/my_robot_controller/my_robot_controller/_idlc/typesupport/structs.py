@@ -11,15 +11,11 @@ import ctypes
 import sys
 from typing import Any
 
-from . import typesupport_c as c
-from . import typesupport_callbacks as callbacks
-from . import typesupport_introspection as introspection
-from . import typesupport_memory as memory
-from . import typesupport_native as native
-from . import typesupport_transcode as transcode
-from .cdr import HEADERS, NATIVE
-from .codec import encode_error, functions
-from .typesupport_layout import structure
+from ..cdr import HEADERS, NATIVE
+from ..codec import encode_error, functions
+from . import c, callbacks, introspection, memory, transcode
+from . import machine_code as native
+from .c_layout import structure
 
 _HEADER = 4
 

@@ -6,8 +6,8 @@ import ctypes
 from functools import cache
 from typing import Any
 
-from . import typesupport_c as c
-from .typesupport_descriptions import ARRAY, NESTED, SCALAR, Field, load
+from . import c
+from .descriptions import ARRAY, NESTED, SCALAR, Field, load
 
 #: Type id in descriptions -> (type id in introspection, C type of one element).
 _ELEMENTS: dict[int, tuple[int, Any]] = {

@@ -12,22 +12,9 @@ from ctypes import c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
 from functools import cache
 from typing import NamedTuple
 
-from . import typesupport_c as c
-from . import typesupport_memory as memory
-from .typesupport_descriptions import (
-    ARRAY,
-    BOUNDED_SEQUENCE,
-    NESTED,
-    SCALAR,
-    Field,
-    about,
-)
-from .typesupport_layout import (
-    element_type,
-    introspection_id,
-    placed_fields,
-    structure,
-)
+from . import c, memory
+from .c_layout import element_type, introspection_id, placed_fields, structure
+from .descriptions import ARRAY, BOUNDED_SEQUENCE, NESTED, SCALAR, Field, about
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 

@@ -11,11 +11,10 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from . import typesupport_c as c
-from . import typesupport_services as services
-from .names import wire_name
-from .typesupport_descriptions import load
-from .typesupport_extension import OF_RCL, extension
+from ..names import wire_name
+from . import c, services
+from .descriptions import load
+from .extension import OF_RCL, extension
 
 #: Middlewares that take encoded messages through Fast DDS's type support.
 _OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
@@ -52,9 +51,9 @@ def _road() -> ModuleType:
             "with colcon"
         )
     if middleware in _OPAQUE:
-        from . import typesupport_fastrtps as road
+        from . import fastrtps as road
     else:
-        from . import typesupport_structs as road  # type: ignore[no-redef]
+        from . import structs as road  # type: ignore[no-redef]
     return road
 
 

@@ -16,7 +16,7 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any
 
-from . import typesupport_c as c
+from . import c
 
 #: Arguments of the interpreter's RESUME instruction.
 _AT_START, _IN_YIELD_FROM = 0, 2

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from struct import Struct
 
-from .codec import (
-    FAILURES,
-    ORDERS,
-    READINGS,
-    deserialize,
-    encode_error,
-    read,
-)
-from .errors import DecodeError, ValidationError
-from .objects import owner_of
+from ..codec import FAILURES, ORDERS, READINGS, deserialize, encode_error, read
+from ..errors import DecodeError, ValidationError
+from ..objects import owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

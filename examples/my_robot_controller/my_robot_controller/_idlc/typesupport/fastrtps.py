@@ -18,15 +18,13 @@ from functools import cache
 from struct import Struct, pack
 from typing import Any
 
-from . import typesupport_c as c
-from . import typesupport_callbacks as callbacks
-from . import typesupport_fastrtps_python as python
-from . import typesupport_introspection as introspection
-from . import typesupport_native as native
-from .cdr import HEADERS, NATIVE
-from .codec import encode_error, functions
-from .typesupport_descriptions import about
-from .typesupport_fastcdr import fast_cdr
+from ..cdr import HEADERS, NATIVE
+from ..codec import encode_error, functions
+from . import c, callbacks, introspection
+from . import fastrtps_python as python
+from . import machine_code as native
+from .descriptions import about
+from .fastcdr import fast_cdr
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from .names import slot_name
-from .objects import owner_of
+from ..names import slot_name
+from ..objects import owner_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..codec import order_of
+from ..errors import DecodeError
 from .batches import failed
-from .codec import order_of
-from .errors import DecodeError
 from .typeinfo import FieldInfo, fields_of, type_name
 
 #: Messages of more different layouts are not what columns are for.
