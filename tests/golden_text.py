@@ -70,6 +70,7 @@ def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
     """Return what each expected section should hold, made independent of idlc's version."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.delenv("ROS_DISTRO", raising=False)
     monkeypatch.setattr("idlc.disk.environment.python_folders", only_rclpy)
     for path, text in case.files.items():
         target = folder / path

@@ -20,6 +20,7 @@ class Siblings:
     names = staticmethod(catalog.names)
     packages = staticmethod(catalog.packages)
     nearby = staticmethod(catalog.nearby)
+    distro = catalog.distro
 
     def __init__(self, case):
         self.texts = {}

@@ -147,9 +147,9 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
     make(Path("ws"), {**chain_of_packages(30), "q/msg/B.msg": "p0/A a\np7/A b\n"})
     lowered, read = Counter(), Counter()
 
-    def lower(file, name, report):
+    def lower(file, *rest):
         lowered[file.source.path] += 1
-        return lower_(file, name, report)
+        return lower_(file, *rest)
 
     def read_bytes(path, *rest):
         read[str(path)] += 1

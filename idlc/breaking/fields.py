@@ -69,8 +69,24 @@ def _changes(sides: Sides) -> Iterator[Change]:
     for old, new in pairing.kept:
         if new.name in pairing.moved:
             yield _moved(sides, old, new)
+    yield from _optional(sides)
     for old, new in (*pairing.kept, *pairing.renamed):
         yield from _element_changes(sides, old, new)
+
+
+def _optional(sides: Sides) -> Iterator[Change]:
+    """Yield the change that a structure has `@optional` now, for its first field that has it."""
+    first = next((field for field in sides.new.fields if field.optional), None)
+    if first is not None and not any(field.optional for field in sides.old.fields):
+        yield Change(
+            codes.OPTIONAL_ADDED,
+            sides.subject(first.name),
+            f"`{first.name}` is `@optional` now: ROS 2 Kilted and older reject the file",
+            frozenset({"source"}),
+            span=first.name_span,
+            path=sides.path,
+            hint="leave it out; it has no effect",
+        )
 
 
 def _element_changes(sides: Sides, old: ir.Field, new: ir.Field) -> Iterator[Change]:

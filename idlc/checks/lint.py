@@ -19,6 +19,8 @@ RULES = (
     portability.chars,
     portability.nested_bounds,
     portability.several_units,
+    portability.removed_types,
+    portability.changed_types,
 )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import msgspec
 
@@ -11,12 +12,17 @@ from idlc.checks.units import REMARK, is_unit
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Edit, Report, first_few
 from idlc.diagnostics.source import Span
-from idlc.model import ir
+from idlc.model import catalog, ir
 from idlc.model.link import Model
 from idlc.model.lowering.comments import brackets
 
 #: Pairs of brackets that a message names.
 SHOWN = 5
+#: What ROS 2 says to use instead of what it removed.
+_INSTEAD = {
+    "actionlib_msgs": "actions are defined in .action files, and ROS 2 makes messages for them",
+    "geometry_msgs/msg/Pose2D": "use `geometry_msgs/Pose`, or fields `x`, `y` and `theta`",
+}
 
 
 def wide_strings(model: Model, report: Report) -> None:
@@ -112,3 +118,44 @@ def several_units(model: Model, report: Report) -> None:
                         else "put one unit in brackets, and what else there is in words",
                     )
                 )
+
+
+def removed_types(model: Model, report: Report) -> None:
+    """What is used stays: a later distribution has no such type."""
+    for target, span in _used(model):
+        gone = catalog.removed(target, model.distro)
+        if gone is not None:
+            report.add(
+                codes.REMOVED_STANDARD_TYPE.at(
+                    span,
+                    f"ROS 2 {gone.title} removed `{target}`",
+                    hint=_INSTEAD.get(str(target)) or _INSTEAD.get(target.package),
+                )
+            )
+
+
+def changed_types(model: Model, report: Report) -> None:
+    """What is used stays what it is: in a later distribution it has other fields."""
+    for target, span in _used(model):
+        other = catalog.changed(target, model.distro)
+        if other is not None:
+            report.add(
+                codes.CHANGED_STANDARD_TYPE.at(
+                    span,
+                    f"`{target}` is another message since ROS 2 {other.title}",
+                    hint="nodes of older and newer distributions cannot exchange it; "
+                    f"`idlc breaking --distro {other.name} --against distro:{model.distro.name}` "
+                    "shows what changed",
+                )
+            )
+
+
+def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span]]:
+    """Yield the messages of other packages that fields hold, and where they are named."""
+    for message in sections(model):
+        for field in message.fields:
+            element, span = ir.element_of(field.type), field.type_span
+            if span is None or not isinstance(element, ir.Ref):
+                continue
+            if element.target.package != model.package:
+                yield element.target, span

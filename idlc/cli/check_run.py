@@ -26,6 +26,7 @@ class Wishes(msgspec.Struct, frozen=True):
     exclude: tuple[str, ...] = ()
     style: str = "text"
     statistics: bool = False
+    distro: str | None = None
 
 
 def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
@@ -38,7 +39,7 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     if not report.had_errors:
         wanted = CheckOptions(
             paths=paths or settings.paths or (".",),
-            scope=scope(settings, wishes.package, wishes.include, wishes.exclude),
+            scope=scope(settings, wishes.package, wishes.include, wishes.exclude, wishes.distro),
             selection=chosen,
             fix=wishes.fix,
         )

@@ -59,6 +59,14 @@ def rules(context: click.Context, option: click.Parameter, word: str) -> list[Co
     ]
 
 
+def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
+    """Offer what a list of distributions can go on with."""
+    from idlc.model.distro import BY_NAME
+
+    before, comma, last = word.rpartition(",")
+    return [f"{before}{comma}{name}" for name in BY_NAME if name.startswith(last)]
+
+
 def _include(context: click.Context) -> tuple[str, ...]:
     given: Any = context.params.get("include")
     return tuple(given or ())

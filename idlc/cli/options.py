@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 
 import click
 
+from idlc.cli import completion
+
 FORMATS = ("text", "json")
 REPORT_FORMATS = (*FORMATS, "github", "sarif", "junit", "gitlab")
 
@@ -44,6 +46,42 @@ def exclude(command: Command) -> Command:
         multiple=True,
         help="Leave out files or folders such as `msg/ros1/**` or `*_test`. May be repeated.",
     )(command)
+
+
+def distro(command: Command) -> Command:
+    """Add --distro with one name."""
+    return _distro(command, "NAME", "The distribution of ROS 2 to work for.", _one)
+
+
+def distros(command: Command) -> Command:
+    """Add --distro with several names."""
+    return _distro(command, "NAME,...", "Check for these distributions of ROS 2.", _several)
+
+
+def _distro(command: Command, metavar: str, text: str, callback: Any) -> Command:
+    more = "Otherwise `distro` in [tool.idlc], what is installed, or jazzy."
+    return click.option(
+        "--distro",
+        metavar=metavar,
+        help=f"{text} {more}",
+        callback=callback,
+        shell_complete=completion.distros,
+    )(command)
+
+
+def _one(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
+    if value and "," in value:
+        raise click.UsageError("--distro takes one name here; only `idlc check` takes several")
+    return _several(context, option, value)
+
+
+def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | None:
+    from idlc.model.distro import BY_NAME, listed, unknown_distro
+
+    for name in listed(value) if value is not None else ():
+        if name not in BY_NAME:
+            raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
+    return value
 
 
 def style(command: Command) -> Command:

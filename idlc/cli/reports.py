@@ -37,11 +37,13 @@ def write(
             what = counted(len(files), "file")
             if not files and checked.packages:
                 what = f"{counted(checked.packages, 'package')} without interfaces"
-            rest = summary(report) if len(report) else f"no problems in {what}"
+            which = f" for {', '.join(checked.distros)}" if checked.distros else ""
+            rest = summary(report) if len(report) else f"no problems in {what}{which}"
             stream.write(f"{done}{rest}\n")
         case "json":
             output.show(report, style, stream)
-            facts = {"files": len(files), **({"fixed": fixed} if fixed else {})}
+            facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
+            facts |= {"distros": list(checked.distros)} if checked.distros else {}
             output.fact(stream, "summary", **output.counts(report), **facts)
         case "github":
             from idlc.diagnostics.formats import github

@@ -60,6 +60,9 @@ BAD_ESCAPE = Code("IDL107", "bad-escape", ERROR)
 UNIT_ACROSS_LINES = Code("IDL108", "unit-across-lines", ERROR)
 HASH_IN_QUOTES = Code("IDL109", "hash-in-quotes", WARNING)
 UNUSUAL_LINE_END = Code("IDL110", "unusual-line-end", WARNING)
+OPTIONAL_WITHOUT_EFFECT = Code("IDL111", "optional-without-effect", WARNING)
+OPTIONAL_NEEDS_LYRICAL = Code("IDL112", "optional-needs-lyrical", ERROR)
+REPEATED_OPTIONAL = Code("IDL113", "repeated-optional", ERROR)
 
 # names and references
 UNKNOWN_TYPE = Code("IDL201", "unknown-type", ERROR)
@@ -112,6 +115,8 @@ SEVERAL_UNITS = Code("IDL411", "several-units", WARNING)
 WIDE_STRING = Code("IDL421", "wide-string", WARNING)
 CHAR_TYPE = Code("IDL422", "char-type", WARNING)
 NESTED_BOUND = Code("IDL423", "unenforced-bound", WARNING)
+REMOVED_STANDARD_TYPE = Code("IDL424", "removed-standard-type", WARNING)
+CHANGED_STANDARD_TYPE = Code("IDL425", "changed-standard-type", WARNING)
 
 # the package around the interfaces
 MISSING_DEPENDENCY = Code("IDL451", "missing-dependency", WARNING)
@@ -148,6 +153,7 @@ USED_TYPE = Code("IDL515", "used-type-changed", ERROR)
 HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
+OPTIONAL_ADDED = Code("IDL519", "optional-added", ERROR)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
@@ -174,6 +180,7 @@ CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
+NO_TYPE_HASHES = Code("IDL640", "no-type-hashes", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -195,6 +202,7 @@ USAGE: frozenset[str] = frozenset(
         STRUCTURE_TOO_LARGE,
         NO_REVISION,
         DUPLICATE_PACKAGE,
+        NO_TYPE_HASHES,
     )
 )
 

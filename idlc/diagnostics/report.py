@@ -42,6 +42,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     and names it in `path`. `hint` is something to do, in the imperative or as a question.
     `detail` is preformatted text of several lines, such as a diff.
     `levels` is what a change between two versions breaks, `edits` is what `check --fix` does.
+    `distros` are the distributions of ROS 2 that it holds for, where not for all that were asked.
     """
 
     code: str
@@ -54,6 +55,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     detail: str = ""
     levels: tuple[str, ...] = ()
     edits: tuple[Edit, ...] = ()
+    distros: tuple[str, ...] = ()
 
     @property
     def where(self) -> tuple[str, int]:
@@ -64,6 +66,20 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     def breaks(self) -> str:
         """What it breaks, in words, such as `breaks: wire, hash`; empty if that is not said."""
         return f"breaks: {', '.join(self.levels)}" if self.levels else ""
+
+    @property
+    def holds_for(self) -> str:
+        """The distributions that it holds for, in words; empty if for all that were asked."""
+        return f"for: {', '.join(self.distros)}" if self.distros else ""
+
+    @property
+    def identity(self) -> tuple[str, str, int, int, str]:
+        """What two reports of the same problem have in common: code and place."""
+        path, start = self.where
+        end = self.span.end if self.span else -1
+        # what is gone has no place of its own
+        about = "" if self.span and not self.levels else self.message
+        return path, self.code, start, end, about
 
 
 class Report:
@@ -79,11 +95,7 @@ class Report:
 
     def add(self, diagnostic: Diagnostic) -> None:
         """Add a problem unless the same code already stands at the same place."""
-        path, start = diagnostic.where
-        end = diagnostic.span.end if diagnostic.span else -1
-        # what is gone has no place of its own
-        about = "" if diagnostic.span and not diagnostic.levels else diagnostic.message
-        self._found.setdefault((path, diagnostic.code, start, end, about), diagnostic)
+        self._found.setdefault(diagnostic.identity, diagnostic)
         self._had_errors = self._had_errors or diagnostic.severity is Severity.ERROR
 
     def extend(self, diagnostics: Iterable[Diagnostic]) -> None:

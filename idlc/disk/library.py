@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
 from idlc.disk import environment
+from idlc.disk.distribution import installed
 from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
 from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
 from idlc.model import catalog, ir
+from idlc.model.distro import DEFAULT, Distro
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
@@ -59,21 +61,33 @@ class Folder:
 
 
 class Prefix:
-    """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg."""
+    """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg.
 
-    def __init__(self, path: Path) -> None:
+    Standard interfaces of another distribution than that which files are read for are not seen.
+    """
+
+    def __init__(self, path: Path, distro: Distro) -> None:
+        self._path = path
         self._share = path / "share"
+        self._distro = distro
+
+    @cached_property
+    def _is_of_another(self) -> bool:
+        found = installed(self._path)
+        return bool(found and found.name and found.name != self._distro.name)
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield the folder of an installed package."""
-        yield self._share / package
+        if not (catalog.is_standard(package) and self._is_of_another):
+            yield self._share / package
 
     def packages(self) -> Iterable[str]:
         """Return the names of installed packages that have interfaces."""
         try:
-            return [path.name for path in self._share.iterdir() if _has_interfaces(path)]
+            found = [path.name for path in self._share.iterdir() if _has_interfaces(path)]
         except OSError:
             return []
+        return [name for name in found if any(self.roots(name))]
 
 
 def _has_interfaces(root: Path) -> bool:
@@ -85,7 +99,7 @@ class Library:
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
     a single file finds its neighbours, unless they are excluded. Files that cannot be read are
-    reported.
+    reported. `distro` is the distribution that files are read for.
     """
 
     def __init__(
@@ -95,14 +109,16 @@ class Library:
         *,
         own: Mapping[str, Sequence[Path]] | None = None,
         exclude: Exclusions = NOTHING,
+        distro: Distro = DEFAULT,
     ) -> None:
+        self.distro = distro
         places = [Folder(path) for path in folders]
         for path in folders:
             if not is_folder(Path(path)):
                 report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
         self._places: tuple[Folder | Prefix, ...] = (
             *places,
-            *map(Prefix, environment.ament_prefixes()),
+            *(Prefix(path, distro) for path in environment.ament_prefixes()),
         )
         self._own = own or {}
         self._exclude = exclude
@@ -140,19 +156,22 @@ class Library:
         if name not in self._sources:
             path = self.path(name)
             self._sources[name] = (
-                read_source(path, shown(path), self._report) if path else catalog.source(name)
+                read_source(path, shown(path), self._report)
+                if path
+                else catalog.source(name, self.distro)
             )
         return self._sources[name]
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
-        return on_disk or catalog.names(package)
+        return on_disk or catalog.names(package, self.distro)
 
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
-        return tuple(sorted(on_disk or [n for n in catalog.interfaces() if n.package == package]))
+        known = on_disk or catalog.interfaces(self.distro)
+        return tuple(sorted(name for name in known if name.package == package))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, from the first place that has any.
@@ -181,7 +200,7 @@ class Library:
     def packages(self) -> Sequence[str]:
         """Return the names of all packages, sorted."""
         if self._packages is None:
-            found = set(catalog.packages()) | set(self._own)
+            found = set(catalog.packages(self.distro)) | set(self._own)
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
 

@@ -19,6 +19,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.suggest import did_you_mean
 from idlc.disk.read import decode, is_file, read_bytes, shown
+from idlc.model.distro import BY_NAME, listed, unknown_distro
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Report
@@ -39,6 +40,7 @@ class Config(msgspec.Struct, frozen=True):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     vendor_deps: bool = False
+    distro: tuple[str, ...] = ()
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
@@ -51,6 +53,7 @@ _SHAPES = {
     "out": "a string",
     "package": "a string",
     "vendor-deps": "true or false",
+    "distro": "a string or a list of strings",
     "breaking": "a table",
     "check": "a table",
 }
@@ -119,6 +122,7 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         include=tuple(_typed(folder, path) for path in found.get("include", ())),
         exclude=tuple(found.get("exclude", ())),
         vendor_deps=found.get("vendor-deps", False),
+        distro=_distros(found.get("distro", ""), source, report),
         tables={key: value for key, value in found.items() if _SHAPES[key] == "a table"},
         source=source,
         folder=folder,
@@ -131,10 +135,22 @@ def _fits(value: object, shape: str) -> bool:
             return isinstance(value, list) and all(isinstance(item, str) for item in value)
         case "a string":
             return isinstance(value, str)
+        case "a string or a list of strings":
+            return _fits(value, "a string") or _fits(value, "a list of strings")
         case "a table":
             return isinstance(value, dict)
         case _:
             return isinstance(value, bool)
+
+
+def _distros(value: str | list[str], source: Source, report: Report) -> tuple[str, ...]:
+    """Return the names of distributions; report those that are unknown."""
+    names = listed(value) if isinstance(value, str) else value
+    for name in names:
+        if name and name not in BY_NAME:
+            message = f"`distro` in [tool.idlc] has `{name}`, which is no distribution"
+            report.add(wrong(source, "distro", message, unknown_distro(name)))
+    return tuple(name for name in names if name in BY_NAME)
 
 
 def _close(key: str) -> str:

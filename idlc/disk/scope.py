@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.disk.distribution import distribution
 from idlc.disk.exclude import Exclusions, exclusion
+from idlc.model.distro import BY_NAME, DEFAULT, Distro, listed
 
 if TYPE_CHECKING:
     from idlc.disk.pyproject import Config
@@ -18,6 +20,7 @@ class Scope(msgspec.Struct, frozen=True):
     """The package's name if it was given, folders with other packages, files that are left out.
 
     `out` is the folder that [tool.idlc] compiles `paths` into; its name may be the package's.
+    `distros` are the distributions of ROS 2 that files are read for, one except for `check`.
     """
 
     package: str | None = None
@@ -25,6 +28,12 @@ class Scope(msgspec.Struct, frozen=True):
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
+    distros: tuple[Distro, ...] = (DEFAULT,)
+
+    @property
+    def distro(self) -> Distro:
+        """The distribution that files are read for where that is one."""
+        return self.distros[0]
 
 
 def scope(
@@ -32,8 +41,9 @@ def scope(
     package: str | None = None,
     include: Sequence[str] = (),
     exclude: Sequence[str] = (),
+    distro: str | None = None,
 ) -> Scope:
-    """Return what was typed, with what pyproject.toml says."""
+    """Return what was typed, with what pyproject.toml says; `distro` is a list with commas."""
     left_out = [exclusion(exclude, Path.cwd())] if exclude else []
     if settings.exclude and settings.folder is not None:
         left_out.append(exclusion(settings.exclude, settings.folder))
@@ -43,4 +53,11 @@ def scope(
         Exclusions(tuple(left_out)),
         settings.paths,
         settings.out,
+        _distros(listed(distro) if distro else settings.distro),
     )
+
+
+def _distros(names: Sequence[str]) -> tuple[Distro, ...]:
+    """Return the distributions with these names; for none, the one that is installed here."""
+    found = dict.fromkeys(BY_NAME[name] for name in names or (distribution().name,) if name)
+    return tuple(found) or (DEFAULT,)

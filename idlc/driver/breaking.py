@@ -29,6 +29,7 @@ from idlc.disk.output import lock_file
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out, is_revision
 from idlc.disk.scope import Scope
+from idlc.driver.breaking_distro import compare_with_distro, is_distro
 from idlc.driver.stages import models_of, stage
 from idlc.model.link import Model
 
@@ -50,7 +51,8 @@ class BreakingOptions(NamedTuple):
 class Verdict(NamedTuple):
     """What came out: how many changes break each level, and the version part to raise.
 
-    `added` breaks nothing.
+    `added` breaks nothing. There is no part to raise without a difference, and none for
+    a comparison with a distribution.
     """
 
     levels: dict[str, int]
@@ -76,7 +78,7 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     )
     wanted = [change for change in changes if change.levels & set(options.levels)]
     report.extend(change.diagnostic for change in wanted)
-    part = part_to_raise(comparison)
+    part = None if is_distro(options.against) else part_to_raise(comparison)
     version = _version(given, report)
     return Verdict(
         {level: sum(level in change.levels for change in wanted) for level in LEVELS},
@@ -91,6 +93,8 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
 def _against(
     options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
+    if is_distro(options.against):
+        return compare_with_distro(options.against, given, options.scope, report)
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], report) as revision:

@@ -33,11 +33,15 @@ class CheckOptions(msgspec.Struct, frozen=True):
 
 
 class Checked(msgspec.Struct, frozen=True):
-    """The files and packages that were looked at, and how many edits were made."""
+    """The files and packages that were looked at, and how many edits were made.
+
+    `distros` are the distributions that they were checked for, if those are several.
+    """
 
     files: tuple[str, ...]
     packages: int = 0
     fixed: int = 0
+    distros: tuple[str, ...] = ()
 
 
 def check(options: CheckOptions, report: Report) -> Checked:
@@ -77,15 +81,33 @@ def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnost
     for path in there.empty:
         if not any(one.home.is_relative_to(absolute(path)) for one in packages):
             report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
-    everything = Report()
-    library = library_for(packages, scope, everything)
-    texts: list[Source] = []
-    for given, model in Compiler(library).all(packages, everything):
-        mine = model.only(given.names)
-        texts += [one.source for one in mine.own if one.source]
-        _advise(given, mine, library, scope.exclude, everything)
+    found: dict[str, Report] = {}
+    texts: dict[str, Source] = {}
+    for distro in scope.distros:
+        found[distro.name] = Report()
+        alone = msgspec.structs.replace(scope, distros=(distro,))
+        texts |= _compiled(packages, alone, found[distro.name])
     files = tuple(file.shown for file in there.files)
-    return Checked(files, len(packages)), _wanted(everything, texts, options.selection)
+    sources = list(texts.values())
+    if len(found) == 1:
+        (everything,) = found.values()
+        return Checked(files, len(packages)), _wanted(everything, sources, options.selection)
+    from idlc.diagnostics.merge import merged, without_overruled
+
+    wanted = _wanted(merged(found), sources, options.selection)
+    checked = Checked(files, len(packages), distros=tuple(found))
+    return checked, list(without_overruled(wanted))
+
+
+def _compiled(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Source]:
+    """Report what is wrong for one distribution; return the texts by path."""
+    library = library_for(packages, scope, report)
+    texts: dict[str, Source] = {}
+    for given, model in Compiler(library).all(packages, report):
+        mine = model.only(given.names)
+        texts |= {one.source.path: one.source for one in mine.own if one.source}
+        _advise(given, mine, library, scope.exclude, report)
+    return texts
 
 
 def _advise(

@@ -50,6 +50,7 @@ def fmt(
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
     from idlc.diagnostics.source import Source
+    from idlc.model.distro import NEWEST
     from idlc.model.lowering.file import lower
     from idlc.model.meaning import meaning
     from idlc.syntax.format import format_file
@@ -58,13 +59,13 @@ def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
     problems, again = Report(), Report()
     name = ir.TypeName("package", file.kind, file.name)
     tree = parse(source)
-    before = lower(tree, name, problems)
+    before = lower(tree, name, problems, NEWEST)
     if problems.had_errors:
         report.extend(one for one in problems if one.severity is Severity.ERROR)
         return Formatted(file.shown)
     new = format_file(tree)
     if new != source.text:
-        after = lower(parse(Source(file.shown, new)), name, again)
+        after = lower(parse(Source(file.shown, new)), name, again, NEWEST)
         if again.had_errors or meaning(after) != meaning(before):
             raise AssertionError("the layout would change the meaning; the file was left alone")
     return Formatted(file.shown, source.text, new)

@@ -75,7 +75,7 @@ def _named(words: Sequence[str], scope: Scope, report: Report) -> list[inputs.In
     chosen: dict[str, set[ir.TypeName]] = {}
     found = []
     for word in words:
-        library, meant = named_types.resolve(word, scope.include, report)
+        library, meant = named_types.resolve(word, scope, report)
         for one in meant:
             chosen.setdefault(one.interface.package, set()).add(one.interface)
         found += [(library, package) for package in {one.interface.package for one in meant}]

@@ -12,6 +12,7 @@ from idlc.diagnostics.suggest import closest, did_you_mean
 from idlc.disk import nearby
 from idlc.disk.library import Library
 from idlc.disk.read import shown
+from idlc.disk.scope import Scope
 from idlc.model import ir
 
 _DIVIDER = re.compile(r"/|\.|::")
@@ -33,9 +34,9 @@ class Meant(NamedTuple):
     interface: ir.TypeName
 
 
-def packages(include: Sequence[str], report: Report) -> list[Package]:
+def packages(scope: Scope, report: Report) -> list[Package]:
     """Return all packages that are known here, those below the working folder included."""
-    library = _wide(include, report)
+    library = _wide(scope, report)
     return [_package(name, library) for name in library.packages()]
 
 
@@ -44,9 +45,9 @@ def _package(name: str, library: Library) -> Package:
     return Package(name, len(library.interfaces(name)), shown(home) if home else None)
 
 
-def interfaces(wanted: Sequence[str], include: Sequence[str], report: Report) -> list[str]:
+def interfaces(wanted: Sequence[str], scope: Scope, report: Report) -> list[str]:
     """Return the names of all interfaces of packages; reports IDL618."""
-    library = _wide(include, report)
+    library = _wide(scope, report)
     found = []
     for package in wanted:
         names = [str(one) for one in library.interfaces(package)]
@@ -58,24 +59,25 @@ def interfaces(wanted: Sequence[str], include: Sequence[str], report: Report) ->
     return found
 
 
-def _near(include: Sequence[str], report: Report) -> Library:
-    return Library(include, report, own=nearby.near())
+def _near(scope: Scope, report: Report) -> Library:
+    return Library(scope.include, report, own=nearby.near(), distro=scope.distro)
 
 
-def _wide(include: Sequence[str], report: Report) -> Library:
-    return Library(include, report, own={**nearby.below(), **nearby.near()})
+def _wide(scope: Scope, report: Report) -> Library:
+    own = {**nearby.below(), **nearby.near()}
+    return Library(scope.include, report, own=own, distro=scope.distro)
 
 
-def resolve(text: str, include: Sequence[str], report: Report) -> tuple[Library, tuple[Meant, ...]]:
+def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Meant, ...]]:
     """Return the types that a text means, and where they are found; reports IDL618.
 
     `package/kind/Name`, `package/Name` and `Name` mean one type, also with dots or `::`, and
     `package` means all of its interfaces. Folders below are searched for what is not found else.
     """
-    library = _near(include, report)
+    library = _near(scope, report)
     meant = _meant(text, library)
     if not meant:
-        library = _wide(include, Report())
+        library = _wide(scope, Report())
         meant = _meant(text, library)
     if len(meant) == 1 or text in library.packages():
         return library, meant

@@ -12,6 +12,7 @@ from idlc.disk.find import find, is_path
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.stages import compile_package, derived_names, sound_models, stage
+from idlc.model.distro import Distro, later
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
     """Return type hash and full name of what paths and type names mean, derived types included."""
     found: list[tuple[str, str]] = []
+    if not _has_hashes(scope.distro, report):
+        return found
     for model, names in wanted_models(wanted, scope, report):
         with stage("describe", model.package):
             found += [(model.describer.hash(name), name) for name in names]
@@ -28,6 +31,8 @@ def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[st
 
 def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
+    if not _has_hashes(scope.distro, report):
+        return None
     found = list(wanted_models((wanted,), scope, report))
     if report.had_errors or not found:
         return None
@@ -42,6 +47,16 @@ def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | N
         return {**model.describer.installed(tops[0])}
 
 
+def _has_hashes(distro: Distro, report: Report) -> bool:
+    """Return whether a distribution has type hashes and descriptions; report IDL640 otherwise."""
+    if not distro.has_hashes:
+        first = next(one for one in later(distro) if one.has_hashes)
+        message = f"ROS 2 {distro.title} has no type hashes and no type descriptions"
+        hint = f"they came with {first.title}; say for which distribution, as in `--distro jazzy`"
+        report.add(codes.NO_TYPE_HASHES.of("", message, hint=hint))
+    return distro.has_hashes
+
+
 def wanted_models(
     wanted: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
@@ -53,7 +68,7 @@ def wanted_models(
     for one in wanted:
         if one not in paths:
             found = Report()
-            yield from _named(one, scope.include, found)
+            yield from _named(one, scope, found)
             report.extend(found)
     if paths:
         there = Report()
@@ -64,9 +79,9 @@ def wanted_models(
             yield from sound_models(given, scope, report)
 
 
-def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[Model, list[str]]]:
+def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, list[str]]]:
     """Yield the models that a type's or package's name means, and the names that are meant."""
-    library, meant = named_types.resolve(text, include, report)
+    library, meant = named_types.resolve(text, scope, report)
     for name, interface in meant:
         source = library.source(interface)
         model = source and compile_package(

@@ -8,10 +8,12 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.disk import pyproject
 from idlc.disk.enclosing_package import MANIFEST, declared_name, manifest
 from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
 from idlc.disk.read import absolute, shown
+from idlc.disk.scope import scope
 from idlc.driver.stages import compile_package, stage
 from idlc.emit.render import support_packages
 from idlc.model import derive, ir
@@ -29,6 +31,13 @@ class Settings(NamedTuple):
     force: bool = False
     include: tuple[str, ...] = ()
     launch: bool = True
+
+
+def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
+    """Return the library that has a package and what is used in it."""
+    distro = scope(pyproject.load(Report())).distro
+    own = {package: (project.path,)}
+    return Library(settings.include, report, own=own, distro=distro)
 
 
 class Result(NamedTuple):
@@ -85,7 +94,7 @@ def interface(
     path = f"{kind}/{name}.{kind}"
     text = interface_text.text(kind, fields, comment)
     full = ir.TypeName(own, kind, name)
-    library = Library(settings.include, report, own={own: (project.path,)})
+    library = library_around(own, project, settings, report)
     problems = Report()
     model = compile_package(own, [(full, Source(project.shown(path), text))], library, problems)
     report.extend(problems)

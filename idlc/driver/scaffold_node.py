@@ -14,6 +14,7 @@ from idlc.driver.scaffold import (
     accepted,
     find_package,
     generation,
+    library_around,
     manifest_edit,
     write,
 )
@@ -63,7 +64,7 @@ def _planned(
     wanted: spec.Node, project: Project, settings: Settings, report: Report
 ) -> Plan | None:
     """Return the node with the interfaces that its endpoints name; reports IDL618."""
-    library = Library(settings.include, report, own={wanted.package: (project.path,)})
+    library = library_around(wanted.package, project, settings, report)
     interfaces: list[ir.Interface] = []
     messages: dict[ir.TypeName, ir.Message] = {}
     for endpoint in wanted.endpoints:
@@ -87,7 +88,7 @@ def check_type(role: spec.Role, type_: str, settings: Settings) -> None:
     found = find_package(settings, report)
     if found is None:
         return  # which is said when the node is written
-    library = Library(settings.include, report, own={found[1]: (found[0].path,)})
+    library = library_around(found[1], found[0], settings, report)
     _type_name(spec.Endpoint(role, type_, ""), found[1], library, report)
     for problem in report:
         raise ValueError("; ".join(filter(None, (problem.message, problem.hint))))

@@ -51,5 +51,8 @@ def _text(interface: ir.Interface, model: Model, style: str) -> str:
 
 def _lines(interface: ir.Interface, model: Model, outline: Iterator[str]) -> Iterator[str]:
     """Yield an outline below the interface's name and hash."""
-    yield f"# {interface.name}\n# {model.describer.hash(str(interface.name))}\n\n"
+    yield f"# {interface.name}\n"
+    if model.distro.has_hashes:
+        yield f"# {model.describer.hash(str(interface.name))}\n"
+    yield "\n"
     yield from (f"{line}\n" for line in outline)

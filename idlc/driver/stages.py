@@ -68,7 +68,7 @@ class Compiler:
                 tree = parse(source)
             with stage("lower", source.path):
                 found = Report()
-                own.append(lower(tree, name, found))
+                own.append(lower(tree, name, found, self.library.distro))
                 self._pool.add(own[-1], found)
                 report.extend(found)
         return tuple(own)
@@ -118,7 +118,7 @@ def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeNa
 def library_for(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> Library:
     """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
-    return Library(scope.include, report, own=own, exclude=scope.exclude)
+    return Library(scope.include, report, own=own, exclude=scope.exclude, distro=scope.distro)
 
 
 def models_of(

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 
 from idlc.model import derive, ir
+from idlc.syntax.tree import OPTIONAL
 
 _INDENT = "  "
 
@@ -78,6 +79,8 @@ def _member(field: ir.Field) -> Iterator[str]:
         yield f"@default (value={_literal(field.default.value)})"
     if field.unit is not None:
         yield f"@unit (value={_text(field.unit)})"
+    if field.optional:
+        yield OPTIONAL
     match field.type:
         case ir.Array():
             type_ = f"{_short(field.type.element)}__{field.type.size}"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.model.spelling import spell, spell_value
+from idlc.syntax.tree import OPTIONAL
 
 INDENT = "    "
 GAP = 2
@@ -40,7 +41,8 @@ def _fields(message: ir.Message, model: Model, depth: int) -> Iterator[tuple[str
         unit = f" [{field.unit}]" if field.unit else ""
         *before, last = field.comment or ("",)
         comment = tuple(line for line in (*before, f"{last}{unit}".strip()) if line)
-        yield f"{INDENT * depth}{spell(field.type)} {field.name}{default}", comment
+        optional = f"{OPTIONAL} " if field.optional else ""
+        yield f"{INDENT * depth}{optional}{spell(field.type)} {field.name}{default}", comment
         element = ir.element_of(field.type)
         if isinstance(element, ir.Ref):
             nested = model.messages[element.target]

@@ -20,7 +20,7 @@ def facts(interface: ir.Interface, model: Model) -> Json:
     used = [model.messages[name] for name in _used(derive.sections(interface), model)]
     return {
         "name": str(interface.name),
-        "hash": model.describer.hash(str(interface.name)),
+        "hash": model.describer.hash(str(interface.name)) if model.distro.has_hashes else None,
         "structures": [_structure(part) for part in derive.sections(interface)],
         "uses": [_structure(part) for part in used],
     }
@@ -51,6 +51,7 @@ def _field(field: ir.Field) -> Json:
         "unit": field.unit,
         "comment": list(field.comment),
         **default,
+        **({"optional": True} if field.optional else {}),
     }
 
 

@@ -1,12 +1,14 @@
-"""ROS 2 Jazzy's standard interfaces, built in, so that a machine without ROS compiles them too.
+"""ROS 2's standard interfaces, built in, so that a machine without ROS compiles them too.
 
-`catalog.json` holds names, types, defaults and constants, no comments; it is turned into
-interface text, so that there is one way from text to meaning.
+`catalog.json` holds those that are alike in all distributions, `catalog_differences.json` the
+others; `catalog.md` says where they come from. They are names, types, defaults and constants, no
+comments, and are turned into interface text, so that there is one way from text to meaning.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Hashable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -15,18 +17,42 @@ import msgspec
 
 from idlc.diagnostics.source import Source
 from idlc.model import ir
+from idlc.model.distro import DEFAULT, DISTROS, NEWEST, Distro, later
+
+#: The distribution that is meant where a function is not told.
+distro = DEFAULT
+
+_HERE = Path(__file__)
 
 
 @lru_cache(maxsize=1)
-def _entries() -> dict[str, msgspec.Raw]:
-    data = Path(__file__).with_name("catalog.json").read_bytes()
+def _common() -> dict[str, msgspec.Raw]:
+    data = _HERE.with_name("catalog.json").read_bytes()
     return msgspec.json.decode(data, type=dict[str, msgspec.Raw])
 
 
 @lru_cache(maxsize=1)
-def _messages() -> dict[str, list[str]]:
+def _differences() -> dict[str, dict[str, msgspec.Raw]]:
+    """Return definitions by name, and by the names of the distributions that have them."""
+    data = _HERE.with_name("catalog_differences.json").read_bytes()
+    return msgspec.json.decode(data, type=dict[str, dict[str, msgspec.Raw]])
+
+
+@lru_cache
+def _entries(of: Distro) -> dict[str, msgspec.Raw]:
+    own = {
+        name: definition
+        for name, variants in _differences().items()
+        for distros, definition in variants.items()
+        if of.name in distros.split()
+    }
+    return dict(sorted({**_common(), **own}.items()))
+
+
+@lru_cache
+def _messages(of: Distro) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
-    for key in _entries():
+    for key in _entries(of):
         name = ir.TypeName.parse(key)
         messages = found.setdefault(name.package, [])
         if name.kind == "msg":
@@ -34,34 +60,80 @@ def _messages() -> dict[str, list[str]]:
     return found
 
 
-def interfaces() -> tuple[ir.TypeName, ...]:
-    """Return the names of all interfaces in the catalogue, sorted."""
-    return tuple(map(ir.TypeName.parse, _entries()))
+def interfaces(of: Distro = DEFAULT) -> tuple[ir.TypeName, ...]:
+    """Return the names of all interfaces of a distribution, sorted."""
+    return tuple(map(ir.TypeName.parse, _entries(of)))
 
 
-def source(name: ir.TypeName) -> Source | None:
-    """Return the text of an interface, or `None` if the catalogue does not have it."""
-    entry = _entries().get(str(name))
-    if entry is None:
+def source(name: ir.TypeName, of: Distro = DEFAULT) -> Source | None:
+    """Return the text of an interface, or `None` if the distribution does not have it."""
+    sections = _sections(str(name), of)
+    if sections is None:
         return None
-    sections = msgspec.json.decode(entry, type=list[dict[str, list[list[Any]]]])
     text = "---\n".join(_section(section) for section in sections)
-    return Source(f"<catalogue>/{name}.{name.kind}", text)
+    return Source(f"<{of.name}>/{name}.{name.kind}", text)
 
 
-def names(package: str) -> Iterable[str]:
+def names(package: str, of: Distro = DEFAULT) -> Iterable[str]:
     """Return the names of a package's messages."""
-    return _messages().get(package, ())
+    return _messages(of).get(package, ())
 
 
-def packages() -> Iterable[str]:
+def packages(of: Distro = DEFAULT) -> Iterable[str]:
     """Return the names of the packages."""
-    return _messages()
+    return _messages(of)
 
 
 def nearby(_: str) -> str | None:
     """Return `None`: what is not built in is not near either."""
     return None
+
+
+def is_standard(package: str) -> bool:
+    """Return whether a package is one of any distribution's."""
+    return any(package in _messages(one) for one in DISTROS)
+
+
+def holding(name: ir.TypeName) -> tuple[Distro, ...]:
+    """Return the distributions that have an interface."""
+    return tuple(one for one in DISTROS if str(name) in _entries(one))
+
+
+def removed(name: ir.TypeName, of: Distro) -> Distro | None:
+    """Return the distribution since which an interface of an earlier one is gone."""
+    holders = holding(name)
+    if of not in holders or NEWEST in holders:
+        return None
+    return later(holders[-1])[0]
+
+
+def changed(name: ir.TypeName, of: Distro) -> Distro | None:
+    """Return the first distribution after one in which a message has other bytes."""
+    here = _layout(str(name), of)
+    others = ((one, _layout(str(name), one)) for one in later(of))
+    return next((one for one, layout in others if here and layout and layout != here), None)
+
+
+def _sections(key: str, of: Distro) -> list[dict[str, list[list[Any]]]] | None:
+    entry = _entries(of).get(key)
+    if entry is None:
+        return None
+    return msgspec.json.decode(entry, type=list[dict[str, list[list[Any]]]])
+
+
+@lru_cache(maxsize=1024)
+def _layout(key: str, of: Distro) -> tuple[Hashable, ...]:
+    """Return the fields of a message, with those of the messages in it; empty if not there."""
+    return tuple(
+        (type_, name, _layout(_target(type_), of) if "/" in type_ else ())
+        for section in _sections(key, of) or ()
+        for type_, name, *_ in section["fields"]
+    )
+
+
+def _target(type_: str) -> str:
+    """Return the full name of the message that a type such as `std_msgs/Header[3]` holds."""
+    return re.sub(r"(\w+)/(\w+).*", r"\1/msg/\2", type_)
 
 
 def _section(section: dict[str, list[list[Any]]]) -> str:
@@ -75,5 +147,6 @@ def _section(section: dict[str, list[list[Any]]]) -> str:
 
 def _literal(value: Any) -> str:
     if isinstance(value, list):
-        return f"[{', '.join(map(_literal, value))}]"
+        texts = (f'"{one}"' if isinstance(one, str) else str(one) for one in value)
+        return f"[{', '.join(texts)}]"
     return str(value)

@@ -133,13 +133,17 @@ class Default(msgspec.Struct, frozen=True):
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True):
-    """A field. `comment` is condensed (language 1.4) but not yet escaped; `unit` likewise."""
+    """A field. `comment` is condensed (language 1.4) but not yet escaped; `unit` likewise.
+
+    `optional` is whether it has `@optional`, which has no effect (language 10).
+    """
 
     name: str
     type: FieldType
     default: Default | None = None
     comment: tuple[str, ...] = ()
     unit: str | None = None
+    optional: bool = False
     name_span: Span | None = None
     type_span: Span | None = None
     default_span: Span | None = None

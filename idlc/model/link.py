@@ -12,6 +12,7 @@ from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.suggest import did_you_mean, package_hint
 from idlc.model import catalog, derive, ir, names
 from idlc.model.circles import circles
+from idlc.model.distro import DEFAULT, Distro, titles
 from idlc.model.lowering import slips
 from idlc.model.lowering.types import STRINGS
 from idlc.model.pool import Pool
@@ -40,6 +41,10 @@ class Library(Protocol):
 
     def nearby(self, package: str) -> str | None:
         """Return how to have a package looked for where it lies, if that is near."""
+
+    @property
+    def distro(self) -> Distro:
+        """The distribution of ROS 2 that files are read for."""
 
 
 class Model:
@@ -78,6 +83,11 @@ class Model:
         describer = self._pool.describer if self._pool else Describer({})
         describer.add(self.interfaces)
         return describer
+
+    @property
+    def distro(self) -> Distro:
+        """The distribution of ROS 2 that the files were read for."""
+        return self._pool.library.distro if self._pool else DEFAULT
 
     def only(self, names: Container[ir.TypeName]) -> Model:
         """Return the model with those of its own interfaces that have one of these names."""
@@ -175,7 +185,9 @@ class _Unknown:
             return codes.UNKNOWN_PACKAGE.at(
                 span.at(0, len(target.package)),
                 f"unknown package `{target.package}`",
-                hint=self._library.nearby(target.package) or package_hint(target.package, packages),
+                hint=self._library.nearby(target.package)
+                or _of_others(target)
+                or package_hint(target.package, packages),
             )
         at = span.at(written.rfind("/") + 1, len(written))
         hint = self._hint(target, qualified="/" in written)
@@ -190,6 +202,7 @@ class _Unknown:
         return (
             (None if qualified else self._elsewhere(target.name))
             or self._misnamed(target)
+            or _of_others(target)
             or self._near(target)
             or _missing(target, self._library)
         )
@@ -224,13 +237,24 @@ class _Unknown:
 def _missing(target: ir.TypeName, library: Library) -> str:
     """Return the hint for a name that is like none of its package."""
     package, name = target.package, target.name
-    known = set(library.names(package))
-    if known and known == set(catalog.names(package)):
+    known, distro = set(library.names(package)), library.distro
+    if known and known == set(catalog.names(package, distro)):
         return (
-            f"the built-in `{package}` is that of ROS 2 Jazzy, which has no `{name}`; "
+            f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`; "
             "if yours does, add `-I DIR` with its sources, or source your ROS 2"
         )
     return f"there is no `{name}.msg` in package `{package}`"
+
+
+def _of_others(target: ir.TypeName) -> str | None:
+    """Return the hint for a message that other distributions have."""
+    others = catalog.holding(target)
+    if not others:
+        return None
+    return (
+        f"it is built in for {titles(others)}; if your ROS 2 has it, add `-I DIR` with its "
+        "sources, or source your ROS 2"
+    )
 
 
 def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:

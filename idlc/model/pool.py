@@ -60,7 +60,7 @@ class Pool:
             self._entries[name] = None
             if source is not None:
                 found = Report()
-                self.add(lower(parse(source), name, found), found)
+                self.add(lower(parse(source), name, found, self.library.distro), found)
         return self._entries[name]
 
     def __getitem__(self, name: ir.TypeName) -> Entry:

@@ -23,6 +23,7 @@ from idlc.syntax.parse import parse_definition
 TAB_WIDTHS = (8, 4)
 #: Kinds of words in the order in which they stand, and the narrow gaps before them, usual first.
 NARROW = {
+    "type": (" ", ""),
     "name": (" ",),
     "default": (" ",),
     "sign": (" ", ""),
@@ -129,14 +130,20 @@ def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[
 
 
 def _words(line: tree.Line) -> Iterator[_Word]:
-    text = line.definition
+    rest = line.after_optional or line
+    before = len(line.code) - len(rest.code)
+    text = rest.definition
     end = 0
+    if rest is not line:
+        yield _Word("annotation", "", tree.OPTIONAL)
+        end = len(tree.OPTIONAL)
     for kind, piece in _pieces(text) if text else ():
         if piece.text:
+            start = before + piece.start
             # what counts as a blank between words, such as a no-break space, becomes one
-            gap = re.sub(r"[^ \t]", " ", line.code[end : piece.start])
-            yield _Word(kind, gap, line.code[piece.start : piece.end])
-            end = piece.end
+            gap = re.sub(r"[^ \t]", " ", line.code[end:start])
+            end = before + piece.end
+            yield _Word(kind, gap, line.code[start:end])
     if line.comment:
         yield _Word("comment", re.sub(r"[^ \t]", " ", line.code[end:]), line.comment.rstrip())
 

@@ -14,6 +14,8 @@ from idlc.diagnostics.source import Source, Span
 
 #: An ordinary character for ROS 2, and therefore wrong wherever it stands (language 1.1).
 BYTE_ORDER_MARK = "\ufeff"
+#: What may begin a line before its definition, in distributions that read it (language 10).
+OPTIONAL = "@optional"
 
 
 class Piece(msgspec.Struct, frozen=True):
@@ -84,6 +86,15 @@ class Line(msgspec.Struct, frozen=True):
     def definition(self) -> str:
         """The code as a definition: TABs as spaces, nothing behind it; may be empty."""
         return self.code.replace("\t", " ").rstrip()
+
+    @property
+    def after_optional(self) -> Line | None:
+        """What follows `@optional` in a line that begins with it; no blank need, nor anything."""
+        if not self.code.startswith(OPTIONAL):
+            return None
+        code = self.code[len(OPTIONAL) :].lstrip()
+        start = self.start + len(self.code) - len(code)
+        return Line(start, code, self.comment, self.newline)
 
 
 class Section(msgspec.Struct, frozen=True):

@@ -38,8 +38,9 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock",
-    help="The version to compare with: a folder, a git revision, or the type hashes in a lock.",
+    metavar="DIR|git:REF|idlc.lock|distro:NAME",
+    help="The version to compare with: a folder, a git revision, the type hashes in a lock, or "
+    "the standard interfaces of a distribution.",
 )
 @click.option(
     "--level",
@@ -51,6 +52,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 @options.package
 @options.include
 @options.exclude
+@options.distro
 @options.report_style
 def command(
     paths: tuple[str, ...],
@@ -59,12 +61,16 @@ def command(
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
+    distro: str | None,
     style: str,
 ) -> int:
     """Report what a new version of interfaces breaks, and for whom.
 
     wire: bytes recorded before are read wrongly or not at all. hash: endpoints of both versions
     do not talk. source: code fails. behaviour: the same code does something else.
+
+    With distro:NAME, the standard interfaces that PATH uses are compared with that
+    distribution's, or all of them if there is no PATH.
     """
     import datetime
 
@@ -73,19 +79,20 @@ def command(
     from idlc.disk import command_settings, pyproject
     from idlc.disk.scope import scope
     from idlc.driver.breaking import BreakingOptions, breaking
+    from idlc.driver.breaking_distro import is_distro
 
     report = Report()
     settings = pyproject.load(report)
     against = against or command_settings.against(settings, report)
     allowed = command_settings.allowances(settings, report)
     if against is None and not report.had_errors:
-        raise click.UsageError("give --against DIR, git:REF or idlc.lock")
+        raise click.UsageError("give --against DIR, git:REF, idlc.lock or distro:NAME")
     verdict = None
     if against is not None and not report.had_errors:
         wanted = BreakingOptions(
-            paths=paths or settings.paths or (".",),
+            paths=paths or settings.paths or (() if is_distro(against) else (".",)),
             against=against,
-            scope=scope(settings, package, include, exclude),
+            scope=scope(settings, package, include, exclude, distro),
             levels=levels or LEVELS,
             allowed=allowed,
             allowed_in=settings.source.path if settings.source else "",
@@ -125,7 +132,8 @@ def _summary(verdict: Verdict) -> str:
     if verdict.added:
         text += f"; added: {first_few(verdict.added, 5)}"
     if verdict.part is None:
-        return f"{text}; the versions are the same"
+        same = not (parts or verdict.allowed or verdict.added)
+        return f"{text}; the versions are the same" if same else text
     if verdict.next_version:
         return f"{text}; the next version after {verdict.version} is {verdict.next_version}"
     return f"{text}; raise the {verdict.part} version"

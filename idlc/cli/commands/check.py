@@ -31,6 +31,7 @@ Example:
 @options.package
 @options.include
 @options.exclude
+@options.distros
 @options.report_style
 def command(
     paths: tuple[str, ...],
@@ -42,6 +43,7 @@ def command(
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
+    distro: str | None,
     style: str,
 ) -> int:
     """Report every problem of interface files and of the packages around them.
@@ -49,10 +51,14 @@ def command(
     PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
     or .action file; without it, `paths` in pyproject.toml, or the working folder.
 
+    For several distributions, each problem is told once, with those for which it holds.
+
     Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
     """
     from idlc.cli.check_run import Wishes, check_paths
 
     options.check_rules(select, ignore)
-    wishes = Wishes(select, ignore, fix, strict, package, include, exclude, style, statistics)
+    wishes = Wishes(
+        select, ignore, fix, strict, package, include, exclude, style, statistics, distro
+    )
     return check_paths(paths, wishes)

@@ -25,7 +25,8 @@ Example:
 )
 @options.package
 @options.include
-def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:
+@options.distro
+def command(wanted: str, package: str | None, include: tuple[str, ...], distro: str | None) -> int:
     """Print a type description with its hashes: the JSON that ROS 2 installs."""
     import json
 
@@ -37,7 +38,7 @@ def command(wanted: str, package: str | None, include: tuple[str, ...]) -> int:
 
     report = Report()
     settings = pyproject.load(report)
-    where = scope(settings, package, include)
+    where = scope(settings, package, include, distro=distro)
     content = None if report.had_errors else describe(wanted, where, report)
     if content is not None:
         sys.stdout.write(json.dumps(content, indent=2) + "\n")

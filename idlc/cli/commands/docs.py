@@ -24,12 +24,14 @@ Example:
 @options.package
 @options.include
 @options.exclude
+@options.distro
 def command(
     paths: tuple[str, ...],
     out: str,
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
+    distro: str | None,
 ) -> int:
     """Write a static HTML site about interfaces: links, units, constants, hashes, a search.
 
@@ -47,7 +49,7 @@ def command(
     pages = 0
     if not report.had_errors:
         paths = paths or settings.paths or (".",)
-        pages = docs(paths, out, scope(settings, package, include, exclude), report)
+        pages = docs(paths, out, scope(settings, package, include, exclude, distro), report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     if pages:

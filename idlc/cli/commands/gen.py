@@ -32,6 +32,7 @@ All options can be kept in pyproject.toml:
 @options.package
 @options.include
 @options.exclude
+@options.distro
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
 @click.option(
@@ -58,7 +59,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     if report.had_errors:
         output.show(report, style, sys.stdout if style == "json" else sys.stderr)
         return output.status(report)
-    words = (given.pop("package"), given.pop("include"), given.pop("exclude"))
+    words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
     wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
     if not wanted.paths or not wanted.out:
         missing = "-o OUT" if wanted.paths else "PATH"

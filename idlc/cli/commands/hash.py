@@ -28,11 +28,13 @@ Example:
 @options.package
 @options.include
 @options.exclude
+@options.distro
 def command(
     wanted: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
+    distro: str | None,
 ) -> int:
     """Print type hashes (RIHS01), derived types of services and actions included.
 
@@ -47,7 +49,7 @@ def command(
     report = Report()
     settings = pyproject.load(report)
     if not report.had_errors:
-        where = scope(settings, package, include, exclude)
+        where = scope(settings, package, include, exclude, distro)
         for value, name in hashes(wanted, where, report):
             sys.stdout.write(f"{value}  {name}\n")
     output.show(report, "text", sys.stderr)

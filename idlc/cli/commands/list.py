@@ -19,22 +19,28 @@ Example:
 @click.command("list", epilog=EPILOG)
 @click.argument("packages", metavar="[PACKAGE]...", nargs=-1, shell_complete=completion.packages)
 @options.include
+@options.distro
 @options.style
-def command(packages: tuple[str, ...], include: tuple[str, ...], style: str) -> int:
+def command(
+    packages: tuple[str, ...], include: tuple[str, ...], distro: str | None, style: str
+) -> int:
     """List the packages that are known here, or the interfaces of some.
 
-    Known are packages below the working folder, along -I, in the ament prefixes, and the built-in
-    ones of ROS 2 Jazzy.
+    Known are packages below the working folder, along -I, in the ament prefixes, and the standard
+    ones of a distribution, which are built in.
     """
     from idlc.cli import output
     from idlc.diagnostics.formats.terminal import counted
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.visible import one_line
+    from idlc.disk import pyproject
+    from idlc.disk.scope import scope
     from idlc.driver import named_types
 
     report = Report()
-    found = [] if packages else named_types.packages(include, report)
-    names = named_types.interfaces(packages, include, report) if packages else []
+    where = scope(pyproject.load(report), include=include, distro=distro)
+    found = [] if packages else named_types.packages(where, report)
+    names = named_types.interfaces(packages, where, report) if packages else []
     if style == "json":
         for package in found:
             output.fact(sys.stdout, "package", **package._asdict())
@@ -43,9 +49,9 @@ def command(packages: tuple[str, ...], include: tuple[str, ...], style: str) -> 
     else:
         width = max((len(package.name) for package in found), default=0)
         for name, number, path in found:
-            where = one_line(path) if path else "built in"
+            place = one_line(path) if path else "built in"
             count = counted(number, "interface")
-            sys.stdout.write(f"{name:{width}}  {count:>14}  {where}\n")
+            sys.stdout.write(f"{name:{width}}  {count:>14}  {place}\n")
         sys.stdout.writelines(f"{name}\n" for name in names)
     output.show(report, "text", sys.stderr)
     return output.status(report)

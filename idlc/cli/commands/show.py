@@ -35,7 +35,10 @@ Example:
 )
 @options.package
 @options.include
-def command(wanted: str, style: str, package: str | None, include: tuple[str, ...]) -> int:
+@options.distro
+def command(
+    wanted: str, style: str, package: str | None, include: tuple[str, ...], distro: str | None
+) -> int:
     """Show an interface with the messages in it and all comments."""
     from idlc.cli import output
     from idlc.diagnostics.report import Report
@@ -46,7 +49,7 @@ def command(wanted: str, style: str, package: str | None, include: tuple[str, ..
 
     report = Report()
     settings = pyproject.load(report)
-    where = scope(settings, package, include)
+    where = scope(settings, package, include, distro=distro)
     texts = [] if report.had_errors else show(wanted, style, where, report)
     text = "\n".join(texts)
     if style == "text" or sys.stdout.isatty():  # other formats are for other tools

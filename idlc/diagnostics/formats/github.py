@@ -17,7 +17,8 @@ def lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
         listed = ",".join(
             f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
         )
-        text = "\n".join(one_line(part) for part in (one.message, one.breaks, one.hint) if part)
+        parts = (one.message, one.breaks, one.holds_for, one.hint)
+        text = "\n".join(one_line(part) for part in parts if part)
         yield f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
 
 

@@ -20,7 +20,7 @@ def _issue(one: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
     return {
         "type": "issue",
         "check_name": one.code,
-        "description": "; ".join(filter(None, (one.message, one.breaks))),
+        "description": "; ".join(filter(None, (one.message, one.breaks, one.holds_for))),
         "severity": "major" if one.severity is Severity.ERROR else "minor",
         "fingerprint": fingerprint(one, seen),
         "location": {"path": one.where[0] or ".", "lines": {"begin": line}},

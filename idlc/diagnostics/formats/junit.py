@@ -33,7 +33,7 @@ def _failed(one: Diagnostic) -> str:
     slug = CODES[one.code].slug if one.code in CODES else ""
     lines = (
         f"{path}{line}: {one.message}",
-        *filter(None, (one.breaks, one.hint and f"hint: {one.hint}")),
+        *filter(None, (one.breaks, one.holds_for, one.hint and f"hint: {one.hint}")),
     )
     text = "\n".join(map(one_line, lines))
     name = f"{one.code} {slug}{line}"

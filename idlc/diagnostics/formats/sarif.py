@@ -56,7 +56,7 @@ def _level(severity: Severity) -> str:
 
 
 def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
-    text = "; ".join(filter(None, (one.message, one.breaks, one.hint)))
+    text = "; ".join(filter(None, (one.message, one.breaks, one.holds_for, one.hint)))
     result: dict[str, object] = {
         "ruleId": one.code,
         "ruleIndex": rule,

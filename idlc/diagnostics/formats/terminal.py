@@ -88,7 +88,8 @@ def _line(diagnostic: Diagnostic, paint: _Paint) -> str:
     if diagnostic.span:
         place = _place(_mark(diagnostic.span, "", ""))
     code = paint(diagnostic.severity.name.lower(), diagnostic.code)
-    return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}"
+    only = f" ({diagnostic.holds_for})" if diagnostic.distros else ""
+    return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}{only}"
 
 
 def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
@@ -117,6 +118,9 @@ def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
     if diagnostic.levels:
         sign = paint("frame", "=")
         yield f"{margin} {sign} {paint('hint', 'breaks')}: {', '.join(diagnostic.levels)}"
+    if diagnostic.distros:
+        sign = paint("frame", "=")
+        yield f"{margin} {sign} {paint('hint', 'for')}: {', '.join(diagnostic.distros)}"
     if diagnostic.hint:
         hint = one_line(_shortened(diagnostic.hint))
         yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {hint}"
@@ -221,6 +225,7 @@ def _facts(diagnostic: Diagnostic) -> dict[str, object]:
         "hint": diagnostic.hint,
         "detail": diagnostic.detail or None,
         **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
+        **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
         "labels": [_label(label) for label in diagnostic.labels],
     }
 

@@ -10,6 +10,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report
 from idlc.diagnostics.source import Span
 from idlc.model import ir
+from idlc.model.distro import DEFAULT, Distro
 from idlc.model.lowering.section import lower_section
 from idlc.syntax import tree
 from idlc.syntax.escapes import EscapeError, through_idl
@@ -24,8 +25,10 @@ SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
 _NUMBERS = ("no", "one", "two")
 
 
-def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
-    """Return the interface that a file defines; missing sections count as empty.
+def lower(
+    file: tree.File, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
+) -> ir.Interface:
+    """Return the interface that a file defines for a distribution; missing sections are empty.
 
     Reports everything that is wrong inside the file; types of other files are `link`'s.
     """
@@ -35,7 +38,7 @@ def lower(file: tree.File, name: ir.TypeName, report: Report) -> ir.Interface:
     empty = tree.Section(len(file.source.text), ())
     sections = (*file.sections, *([empty] * len(suffixes)))
     parts = [
-        lower_section(file, section, name._replace(name=name.name + suffix), report)
+        lower_section(file, section.lines, name._replace(name=name.name + suffix), report, distro)
         for suffix, section in zip(suffixes, sections, strict=False)
     ]
     parts = _without_moved_constants(parts, report)

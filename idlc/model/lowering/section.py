@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import takewhile
+from typing import TypeAlias
 
 import msgspec
 
@@ -10,6 +11,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Span
 from idlc.model import ir, names
+from idlc.model.distro import Distro
 from idlc.model.lowering import slips
 from idlc.model.lowering.comments import Comment, condense, problem
 from idlc.model.lowering.fault import Fault
@@ -17,6 +19,8 @@ from idlc.model.lowering.literals import Text, default, scalar
 from idlc.model.lowering.types import STRINGS, as_parsed, lower_type
 from idlc.syntax import tree
 from idlc.syntax.parse import parse_definition
+
+Lines: TypeAlias = tuple[tree.Line, ...]
 
 _BROKEN = {
     code.slug: code
@@ -30,10 +34,10 @@ _BROKEN = {
 
 
 def lower_section(
-    file: tree.File, section: tree.Section, name: ir.TypeName, report: Report
+    file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
 ) -> ir.Message:
-    """Return the message that a section defines; reports what is wrong in it."""
-    return _Section(file, section, name, report).lower()
+    """Return the message that a section's lines define; reports what is wrong in them."""
+    return _Section(file, lines, name, report, distro).lower()
 
 
 class _Element(msgspec.Struct, frozen=True):
@@ -42,18 +46,21 @@ class _Element(msgspec.Struct, frozen=True):
     line: tree.Line
     body: tree.Field | tree.Constant
     comments: list[tree.Line]
+    optional: bool
 
 
 class _Section:
     """Lowers one section; holds what its steps share."""
 
     def __init__(
-        self, file: tree.File, section: tree.Section, name: ir.TypeName, report: Report
+        self, file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
     ) -> None:
         self.file = file
-        self.lines = section.lines
+        self.lines = lines
         self.name = name
         self.report = report
+        self.distro = distro
+        self.optional = False
 
     def lower(self) -> ir.Message:
         head = self._head()
@@ -65,7 +72,8 @@ class _Section:
             texts = [_comment_text(commented) for commented in lines]
             if isinstance(body, tree.Field):
                 about = self._condense(texts, lines, has_unit=True)
-                fields.append(self._field(line, body, about))
+                field = self._field(line, body, about)
+                fields.append(msgspec.structs.replace(field, optional=element.optional))
             else:
                 about = self._condense(texts, lines, has_unit=False)
                 constant = self._constant(line, body, about)
@@ -95,6 +103,8 @@ class _Section:
                 continue
             if line.comment:
                 pending.append(line)
+            if line.code.startswith(tree.OPTIONAL):
+                line = self._after_optional(line)
             text = line.definition
             if not text or (line.start == 0 and text[0] == tree.BYTE_ORDER_MARK):
                 continue
@@ -106,9 +116,16 @@ class _Section:
                 self._broken(line, body)
             else:
                 self._warn_hash(line, text)
-                elements.append(_Element(line, body, pending))
+                elements.append(_Element(line, body, pending, self.optional))
             pending = []
+            self.optional = False
         return elements
+
+    def _after_optional(self, line: tree.Line) -> tree.Line:
+        from idlc.model.lowering.optional import after_optional
+
+        is_second, self.optional = self.optional, True
+        return after_optional(line, self.file.source, self.distro, self.report, is_second=is_second)
 
     def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
         """Return an element's comment; `has_unit` is whether rosidl writes its unit anywhere."""

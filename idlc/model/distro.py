@@ -1,0 +1,61 @@
+"""The distributions of ROS 2, and how what they make of interface files differs."""
+
+from __future__ import annotations
+
+import msgspec
+
+from idlc.diagnostics.suggest import did_you_mean
+
+
+class Distro(msgspec.Struct, frozen=True):
+    """A distribution, by the name that ROS 2 has for it in paths.
+
+    `has_hashes` is whether it has type hashes and descriptions, `reads_optional` whether
+    `@optional` is no error.
+    """
+
+    name: str
+    has_hashes: bool = True
+    reads_optional: bool = False
+
+    @property
+    def title(self) -> str:
+        """Its name as people write it."""
+        return self.name.capitalize()
+
+
+#: Every distribution that idlc knows, the oldest first.
+DISTROS = (
+    Distro("humble", has_hashes=False),
+    Distro("iron"),
+    Distro("jazzy"),
+    Distro("kilted"),
+    Distro("lyrical", reads_optional=True),
+    Distro("rolling", reads_optional=True),
+)
+BY_NAME = {distro.name: distro for distro in DISTROS}
+#: What is meant where nothing says otherwise.
+DEFAULT = BY_NAME["jazzy"]
+#: The one that accepts whatever another accepts.
+NEWEST = DISTROS[-1]
+
+
+def listed(text: str) -> list[str]:
+    """Return the names in a list with commas."""
+    return [name.strip() for name in text.split(",")]
+
+
+def later(distro: Distro) -> tuple[Distro, ...]:
+    """Return the distributions after one."""
+    return DISTROS[DISTROS.index(distro) + 1 :]
+
+
+def titles(distros: tuple[Distro, ...]) -> str:
+    """Return the names of distributions for a sentence, such as `Humble, Iron and Jazzy`."""
+    *first, last = (distro.title for distro in distros)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def unknown_distro(name: str) -> str:
+    """Return the hint for a name that no distribution has."""
+    return did_you_mean(name, BY_NAME) or f"idlc knows {', '.join(BY_NAME)}"
