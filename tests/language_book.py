@@ -2,8 +2,8 @@
 
 A block named ```msg, ```srv or ```action is an interface file, followed by lines that begin with an
 arrow. If its lines hold an arrow each, every line is a file of its own. In a block named ```names,
-lines are paths of files that are sound but for their names. A block whose arrows are a hash, or
-the text that is hashed, is about these.
+lines are paths of files that are sound but for their names. Files in a block named ```msg lyrical
+are read as Lyrical does. A block whose arrows are a hash, or the text that is hashed, is about these.
 
 Structures are the records of golden/spec, so that one function tells what idlc and rosidl read.
 """
@@ -33,7 +33,7 @@ SIBLINGS = {"msg/Part.msg": "int32 number\n"}
 ASKED = ("hash ", "hashed ")
 DUMMY = "structure_needs_at_least_one_member"
 
-_BLOCK = re.compile(r"^```(msg|srv|action|names)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_BLOCK = re.compile(r"^```(msg|srv|action|names)( lyrical)?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARKS = {"␉": "\t", "␠": " ", "⏎": "\n"}
 
 
@@ -46,6 +46,7 @@ class Example(NamedTuple):
     kind: str = "msg"
     path: str = ""
     inline: bool = False
+    distro: str = ""
 
     @property
     def case(self) -> dict[str, Any]:
@@ -64,6 +65,7 @@ class Example(NamedTuple):
             "name": name,
             "bytes_hex": data,
             "siblings": SIBLINGS,
+            **({"distro": self.distro} if self.distro else {}),
         }
 
 
@@ -76,14 +78,15 @@ def unmarked(shown: str) -> str:
 def examples(book: str) -> Iterator[Example]:
     for block in _BLOCK.finditer(book):
         number = book.count("\n", 0, block.start()) + 2
-        lines = block[2].splitlines()
+        lines, distro = block[3].splitlines(), (block[2] or "").strip()
         if any(ARROW in line[1:] for line in lines):
-            yield from _inline(block[1], lines, number)
+            for example in _inline(block[1], lines, number):
+                yield example._replace(distro=distro)
         else:
             code = [line for line in lines if not line.startswith(ARROW)]
             arrows = tuple(line[len(ARROW) :] for line in lines if line.startswith(ARROW))
             shown = "".join(f"{line}\n" for line in code)
-            yield Example(f"line {number}", shown, arrows, block[1])
+            yield Example(f"line {number}", shown, arrows, block[1], distro=distro)
 
 
 def _inline(kind: str, lines: list[str], number: int) -> Iterator[Example]:
@@ -115,11 +118,11 @@ def rewritten(book: str, found: dict[str, tuple[str, ...]]) -> str:
             return match[0]
         if not example.inline:
             arrows = "".join(f"{ARROW}{line}\n" for line in found[example.place])
-            return f"```{match[1]}\n{example.shown}{arrows}```"
-        rows = [known[f"line {number + n}"] for n in range(match[2].count("\n"))]
+            return f"```{match[1]}{match[2] or ''}\n{example.shown}{arrows}```"
+        rows = [known[f"line {number + n}"] for n in range(match[3].count("\n"))]
         width = min(max(len(row.shown) for row in rows), 44)
         lines = [f"{row.shown:{width}} {ARROW}{found[row.place][0]}\n" for row in rows]
-        return f"```{match[1]}\n{''.join(lines)}```"
+        return f"```{match[1]}{match[2] or ''}\n{''.join(lines)}```"
 
     return _BLOCK.sub(block, book)
 

@@ -1,13 +1,14 @@
 """idlc's front end over one recorded or invented case, in the words of golden/spec.
 
 A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `text`, or as bytes in
-`bytes_hex`.
+`bytes_hex`; `distro` if that is not Jazzy.
 """
 
 from idlc import checks
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
+from idlc.model.distro import BY_NAME
 from idlc.model.link import Model, link
 from idlc.model.lowering.file import lower
 from idlc.syntax.escapes import through_idl
@@ -46,7 +47,8 @@ def compile_case(case) -> tuple[Model | None, Report]:
     else:
         text = case["text"]
     name = ir.TypeName(case["pkg"], case["kind"], case["name"])
-    interface = lower(parse(Source(f"{case['name']}.{case['kind']}", text)), name, report)
+    source = Source(f"{case['name']}.{case['kind']}", text)
+    interface = lower(parse(source), name, report, BY_NAME[case.get("distro", "jazzy")])
     model = link(case["pkg"], [interface], Siblings(case), report)
     checks.check(model, report)
     return model, report

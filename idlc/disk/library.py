@@ -16,7 +16,7 @@ from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
 from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
-from idlc.model import catalog, ir
+from idlc.model import catalog, derive, ir
 from idlc.model.distro import DEFAULT, Distro
 
 if TYPE_CHECKING:
@@ -156,11 +156,14 @@ class Library:
         if name not in self._sources:
             path = self.path(name)
             self._sources[name] = (
-                read_source(path, shown(path), self._report)
-                if path
-                else catalog.source(name, self.distro)
+                read_source(path, shown(path), self._report) if path else self._built_in(name)
             )
         return self._sources[name]
+
+    def _built_in(self, name: ir.TypeName) -> Source | None:
+        # generated code is the same for all: it has events where ROS 2 has none, too
+        of = DEFAULT if name == derive.SERVICE_EVENT_INFO else self.distro
+        return catalog.source(name, of)
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
@@ -170,8 +173,8 @@ class Library:
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
-        known = on_disk or catalog.interfaces(self.distro)
-        return tuple(sorted(name for name in known if name.package == package))
+        known = on_disk or (*catalog.interfaces(self.distro), derive.SERVICE_EVENT_INFO)
+        return tuple(sorted({name for name in known if name.package == package}))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, from the first place that has any.

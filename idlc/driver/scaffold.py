@@ -16,7 +16,7 @@ from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
 from idlc.driver.stages import compile_package, stage
 from idlc.emit.render import support_packages
-from idlc.model import derive, ir
+from idlc.model import catalog, derive, ir
 from idlc.model.link import Model
 from idlc.scaffold import new_interface as interface_text
 from idlc.scaffold import new_package as package_files
@@ -101,7 +101,8 @@ def interface(
     if report.had_errors:
         return None
     needed = set(derive.IMPLICIT_PACKAGES[kind]) | {one.package for one in model.interfaces}
-    depends = sorted(needed - {own} - _reached_only(model))
+    absent = set(derive.IMPLICIT_PACKAGES[kind]) - set(catalog.packages(model.distro))
+    depends = sorted(needed - {own} - _reached_only(model) - absent)
     tests = _test_of_interfaces(project, own)
     runner = ["python3-pytest"] if tests else []
     edits = manifest_edit(project, depends, runner, group=True)

@@ -149,14 +149,22 @@ def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool
     while queue:
         entry = pool[queue.pop()]
         for field, target in entry.references:
-            if target in interfaces:
+            if field.type_span is not None and _is_implied_only(target, pool.library):
+                if not entry.linked:
+                    entry.errors.append(unknown.problem(target, field.type_span))
+            elif target in interfaces:
                 continue
-            if found := pool.get(target):
+            elif found := pool.get(target):
                 interfaces[target] = found.interface
                 queue.append(target)
             elif field.type_span is not None and not entry.linked:
                 entry.errors.append(unknown.problem(target, field.type_span))
         entry.linked = True
+
+
+def _is_implied_only(target: ir.TypeName, library: Library) -> bool:
+    """Return whether a message is there for events alone, which Humble does not have."""
+    return target == derive.SERVICE_EVENT_INFO and target.name not in library.names(target.package)
 
 
 class _Unknown:

@@ -53,7 +53,7 @@ def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
-        if package not in used and package in set(catalog.packages()):
+        if package not in used and catalog.is_standard(package):
             report.add(
                 codes.UNUSED_DEPENDENCY.at(
                     statement.span,
