@@ -3,7 +3,8 @@
 A block named ```msg, ```srv or ```action is an interface file, followed by lines that begin with an
 arrow. If its lines hold an arrow each, every line is a file of its own. In a block named ```names,
 lines are paths of files that are sound but for their names. Files in a block named ```msg lyrical
-are read as Lyrical does. A block whose arrows are a hash, or the text that is hashed, is about these.
+are read as Lyrical does. A block whose arrows are a hash, or the text that is hashed, is about
+these.
 
 Structures are the records of golden/spec, so that one function tells what idlc and rosidl read.
 """

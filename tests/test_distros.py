@@ -5,9 +5,12 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import click
 import pytest
 
 from idlc.checks.lint import lint
+from idlc.cli import completion
+from idlc.cli.commands.check import command as check
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -220,6 +223,11 @@ def test_an_installed_definition_wins_if_it_is_of_that_distribution(install, cap
     assert re.search(r"(?m)^sensor_msgs .*built in$", capsys.readouterr().out)
 
 
+def test_shells_offer_names():
+    offered = completion.distros(click.Context(check), click.Option(["--distro"]), "humble,l")
+    assert offered == ["humble,lyrical"]
+
+
 def test_what_was_removed_is_not_taken_from_another_distribution(install, capsys):
     prefix = install("jazzy", {"actionlib_msgs/msg/GoalID.msg": "string id\n"})
     write({"demo/msg/A.msg": "actionlib_msgs/GoalID a\n"})
@@ -264,6 +272,12 @@ def test_generated_code_is_the_same_for_all(capsys):
         found[distro] = {path.relative_to(f"out/{distro}"): path.read_bytes() for path in files}
     assert len(found["humble"]) > 10
     assert all(one == found["jazzy"] for one in found.values())
+
+
+def test_generating_again_for_another_distribution_is_no_shortcut(capsys):
+    write({"demo/msg/A.msg": "@optional int32 a\n"})
+    for distro, status in (("lyrical", 0), ("rolling", 0), ("jazzy", 1), ("lyrical", 0)):
+        assert main(["gen", "demo", "-o", "out/demo", "--distro", distro]) == status
 
 
 def test_services_for_humble_which_has_no_events(capsys):

@@ -78,7 +78,7 @@ class Prefix:
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield the folder of an installed package."""
-        if not (catalog.is_standard(package) and self._is_of_another):
+        if not (self._is_of_another and catalog.is_standard(package)):
             yield self._share / package
 
     def packages(self) -> Iterable[str]:

@@ -18,6 +18,8 @@ from idlc.driver import named_types
 from idlc.driver.gen_package import Package, as_inputs, package_of
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import derive, ir
+from idlc.model.distro import Distro
+from idlc.syntax.tree import OPTIONAL
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -87,13 +89,14 @@ def _made(
     wanted: Mapping[Target, inputs.Inputs], options: GenOptions, report: Report
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(wanted.values()), options.scope, report)
-    if not (options.check or report.had_errors):
+    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), options)):
         current = [
             _current(target, given.digests, library, options.vendor_deps)
             for target, given in wanted.items()
         ]
         if all(current):
-            return _with_needs([one for done in current for one in done], wanted, report)
+            done = [one for each in current for one in each]
+            return _with_needs(done, wanted, options.scope.distro, report)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -105,7 +108,15 @@ def _made(
             one.target.drift(one.plan, one.lock)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
-    return _with_needs(map(_generated, packages), wanted if packages else (), report)
+    targets = wanted if packages else ()
+    return _with_needs(map(_generated, packages), targets, options.scope.distro, report)
+
+
+def _may_be_refused(given: Iterable[inputs.Inputs], options: GenOptions) -> bool:
+    """Return whether files that one distribution accepted may be an error for this one."""
+    if options.scope.distro.reads_optional:
+        return False
+    return any(OPTIONAL.encode() in file.data for one in given for file in one.files)
 
 
 def _planned(
@@ -187,7 +198,7 @@ def _needed(model: Model) -> set[str]:
 
 
 def _with_needs(
-    done: Iterable[Generated], targets: Iterable[Target], report: Report
+    done: Iterable[Generated], targets: Iterable[Target], distro: Distro, report: Report
 ) -> tuple[Generated, ...]:
     """Report IDL617 for generated packages that need others that cannot be imported here.
 
@@ -202,12 +213,11 @@ def _with_needs(
             quiet[target.name] = tuple(missing)
             continue
         names = ", ".join(f"`{name}`" for name in missing)
-        wheels = " ".join(f"ros-jazzy-{name.replace('_', '-')}" for name in missing)
         report.add(
             codes.NOT_IMPORTABLE.of(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
-                hint=f"install it with ROS 2 or `pip install {wheels}`, or run idlc gen again "
+                hint=f"{distro.installing(missing)}, or run idlc gen again "
                 "with --vendor-deps, which writes it next to this one",
             )
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.suggest import did_you_mean
+from idlc.disk.distribution import distribution
 from idlc.disk.environment import python_folders
 from idlc.disk.library import Library
 from idlc.disk.output.project import Project
@@ -20,6 +21,7 @@ from idlc.driver.scaffold import (
 )
 from idlc.driver.stages import compile_package, stage
 from idlc.model import ir
+from idlc.model.distro import BY_NAME, DEFAULT
 from idlc.scaffold import new_package as package_files
 from idlc.scaffold import node as node_page
 from idlc.scaffold import node_tests, spec
@@ -202,8 +204,8 @@ def _absent(planned: Plan) -> list[str]:
     if not absent or not python_folders("rclpy"):
         return []
     names = ", ".join(f"`{name}`" for name in absent)
-    wheels = " ".join(f"ros-jazzy-{name.replace('_', '-')}" for name in absent)
-    return [f"{names} cannot be imported here: install it with ROS 2, or `pip install {wheels}`"]
+    here = BY_NAME.get(distribution().name, DEFAULT)
+    return [f"{names} cannot be imported here: {here.installing(absent)}"]
 
 
 def _launch_file(project: Project, own: str) -> str:

@@ -91,7 +91,12 @@ def nearby(_: str) -> str | None:
 
 def is_standard(package: str) -> bool:
     """Return whether a package is one of any distribution's."""
-    return any(package in _messages(one) for one in DISTROS)
+    return package in _packages_of_any()
+
+
+@lru_cache(maxsize=1)
+def _packages_of_any() -> frozenset[str]:
+    return frozenset(key.partition("/")[0] for key in (*_common(), *_differences()))
 
 
 def holding(name: ir.TypeName) -> tuple[Distro, ...]:
@@ -101,7 +106,7 @@ def holding(name: ir.TypeName) -> tuple[Distro, ...]:
 
 def removed(name: ir.TypeName, of: Distro) -> Distro | None:
     """Return the distribution since which an interface of an earlier one is gone."""
-    holders = holding(name)
+    holders = holding(name) if str(name) in _differences() else ()
     if of not in holders or NEWEST in holders:
         return None
     return later(holders[-1])[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import msgspec
 
 from idlc.diagnostics.suggest import did_you_mean
@@ -11,25 +13,31 @@ class Distro(msgspec.Struct, frozen=True):
     """A distribution, by the name that ROS 2 has for it in paths.
 
     `has_hashes` is whether it has type hashes and descriptions, `reads_optional` whether
-    `@optional` is no error.
+    `@optional` is no error, `has_wheels` whether pip can install its packages.
     """
 
     name: str
     has_hashes: bool = True
     reads_optional: bool = False
+    has_wheels: bool = False
 
     @property
     def title(self) -> str:
         """Its name as people write it."""
         return self.name.capitalize()
 
+    def installing(self, packages: Iterable[str]) -> str:
+        """Return how to install packages, as it is said in a hint."""
+        wheels = " ".join(f"ros-{self.name}-{name.replace('_', '-')}" for name in packages)
+        return "install it with ROS 2" + (f" or `pip install {wheels}`" if self.has_wheels else "")
+
 
 #: Every distribution that idlc knows, the oldest first.
 DISTROS = (
     Distro("humble", has_hashes=False),
     Distro("iron"),
-    Distro("jazzy"),
-    Distro("kilted"),
+    Distro("jazzy", has_wheels=True),
+    Distro("kilted", has_wheels=True),
     Distro("lyrical", reads_optional=True),
     Distro("rolling", reads_optional=True),
 )
