@@ -178,9 +178,9 @@ STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
+NO_TYPE_HASHES = Code("IDL623", "no-type-hashes", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
-NO_TYPE_HASHES = Code("IDL640", "no-type-hashes", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -200,9 +200,9 @@ USAGE: frozenset[str] = frozenset(
         BAD_LOCK,
         NO_SUCH_TYPE,
         STRUCTURE_TOO_LARGE,
+        NO_TYPE_HASHES,
         NO_REVISION,
         DUPLICATE_PACKAGE,
-        NO_TYPE_HASHES,
     )
 )
 

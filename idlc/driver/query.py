@@ -48,7 +48,7 @@ def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | N
 
 
 def _has_hashes(distro: Distro, report: Report) -> bool:
-    """Return whether a distribution has type hashes and descriptions; report IDL640 otherwise."""
+    """Return whether a distribution has type hashes and descriptions; report IDL623 otherwise."""
     if not distro.has_hashes:
         first = next(one for one in later(distro) if one.has_hashes)
         message = f"ROS 2 {distro.title} has no type hashes and no type descriptions"
