@@ -148,6 +148,8 @@ USED_TYPE = Code("IDL515", "used-type-changed", ERROR)
 HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
+SEVERAL_VERSIONS = Code("IDL530", "several-versions", ERROR)
+SEVERAL_TYPES = Code("IDL531", "several-types", ERROR)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
@@ -174,6 +176,8 @@ CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
+NO_RCLPY = Code("IDL640", "no-rclpy", ERROR)
+EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -195,6 +199,8 @@ USAGE: frozenset[str] = frozenset(
         STRUCTURE_TOO_LARGE,
         NO_REVISION,
         DUPLICATE_PACKAGE,
+        NO_RCLPY,
+        EMPTY_GRAPH,
     )
 )
 

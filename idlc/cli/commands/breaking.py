@@ -12,6 +12,7 @@ from idlc.cli import options
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.driver.breaking import Verdict
+    from idlc.driver.graph import GraphVerdict
 
 EPILOG = """\
 Example:
@@ -32,14 +33,23 @@ A change that is meant is allowed in pyproject.toml, with a reason and for a tim
 """
 
 LEVELS = ("wire", "hash", "source", "behaviour")
+GRAPH = "graph"
+PATIENCE = 3.0
 
 
 @click.command("breaking", epilog=EPILOG)
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock",
-    help="The version to compare with: a folder, a git revision, or the type hashes in a lock.",
+    metavar="DIR|git:REF|idlc.lock|graph",
+    help="The version to compare with: a folder, a git revision, the type hashes in a lock, or "
+    "what the nodes of the running ROS 2 graph use (a folder of that name is ./graph).",
+)
+@click.option(
+    "--timeout",
+    metavar="SECONDS",
+    type=click.FloatRange(min=0, min_open=True),
+    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 3]",
 )
 @click.option(
     "--level",
@@ -55,6 +65,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 def command(
     paths: tuple[str, ...],
     against: str | None,
+    timeout: float | None,
     levels: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
@@ -65,9 +76,10 @@ def command(
 
     wire: bytes recorded before are read wrongly or not at all. hash: endpoints of both versions
     do not talk. source: code fails. behaviour: the same code does something else.
-    """
-    import datetime
 
+    Against the graph, it reports the types of which running nodes have several versions, or
+    another one than the files here or the installed packages.
+    """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.disk import command_settings, pyproject
@@ -79,8 +91,10 @@ def command(
     against = against or command_settings.against(settings, report)
     allowed = command_settings.allowances(settings, report)
     if against is None and not report.had_errors:
-        raise click.UsageError("give --against DIR, git:REF or idlc.lock")
-    verdict = None
+        raise click.UsageError("give --against DIR, git:REF, idlc.lock or graph")
+    if timeout is not None and against != GRAPH:
+        raise click.UsageError("--timeout is for --against graph")
+    verdict: Verdict | GraphVerdict | None = None
     if against is not None and not report.had_errors:
         wanted = BreakingOptions(
             paths=paths or settings.paths or (".",),
@@ -89,14 +103,26 @@ def command(
             levels=levels or LEVELS,
             allowed=allowed,
             allowed_in=settings.source.path if settings.source else "",
-            today=datetime.datetime.now().astimezone().date().isoformat(),
+            today=_today(),
         )
-        verdict = breaking(wanted, report)
+        if against == GRAPH:
+            from idlc.driver.graph import compare_with_graph
+
+            patience = timeout or PATIENCE
+            verdict = compare_with_graph(wanted, patience, report, is_given=bool(paths))
+        else:
+            verdict = breaking(wanted, report)
     _show(report, verdict, style)
     return output.status(report)
 
 
-def _show(report: Report, verdict: Verdict | None, style: str) -> None:
+def _today() -> str:
+    import datetime
+
+    return datetime.datetime.now().astimezone().date().isoformat()
+
+
+def _show(report: Report, verdict: Verdict | GraphVerdict | None, style: str) -> None:
     from idlc.cli import output, reports
     from idlc.diagnostics.formats.github import notice
     from idlc.driver.check import Checked
@@ -104,6 +130,8 @@ def _show(report: Report, verdict: Verdict | None, style: str) -> None:
     if style == "json":
         output.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
+        for endpoint in facts.pop("endpoints", ()):
+            output.fact(sys.stdout, "endpoint", **endpoint._asdict())
         output.fact(sys.stdout, "summary", **output.counts(report), **facts)
     elif style == "text":
         output.show(report, style, sys.stdout)
@@ -115,15 +143,30 @@ def _show(report: Report, verdict: Verdict | None, style: str) -> None:
             sys.stdout.write(notice("idlc breaking", _summary(verdict)))
 
 
-def _summary(verdict: Verdict) -> str:
-    from idlc.diagnostics.report import first_few
+def _summary(verdict: Verdict | GraphVerdict) -> str:
+    from idlc.driver.breaking import Verdict
 
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
     if verdict.allowed:
         text += f"; allowed: {verdict.allowed}"
-    if verdict.added:
-        text += f"; added: {first_few(verdict.added, 5)}"
+    return text + (_next(verdict) if isinstance(verdict, Verdict) else _seen(verdict))
+
+
+def _seen(verdict: GraphVerdict) -> str:
+    """Return what was looked at."""
+    from idlc.diagnostics.formats.terminal import counted
+
+    seen = [counted(number, noun) for noun, number in verdict.seen.items()]
+    text = f"; looked at {', '.join(seen)}"
+    return f"{text}; without type hash: {verdict.silent}" if verdict.silent else text
+
+
+def _next(verdict: Verdict) -> str:
+    """Return what was added, and which version comes next."""
+    from idlc.diagnostics.report import first_few
+
+    text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
     if verdict.part is None:
         return f"{text}; the versions are the same"
     if verdict.next_version:
