@@ -21,15 +21,15 @@ Role: TypeAlias = Literal["publisher", "subscription", "server", "client"]
 _PART = re.compile(r"_((SendGoal|GetResult)_)?(Request|Response)$|_FeedbackMessage$")
 #: What every action uses, whatever its type.
 _SHARED = "action_msgs/"
-#: Nodes that are named in a sentence.
+#: More nodes than these are named by the first one in a sentence.
 NAMED = 2
 
 
 class Endpoint(NamedTuple):
-    """One end of a topic, service or action: which structure it sends or reads.
+    """One end of a topic, service or action, and the structure that it sends or reads.
 
-    `type` is the structure's full name, a request's or response's for services; `node` and `hash`
-    are empty where they are not known.
+    A service has two, of its request and of its response. `node` and `hash` are empty where they
+    are not known.
     """
 
     node: str
@@ -37,7 +37,7 @@ class Endpoint(NamedTuple):
     name: str
     role: Role
     sends: bool
-    type: str
+    structure: str
     hash: str = ""
 
     @property
@@ -80,8 +80,9 @@ class Version(NamedTuple):
     @property
     def who(self) -> str:
         """Who has it, for a sentence."""
-        nodes = dict.fromkeys(one.who for one in self.endpoints)
-        return first_few(nodes, NAMED) or (self.here.who if self.here else "nobody")
+        nodes = sorted({one.who for one in self.endpoints})
+        named = " and ".join(nodes) if len(nodes) <= NAMED else first_few(nodes, 1)
+        return named or (self.here.who if self.here else "nobody")
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -109,7 +110,7 @@ def several_versions(
     types: dict[str, dict[str, list[Endpoint]]] = {}
     for one in endpoints:
         if one.hash:
-            types.setdefault(one.type, {}).setdefault(one.hash, []).append(one)
+            types.setdefault(one.structure, {}).setdefault(one.hash, []).append(one)
     for name, hashes in sorted(types.items()):
         mine = here.get(name)
         if mine:
@@ -142,9 +143,9 @@ def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
     """Yield a change for each topic, service and action whose ends differ in the type's name."""
     places: dict[tuple[Entity, str], dict[str, list[Endpoint]]] = {}
     for one in endpoints:
-        if one.entity != "action" or not one.type.startswith(_SHARED):
+        if one.entity != "action" or not one.structure.startswith(_SHARED):
             types = places.setdefault((one.entity, one.name), {})
-            types.setdefault(interface_of(one.type), []).append(one)
+            types.setdefault(interface_of(one.structure), []).append(one)
     for (entity, name), types in sorted(places.items()):
         if len(types) > 1:
             shown = one_line(name)

@@ -44,7 +44,7 @@ def changes(
     yield Change(
         codes.SEVERAL_VERSIONS,
         last.type,
-        f"`{last.type}` has {len(versions)} versions, of {' and of '.join(whose)}",
+        f"`{last.type}` has {len(versions)} versions: of {', of '.join(whose)}",
         frozenset(levels),
         path=last.type,
         hint="build everything that uses it from one version, and start it again",

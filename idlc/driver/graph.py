@@ -128,7 +128,7 @@ def _here(
     here: dict[str, Here] = {}
     for model in given:
         here |= {name: Here(hash_, True) for name, hash_ in _add(model, known)}
-    for model in _installed({one.type for one in endpoints}, scope):
+    for model in _installed({one.structure for one in endpoints}, scope):
         for name, hash_ in _add(model, known):
             here.setdefault(name, Here(hash_, False))
     return known, here
@@ -169,14 +169,16 @@ def _questions(
     A node knows a service by the hash of the whole, which only service introspection tells: the
     description of its events holds request and response.
     """
-    events = [one for one in endpoints if one.type.endswith("_Event") and one.hash]
+    events = [one for one in endpoints if one.structure.endswith("_Event") and one.hash]
     for version in chain.from_iterable(found):
         key = (version.type, version.hash)
         if key not in known:
             wanted = [running.Question(node, *key) for node in version.nodes[: running.ASKED]]
             if event := event_of(version.type):
-                mine = (one for one in events if one.type == event and one.node in version.nodes)
-                wanted = [running.Question(one.node, one.type, one.hash) for one in mine]
+                mine = (
+                    one for one in events if one.structure == event and one.node in version.nodes
+                )
+                wanted = [running.Question(one.node, one.structure, one.hash) for one in mine]
             yield key, wanted
 
 

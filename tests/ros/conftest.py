@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -23,8 +24,8 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.ros)
 
 
-@pytest.fixture(scope="session")
-def ros_environment() -> Iterator[dict[str, str]]:
+@contextmanager
+def _domain_of_its_own() -> Iterator[dict[str, str]]:
     """Yield an environment in which DDS stays on this machine and meets no other run.
 
     A domain is held by a port, as the tests of scaffolded packages do it.
@@ -37,6 +38,20 @@ def ros_environment() -> Iterator[dict[str, str]]:
             "ROS_DOMAIN_ID": str(domain),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
+
+
+@pytest.fixture(scope="session")
+def ros_environment() -> Iterator[dict[str, str]]:
+    """Yield the environment that tests share."""
+    with _domain_of_its_own() as environment:
+        yield environment
+
+
+@pytest.fixture
+def lonely_environment() -> Iterator[dict[str, str]]:
+    """Yield an environment for one test, which sees no nodes of others, dead ones included."""
+    with _domain_of_its_own() as environment:
+        yield environment
 
 
 def _bound(held: socket.socket, domain: int) -> bool:

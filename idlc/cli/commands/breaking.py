@@ -34,7 +34,7 @@ A change that is meant is allowed in pyproject.toml, with a reason and for a tim
 
 LEVELS = ("wire", "hash", "source", "behaviour")
 GRAPH = "graph"
-PATIENCE = 3.0
+PATIENCE = 5.0
 
 
 @click.command("breaking", epilog=EPILOG)
@@ -49,7 +49,7 @@ PATIENCE = 3.0
     "--timeout",
     metavar="SECONDS",
     type=click.FloatRange(min=0, min_open=True),
-    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 3]",
+    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 5]",
 )
 @click.option(
     "--level",
