@@ -24,9 +24,13 @@ def hash_of(model, type_):
 
 
 class RecordedGraph:
-    """`told` has the answers by node; the others do not answer."""
+    """`told` has the answers by node; the others do not answer.
 
-    def __init__(self, ends, told=None):
+    `sources` has the texts that a node tells, by type.
+    """
+
+    def __init__(self, ends, told=None, sources=None):
+        self.sources = sources or {}
         self.ends = tuple(sorted(ends))
         self.told = told or {}
         self.asked = []
@@ -44,7 +48,8 @@ class RecordedGraph:
             return Answer(None, told)
         if told is None or (question.type, question.hash) not in told:
             return Answer(None, "does not answer")
-        return Answer(told[question.type, question.hash])
+        sources = self.sources.get(question.node, {})
+        return Answer(told[question.type, question.hash], sources=sources)
 
 
 def descriptions(model, *types):

@@ -1,6 +1,6 @@
 """`idlc breaking --against graph`: descriptions from other programs, and what differs among them.
 
-The graphs here are recorded; those of tests/ros/test_graph.py run.
+The graphs here are recorded; those of tests/ros/test_graph_live.py run.
 """
 
 import copy
@@ -274,6 +274,27 @@ def test_a_description_with_another_hash_is_not_believed(say):
     found = ends(old=[("/old", "publisher")], new=[("/new", "subscription")])
     _, said = say(RecordedGraph(found, {**TOLD, "/old": lies}))
     assert "`/old` is not believed: its description has another type hash" in said
+
+
+def test_sources_count_if_they_mean_what_is_announced(say):
+    """They have what descriptions lack: constants, units, comments."""
+    found = ends(old=[("/old", "publisher")], new=[("/new", "subscription")])
+    right = {TYPE: "uint8 FAST=1\nfloat64 speed  # [m/s]\n"}
+    new = {TYPE: "uint8 FAST=2\nfloat64 speed  # [km/h]\nint8 gear\n"}
+    _, said = say(RecordedGraph(found, TOLD, {"/old": right, "/new": new}))
+    assert "the unit of `speed` was [m/s] and is [km/h] now (`/old` → `/new`)" in said
+    assert "constant `FAST` was 1 and is 2 now" in said
+    assert " --> demo/msg/Drive (/new):3:6" in said
+    for text in (
+        "uint8 FAST=2\nfloat32 speed\n",
+        "=\x1b[31m",
+        "Drive drive\n",
+        "A a\n",
+        "a" * 2**20,
+    ):
+        _, said = say(RecordedGraph(found, TOLD, {"/old": {TYPE: text}, "/new": new}))
+        assert "constant" not in said
+        assert "field `gear` was added (`/old` → `/new`)" in said
 
 
 def test_a_service_is_told_by_its_events(say):

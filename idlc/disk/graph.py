@@ -11,6 +11,7 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.breaking.graph import Endpoint, Entity, Role
@@ -42,10 +43,11 @@ class Question(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A node's description of a type, or why there is none."""
+    """A node's description of a type, or why there is none; `sources` are .msg files by type."""
 
     description: DescriptionDict | None
     problem: str = ""
+    sources: Mapping[str, str] = MappingProxyType({})
 
 
 @contextmanager
@@ -189,7 +191,7 @@ class Graph:
                 client = clients[one.node]
                 if one not in futures and client is not None and client.service_is_ready():
                     request = service.Request(
-                        type_name=one.type, type_hash=one.hash, include_type_sources=False
+                        type_name=one.type, type_hash=one.hash, include_type_sources=True
                     )
                     futures[one] = client.call_async(request)
             if len(futures) == len(questions) and all(one.done() for one in futures.values()):
@@ -214,7 +216,12 @@ def _answer(result: Any, is_offered: bool) -> Answer:
             "referenced_type_descriptions": [
                 _individual(one) for one in told.referenced_type_descriptions
             ],
-        }
+        },
+        sources={
+            one.type_name: one.raw_file_contents
+            for one in result.type_sources
+            if one.encoding == "msg"
+        },
     )
 
 

@@ -31,8 +31,9 @@ from idlc.disk.scope import Scope
 from idlc.driver.breaking import BreakingOptions
 from idlc.driver.stages import Compiler, models_of, stage
 from idlc.model import ir
-from idlc.model.described import NotBelievedError, described
+from idlc.model.described import NotBelievedError
 from idlc.model.link import Model
+from idlc.model.told import told
 
 #: A structure's full name and type hash.
 Key = tuple[str, str]
@@ -191,10 +192,11 @@ def _learn(
     problems: dict[Key, list[str]] = {}
     for key, asked in questions.items():
         for question in asked:
-            description, problem = answers[question]
+            node, name, type_hash = question
+            description, problem, sources = answers[question]
             if description is not None:
                 try:
-                    model = described(description, question.type, question.hash, question.node)
+                    model = told(description, sources, name, type_hash, node)
                     if any(oversized(model)):
                         raise NotBelievedError("it is larger than anybody can use")
                 except NotBelievedError as error:
@@ -202,7 +204,7 @@ def _learn(
                 else:
                     list(_add(model, known))
             if problem:
-                problems.setdefault(key, []).append(f"`{question.node}` {problem}")
+                problems.setdefault(key, []).append(f"`{node}` {problem}")
     return {
         key: first_few(problems.get(key, [_SERVICE if event_of(key[0]) else _NO_NODE]), 3)
         for key in questions

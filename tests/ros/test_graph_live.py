@@ -12,7 +12,7 @@ from installed import HERE
 #: Versions of one package.
 FILES = {
     "msg/Drive.msg": "std_msgs/Header header\nfloat64 speed\nPart[<=3] parts\n",
-    "msg/Part.msg": "string<=5 name\nwstring[2] labels\n",
+    "msg/Part.msg": "uint8 RED=1\nstring<=5 name\nwstring[2] labels\n",
     "srv/Go.srv": "float64 to\n---\nbool done\n",
     "action/Fly.action": "float64 to\n---\nbool done\n---\nfloat64 left\n",
 }
@@ -20,7 +20,7 @@ VERSIONS = {
     "one": FILES,
     "two": {
         **FILES,
-        "msg/Part.msg": "string<=5 name\nwstring[2] labels\nbyte colour\n",
+        "msg/Part.msg": "uint8 RED=2\nstring<=5 name\nwstring[2] labels\nbyte colour\n",
         "srv/Go.srv": "float32 to\n---\nbool done\n",
         "action/Fly.action": "float64 to\n---\nbool done\n---\nfloat32 left\n",
     },
@@ -122,6 +122,7 @@ def test_two_versions_are_told_field_by_field(start, look, packages):
         "`/talker` publishes on topic `/robot/drive`",
         "what differs is in `demo_msgs/msg/Part`",
         "field `colour` was added (`/talker` → `/listener`)",
+        "constant `RED` was 1 and is 2 now (`/talker` → `/listener`)",
         "`demo_msgs/srv/Go_Request` has 2 versions",
         "field `to` was `float32` and is `float64` now (`/listener` → `/talker`)",
         "`demo_msgs/action/Fly_FeedbackMessage` has 2 versions",
@@ -137,7 +138,7 @@ def test_two_versions_are_told_field_by_field(start, look, packages):
     assert status == 1
     added = next(one for one in found["diagnostic"] if one["code"] == "IDL505")
     assert added["path"].endswith("sources/two/demo_msgs/msg/Part.msg")
-    assert (added["line"], added["levels"]) == (3, ["wire", "hash"])
+    assert (added["line"], added["levels"]) == (4, ["wire", "hash"])
     goals = [one for one in found["endpoint"] if one["structure"].endswith("SendGoal_Request")]
     assert {(one["node"], one["role"], one["name"]) for one in goals} == {
         ("/talker", "server", "/robot/fly"),
