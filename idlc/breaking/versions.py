@@ -14,9 +14,9 @@ from idlc.diagnostics import codes
 from idlc.model import ir
 from idlc.model.link import Model
 
-#: A structure's full name and type hash.
+#: Models by a structure's full name and type hash.
 Known: TypeAlias = Mapping[tuple[str, str], Model]
-#: A structure of two versions by its name and both of its hashes.
+#: Structures of two versions, by name and both hashes.
 Seen: TypeAlias = set[tuple[str, str, str]]
 
 
@@ -29,10 +29,8 @@ def changes(
     ones. Of what several types hold, the differences are told once: `seen` grows.
     """
     *others, last = versions
-    differences: list[Change] = []
-    for one in others:
-        differences += _differences(one, last, known, seen)
-    structures = sorted({change.subject.partition(".")[0] for change in differences})
+    sides = [found for one in others for found in _all_sides(one, last, known)]
+    structures = sorted({str(one.new.name) for one, *_ in sides})
     pairs = [(a, b) for a in versions for b in versions if a is not b and a.sends and b.reads]
     lines = [line for version in versions for line in _version(version, known, problems)]
     lines += _effects(pairs, known)
@@ -50,7 +48,8 @@ def changes(
         hint="build everything that uses it from one version, and start it again",
         detail="\n".join(lines),
     )
-    yield from differences
+    for found in sides:
+        yield from _told_once(*found, known, seen)
 
 
 def _version(
@@ -86,11 +85,12 @@ def _misreads(sender: Version, reader: Version, known: Known) -> bool:
     return not reads_alike(before[name], after[name], before, after)
 
 
-def _differences(one: Version, other: Version, known: Known, seen: Seen) -> Iterator[Change]:
-    """Yield what differs between two versions, in what the type holds as well.
+def _all_sides(
+    one: Version, other: Version, known: Known
+) -> Iterator[tuple[Sides, Version, Version]]:
+    """Yield what differs between two versions of a type, itself and what it holds.
 
-    From the one to the other, unless only the other is sent. What a type holds is compared on
-    its own, so that a type which holds it is no difference.
+    From the one to the other, unless only the other is sent.
     """
     backwards = not (one.sends and other.reads) and other.sends and one.reads
     old, new = (other, one) if backwards else (one, other)
@@ -98,18 +98,32 @@ def _differences(one: Version, other: Version, known: Known, seen: Seen) -> Iter
     if any(key not in known for key in keys):
         return
     before, after = (known[key] for key in keys)
-    met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
-    misread = any(_misreads(a, b, known) for a, b in met or [(old, new)])
-    for sides in _changed(ir.TypeName.parse(old.type), before, after, seen):
-        found = [
-            change
-            for change in (*field_changes(sides), *constant_changes(sides))
-            if change.code is not codes.USED_TYPE
-        ]
-        yield from (
-            change._replace(message=f"{change.message} ({old.who} → {new.who})")
-            for change in _with_wire(found, misread)
-        )
+    name = ir.TypeName.parse(old.type)
+    for each in sorted(_held(name, before) & _held(name, after)):
+        if before.describer.hash(str(each)) != after.describer.hash(str(each)):
+            sides = Sides(before.messages[each], after.messages[each], before, after)
+            if any(_changes(sides)):
+                yield sides, old, new
+
+
+def _told_once(
+    sides: Sides, old: Version, new: Version, known: Known, seen: Seen
+) -> Iterator[Change]:
+    name = str(sides.new.name)
+    key = (name, sides.before.describer.hash(name), sides.after.describer.hash(name))
+    if key not in seen:
+        seen.add(key)
+        met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
+        misread = any(_misreads(a, b, known) for a, b in met or [(old, new)])
+        for change in _with_wire(list(_changes(sides)), misread):
+            yield change._replace(message=f"{change.message} ({old.who} → {new.who})")
+
+
+def _changes(sides: Sides) -> Iterator[Change]:
+    """Yield what changed; not that a type changed which it holds, as that is told of that type."""
+    for change in (*field_changes(sides), *constant_changes(sides)):
+        if change.code is not codes.USED_TYPE:
+            yield change
 
 
 def _with_wire(found: Sequence[Change], misread: bool) -> Iterator[Change]:
@@ -122,15 +136,6 @@ def _with_wire(found: Sequence[Change], misread: bool) -> Iterator[Change]:
             yield change._replace(levels=change.levels | {"wire"})
         else:
             yield change
-
-
-def _changed(name: ir.TypeName, before: Model, after: Model, seen: Seen) -> Iterator[Sides]:
-    """Yield the structures in a type, itself included, that both versions have and that differ."""
-    for each in sorted(_held(name, before) & _held(name, after)):
-        key = (str(each), before.describer.hash(str(each)), after.describer.hash(str(each)))
-        if key[1] != key[2] and key not in seen:
-            seen.add(key)
-            yield Sides(before.messages[each], after.messages[each], before, after)
 
 
 def _held(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
