@@ -5,9 +5,10 @@ import re
 import subprocess
 import sys
 
-import generated
 import pytest
-from installed import HERE
+
+from tests.support import generated
+from tests.support.paths import PROGRAMS
 
 #: Versions of one package.
 FILES = {
@@ -64,7 +65,7 @@ def start(lonely_environment, packages, nodes):
     def run(version, name, *words):
         nodes.append(
             subprocess.Popen(
-                [sys.executable, str(HERE / "graph_node.py"), name, *words],
+                [sys.executable, str(PROGRAMS / "graph_node.py"), name, *words],
                 env={**lonely_environment, "PYTHONPATH": str(packages / version)},
                 stdout=subprocess.PIPE,
                 text=True,
