@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -23,3 +24,9 @@ def python_folders(package: str) -> list[Path]:
     """Return the folders that importing a package would use, without importing it."""
     spec = PathFinder.find_spec(package, sys.path)
     return [Path(place) for place in (spec and spec.submodule_search_locations) or ()]
+
+
+def machine() -> str:
+    """Return the processor that programs here are for, such as `x86_64`; empty if not on Linux."""
+    whole = sys.maxsize > 1 << 32  # a 32-bit Python on a 64-bit kernel
+    return platform.machine() if sys.platform == "linux" and whole else ""
