@@ -17,7 +17,7 @@ TEMPLATES = sorted((ROOT / "templates").glob("*.jinja"))
 RUNTIME = [path for path in MODULES if path.parent.name == "runtime"]
 
 #: Each stage may import those before it; `runtime` stands apart and imports none.
-STAGES = "text syntax model checks emit native scaffold disk driver cli".split()
+STAGES = "text syntax model checks emit native scaffold disk driver cli backend".split()
 #: Stages that need fewer of those before them.
 NEEDS_ONLY = {"native": {"native", "model"}}
 #: What emit shares with the runtime, so that there is one rule for the names in Python.
@@ -26,7 +26,7 @@ SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 OUTERMOST = {"__main__": "cli", "__init__": "text", "build": "cli"}
 
 #: Only these stages may touch files, the environment or the terminal.
-MAY_DO_IO = {"disk", "cli"}
+MAY_DO_IO = {"disk", "cli", "backend"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
 #: What may read files of idlc: grammar, catalogue, templates, runtime, texts of licences.

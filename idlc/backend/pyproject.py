@@ -1,0 +1,49 @@
+"""The `[project]` table of a package: what pyproject.toml says, and package.xml besides."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from idlc.disk.config import FILE
+from idlc.text import codes
+from idlc.text.diagnostics import Report
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
+    """Return the table with what package.xml declares in place of what is absent or dynamic.
+
+    Without a table all of it is taken. With one it is what the standard demands: the table alone
+    says what holds, and `dynamic` names what is taken from elsewhere.
+    """
+    document = tomllib.loads(Path(FILE).read_text(encoding="utf-8")) if Path(FILE).is_file() else {}
+    table = document.get("project")
+    if not isinstance(table, dict):
+        return declared
+    dynamic = table.get("dynamic", [])
+    if not isinstance(dynamic, list):
+        return table  # which the builder refuses
+    unknown = [repr(key) for key in dynamic if key not in _DYNAMIC]
+    if unknown:
+        message = f"`dynamic` names {', '.join(unknown)}, which no package.xml tells"
+        hint = f"it may name {', '.join(f'`{key}`' for key in _DYNAMIC)}"
+        report.add(codes.BAD_CONFIG.of(FILE, message, hint=hint))
+    twice = [key for key in dynamic if key in table]
+    if twice:
+        message = f"`{twice[0]}` is both in [project] and in its `dynamic`"
+        report.add(codes.BAD_CONFIG.of(FILE, message, hint="remove one of them"))
+    taken = {key: declared[key] for key in dynamic if key in declared}
+    return {**table, **taken, "dynamic": []}
+
+
+#: What package.xml, and what lies beside it, can tell.
+_DYNAMIC = (
+    *("version", "description", "readme", "requires-python", "license"),
+    *("authors", "maintainers", "urls", "dependencies"),
+)
