@@ -19,6 +19,7 @@ from idlc.cli.ending import ended
 from idlc.disk import config
 from idlc.disk.distribution import Distribution
 from idlc.disk.package import MANIFEST
+from idlc.disk.read import reason
 from idlc.text import codes
 from idlc.text.diagnostics import Report
 
@@ -28,7 +29,9 @@ if TYPE_CHECKING:
     from idlc.backend.content import Content
 
 #: What a workspace or an earlier build left in the folder.
-_NO_SOURCES = ("/build", "/dist", "/install", "/log")
+_NO_SOURCES = ["/build", "/dist", "/install", "/log"]
+#: What is needed even if version control ignores it.
+_SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
 
 
 def finished(build: Callable[[Report], str | None]) -> str:
@@ -38,11 +41,16 @@ def finished(build: Callable[[Report], str | None]) -> str:
     def command() -> int:
         report = Report()
         if importlib.util.find_spec("hatchling") is None:
-            message = "idlc.backend has archives written by hatchling, which is not installed"
-            hint = "`pip install hatchling`, or build without --no-build-isolation"
-            report.add(codes.NOT_IMPORTABLE.of("", message, hint=hint))
-        else:
+            sys.stderr.write(
+                "Error: hatchling, which writes archives for idlc.backend, is not installed: "
+                "`pip install hatchling`, or build without --no-build-isolation\n"
+            )
+            return 2
+        try:
             built.extend(filter(None, [build(report)]))
+        except OSError as error:
+            message = f"cannot write the archive: {reason(error)}"
+            report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
         terminal.show(report, "text", sys.stderr)
         terminal.notes(report, sys.stderr)
         return 0 if built else terminal.status(report) or 1
@@ -61,7 +69,7 @@ def sdist(directory: str, report: Report) -> str | None:
     found = _declared(report)
     if found is None:
         return None
-    settings = {"project": found[1], **_target("sdist", exclude=[*_NO_SOURCES])}
+    settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
     return _written(SdistBuilder(str(Path.cwd()), config=settings), directory, report)
 
 

@@ -35,7 +35,7 @@ def project(report: Report) -> dict[str, Any]:
         report.add(codes.UNIMPORTABLE.of(MANIFEST, f"`{name}` {why}", hint=hint))
         return {}
     said = statements(path, MANIFEST, report)
-    version = _version(said, report)
+    version = None if report.had_errors else _version(said, report)
     if version is None:
         return {}
     found = {

@@ -23,21 +23,22 @@ def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     says what holds, and `dynamic` names what is taken from elsewhere.
     """
     document = tomllib.loads(Path(FILE).read_text(encoding="utf-8")) if Path(FILE).is_file() else {}
-    table = document.get("project")
-    if not isinstance(table, dict):
+    if "project" not in document:
         return declared
-    dynamic = table.get("dynamic", [])
-    if not isinstance(dynamic, list):
-        return table  # which the builder refuses
-    unknown = [repr(key) for key in dynamic if key not in _DYNAMIC]
-    if unknown:
-        message = f"`dynamic` names {', '.join(unknown)}, which no package.xml tells"
-        hint = f"it may name {', '.join(f'`{key}`' for key in _DYNAMIC)}"
-        report.add(codes.BAD_CONFIG.of(FILE, message, hint=hint))
-    twice = [key for key in dynamic if key in table]
-    if twice:
-        message = f"`{twice[0]}` is both in [project] and in its `dynamic`"
-        report.add(codes.BAD_CONFIG.of(FILE, message, hint="remove one of them"))
+    table = document["project"]
+    dynamic = table.get("dynamic", []) if isinstance(table, dict) else None
+    if not isinstance(dynamic, list) or not all(isinstance(key, str) for key in dynamic):
+        message = "`project` must be a table, and `dynamic` in it a list of strings"
+        report.add(codes.BAD_CONFIG.of(FILE, message))
+        return {}
+    for key in dynamic:
+        if key not in _DYNAMIC:
+            message = f"`dynamic` in [project] names `{key}`, which no package.xml tells"
+            hint = f"it may name {', '.join(f'`{known}`' for known in _DYNAMIC)}"
+            report.add(codes.BAD_CONFIG.of(FILE, message, hint=hint))
+        elif key in table:
+            message = f"`{key}` is both in [project] and in its `dynamic`"
+            report.add(codes.BAD_CONFIG.of(FILE, message, hint="remove one of them"))
     taken = {key: declared[key] for key in dynamic if key in declared}
     return {**table, **taken, "dynamic": []}
 
