@@ -58,7 +58,7 @@ def test_pip_installs_what_is_scaffolded(options, scaffolded, tmp_path):
     # what an editable installation has of the interfaces changes as one
     (scaffolded / "msg" / "Drive.msg").write_text("float32 velocity\n")
     assert "Drive(speed=0.0)" in imported(prefix, tmp_path)
-    run(*command, "--force-reinstall", cwd=tmp_path)
+    run(*command, "--ignore-installed", cwd=tmp_path)
     assert "Drive(velocity=0.0)" in imported(prefix, tmp_path)
     assert (prefix / "share/demo_msgs/msg/Drive.msg").read_text() == "float32 velocity\n"
     assert (prefix / "lib/libdemo_msgs__rosidl_typesupport_cpp.so").is_file()
