@@ -6,15 +6,14 @@ A package that is entered in ROS 2's index without a library for its types stops
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from typing import TypeGuard
 
 import msgspec
 
-from idlc.checks.facts import Facts
 from idlc.checks.python_files import is_setup, parsed, read_setup, start_of
-from idlc.model.link import Model
 from idlc.text import codes
-from idlc.text.diagnostics import Edit, Report
+from idlc.text.diagnostics import Diagnostic, Edit
 from idlc.text.source import Source, Span
 
 COMPILE = "compile_interfaces"
@@ -30,24 +29,20 @@ else:
 """
 
 
-def installed_libraries(facts: Facts, model: Model, report: Report) -> None:
-    """setup.py installs what C++ tools load, where the package is in the index by which they go."""
-    setup = facts.setup_py
-    if setup is None or facts.build_type != "ament_python" or not model.own:
-        return
+def unusable_entry(setup: Source, package: str) -> Iterator[Diagnostic]:
+    """Yield the problem with a setup.py that enters a package without installing libraries."""
     index = [text for text in read_setup(setup).data_files or () if "/packages" in text.value]
     if not index or installs(setup):
         return
     edits = edits_for(setup)
-    by_hand = "" if edits else f", as in `setup(**{RESULT}, ...)`"
+    by_hand = "; --fix does" if edits else f", as in `setup(**{RESULT}, ...)`"
     problem = codes.NO_LIBRARY.at(
         index[0].span,
-        f"`{facts.name}` is entered in ROS 2's index without libraries for its types, and stops "
+        f"`{package}` is entered in ROS 2's index without libraries for its types, and stops "
         "`ros2 bag record`",
-        hint=f"give setup() what `idlc.build.{COMPILE}` returns{by_hand}"
-        + ("; --fix does" if edits else ""),
+        hint=f"give setup() what `idlc.build.{COMPILE}` returns{by_hand}",
     )
-    report.add(msgspec.structs.replace(problem, edits=edits))
+    yield msgspec.structs.replace(problem, edits=edits)
 
 
 def installs(setup: Source) -> bool:
@@ -82,7 +77,7 @@ def _compiling(setup: Source, tree: ast.Module, call: ast.Call) -> tuple[Edit, .
         name = next((one.value for one in call.keywords if one.arg == "name"), None)
         if not isinstance(first, ast.Expr) or not isinstance(name, (ast.Name, ast.Constant)):
             return ()
-        gap = "\n" if setup.lines[first.lineno - 2 : first.lineno - 1] not in ([], [""]) else ""
+        gap = "\n" if any(setup.lines[first.lineno - 2 : first.lineno - 1]) else ""
         return (_insert(setup, first, gap + _BLOCK.format(name=ast.unparse(name))),)
     found = [one for one in tree.body if isinstance(one, ast.Try) and plain[0] in one.orelse]
     if len(plain) != 1 or len(found) != 1 or len(found[0].handlers) != 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from idlc.checks import installation, libraries, manifest
+from idlc.checks import installation, manifest
 from idlc.checks.facts import Facts
 from idlc.model.link import Model
 from idlc.text.diagnostics import Report
@@ -16,7 +16,7 @@ RULES = (
     manifest.declared_imports,
     installation.installed_interfaces,
     installation.resource_marker,
-    libraries.installed_libraries,
+    installation.installed_libraries,
     installation.entry_points,
     installation.names,
     installation.current_output,
