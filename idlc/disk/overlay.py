@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from pathlib import Path
 
 from idlc.disk import surroundings, write
 from idlc.disk.alone import alone
 from idlc.disk.library import Library
+from idlc.disk.package import manifest
 from idlc.disk.plan import Change, Plan
+from idlc.disk.read import read_bytes, shown
 from idlc.disk.target import Target
 from idlc.disk.tree import Tree
 from idlc.text.diagnostics import Report
@@ -20,10 +23,25 @@ MARK = b"# Written by idlc"
 class Overlay(Target):
     """A package in a prefix. What idlc wrote of it is recorded in its share folder."""
 
-    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+    def __init__(
+        self, name: str, package: str, home: Path | None, report: Report, *, force: bool = False
+    ) -> None:
         super().__init__(name, package, report, force=force)
+        declared = manifest(home) if home else None
+        #: The content of its package.xml; `None` if there is none to be copied.
+        self.manifest = read_bytes(declared, shown(declared), report) if declared else None
         self.home = f"share/{package}/"
         self.modules = f"{surroundings.modules_folder()}/{package}/"
+
+    @property
+    def place(self) -> str:
+        """The prefix's path, which shells need where they do not know what they read."""
+        return self._path.as_posix()
+
+    @property
+    def prefixes(self) -> tuple[Path, ...]:
+        """The prefixes in which what is installed here is used."""
+        return (self._path, *surroundings.ament_prefixes())
 
     def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
@@ -32,7 +50,8 @@ class Overlay(Target):
 
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""
-        return Overlay(self.name, package, self.report, force=self._force)
+        home = Library((), Report()).home(package)
+        return Overlay(self.name, package, home, self.report, force=self._force)
 
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False

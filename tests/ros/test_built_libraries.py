@@ -186,6 +186,32 @@ def test_without_a_library_the_package_is_not_in_the_index(scaffolded, environme
         assert "1.5" in said
 
 
+@pytest.mark.parametrize("shell", [None, "sh", "bash", "zsh"])
+def test_a_prefix_without_a_build(shell, scaffolded, ask, tmp_path):
+    prefix = tmp_path / "a prefix"
+    idlc("gen", scaffolded, "--ament", prefix, cwd=tmp_path)
+    assert ask(prefix) == hashes(scaffolded)
+    code = (
+        "from ament_index_python.packages import get_package_share_directory as share\n"
+        "from ament_index_python.resources import get_resource\n"
+        "from demo.msg import Drive\n"
+        "print(share('demo'), get_resource('rosidl_interfaces', 'demo')[0].split(), Drive())"
+    )
+    if shell is None:
+        (site,) = prefix.glob("lib/python3*/site-packages")
+        found = {"AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": str(site)}
+        said = run(sys.executable, "-c", code, cwd=tmp_path, **found)
+    else:
+        if not shutil.which(shell):
+            pytest.skip(f"no {shell}")
+        line = f'. "./a prefix/setup.{shell}" && "$0" -c "$1"'
+        clean = {"AMENT_PREFIX_PATH": "", "PYTHONPATH": ""}
+        said = run(shell, "-euc", line, sys.executable, code, cwd=tmp_path, **clean)
+    assert f"{prefix}/share/demo" in said
+    assert "'action/Park.action', 'action/Park.idl'" in said
+    assert "Drive(" in said
+
+
 def test_a_full_disk_leaves_the_old_library(scaffolded, ask, tmp_path):
     package = shutil.copytree(scaffolded, tmp_path / "demo")
     prefix = tmp_path / "prefix"
