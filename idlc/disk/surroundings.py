@@ -15,6 +15,17 @@ def ament_prefixes() -> tuple[Path, ...]:
     return tuple(dict.fromkeys(Path(prefix) for prefix in (*listed, sys.prefix) if prefix))
 
 
+def modules_folder() -> str:
+    """Return the folder of a prefix in which the Python of ROS 2 here looks for modules."""
+    found = (
+        path.parent.relative_to(prefix).as_posix()
+        for prefix in ament_prefixes()
+        for path in sorted(prefix.glob("lib/python3*/site-packages/rclpy"))
+    )
+    own = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+    return next(found, own)
+
+
 def runs_nodes() -> bool:
     """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
     return bool(python_folders("rclpy"))

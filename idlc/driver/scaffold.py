@@ -108,7 +108,8 @@ def interface(
     if setup is not None and lists is None:
         kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
         packages = [own, f"{own}._idlc", *(f"{own}.{one}" for one in sorted(kinds))]
-        edits.append(("setup.py", data_files.add_packages(setup, packages)))
+        wired = data_files.add_libraries(setup)
+        edits.append(("setup.py", data_files.add_packages(wired, packages)))
     edited = accepted(project, edits, report)
     if edited is None:
         return None

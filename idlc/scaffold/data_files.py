@@ -6,9 +6,12 @@ from collections.abc import Iterable
 
 import libcst as cst
 
+from idlc.checks.libraries import edits_for
 from idlc.scaffold.edit import Edited, Outcome, Refused
 from idlc.scaffold.python_text import appended, constants, parsed, quoted, string
 from idlc.scaffold.setup_py import setup_calls, strings
+from idlc.text.edits import apply
+from idlc.text.source import Source
 
 WHERE = "to `data_files` in the call of setup()"
 
@@ -37,6 +40,11 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     changed = module.deep_replace(listed[0], appended(listed[0], new))
     assert isinstance(changed, cst.Module)
     return Edited(changed.code)
+
+
+def add_libraries(text: str) -> str:
+    """Return a setup.py that makes and installs libraries for C++ tools, if it can be told to."""
+    return apply(text, edits_for(Source("setup.py", text)))[0]
 
 
 def add_packages(text: str, names: Iterable[str]) -> Outcome:

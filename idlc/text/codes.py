@@ -124,6 +124,7 @@ BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING)
 NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING)
 UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING)
 STALE_OUTPUT = Code("IDL460", "stale-generated-code", WARNING)
+NO_LIBRARY = Code("IDL461", "no-library-installed", WARNING)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)

@@ -1,6 +1,10 @@
 """Prefixes that hold the libraries that idlc writes, and nothing else of a package."""
 
+import sys
 from pathlib import Path
+
+from installed import HERE
+from tools import run, tool
 
 from idlc.disk.find import look
 from idlc.disk.inputs import packages
@@ -11,6 +15,15 @@ from idlc.native.library import MACHINES, libraries
 from idlc.text.diagnostics import Report
 
 INDEX = "share/ament_index/resource_index/packages"
+
+
+def built(folder, machine="x86_64"):
+    """Return the program of native_ask.cpp, built for a machine with ROS 2's own headers."""
+    include = Path(sys.prefix, "include")
+    folders = [include, *(path for path in include.glob("r*") if path.name != "rcl")]
+    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in folders)]
+    run(tool("g++", machine), *options, HERE / "native_ask.cpp", "-o", folder / "ask", "-ldl")
+    return folder / "ask"
 
 
 def model_of(folder):

@@ -1,11 +1,8 @@
 """A C++ program does with idlc's libraries what rclcpp and rosbag2 do, on either machine."""
 
-import sys
-from pathlib import Path
-
 import pytest
 from installed import HERE, SHARE, interfaces_in, names_in
-from native import install, model_of
+from native import built, install, model_of
 from tools import MACHINES, emulator, run, tool
 
 from idlc.native.library import OWN
@@ -42,17 +39,12 @@ def prefixes(models, tmp_path_factory):
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a function that builds the program for a machine, with ROS 2's own headers."""
-    include = Path(sys.prefix, "include")
-    folders = [include, *(path for path in include.glob("r*") if path.name != "rcl")]
-    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in folders)]
-    built = {}
+    found = {}
 
     def build(machine):
-        if machine not in built:
-            built[machine] = tmp_path_factory.mktemp(machine) / "ask"
-            source = HERE / "native_ask.cpp"
-            run(tool("g++", machine), *options, source, "-o", built[machine], "-ldl")
-        return built[machine]
+        if machine not in found:
+            found[machine] = built(tmp_path_factory.mktemp(machine), machine)
+        return found[machine]
 
     return build
 
