@@ -45,6 +45,7 @@ FILES = {
 PREFIX = {  # what is installed besides classes
     "lib/libdemo_msgs__rosidl_typesupport_cpp.so",
     "lib/libdemo_msgs__rosidl_typesupport_introspection_cpp.so",
+    "share/ament_index/resource_index/package_run_dependencies/demo_msgs",
     "share/ament_index/resource_index/packages/demo_msgs",
     "share/ament_index/resource_index/rosidl_interfaces/demo_msgs",
     "share/demo_msgs/package.xml",
@@ -349,7 +350,7 @@ def test_without_a_library_a_package_is_not_entered_in_the_index(
     files, _ = read(wheel)
     assert not [name for name in files if "/lib/" in name or "/packages/" in name]
     assert [name for name in files if "/rosidl_interfaces/" in name]
-    assert "recorders stop at one without a library" in capfd.readouterr().err
+    assert "recorders stop at packages without a library" in capfd.readouterr().err
 
 
 def test_the_distribution_can_be_told(source, tmp_path, capfd):

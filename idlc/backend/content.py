@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,14 +17,11 @@ from idlc.disk.package import MANIFEST
 from idlc.disk.read import is_folder, read_bytes
 from idlc.disk.scope import Scope, scope
 from idlc.driver.gen import GenOptions, gen
-from idlc.driver.libraries import Libraries, libraries_of
+from idlc.driver.libraries import libraries_of
+from idlc.driver.share import INTERFACES, shared
 from idlc.driver.stages import models_of
-from idlc.model.idl import idl
-from idlc.model.link import Model
 from idlc.text import codes
 from idlc.text.diagnostics import Report
-
-_INDEX = "share/ament_index/resource_index"
 
 
 class Content(NamedTuple):
@@ -63,8 +59,11 @@ def compiled(
     (classes / "__init__.py").write_text(f'"""Interfaces of {name}."""\n', encoding="utf-8")
     ((_, model),) = models_of((given,), where, Report())
     libraries = libraries_of(model, distribution)
-    files = {**_share(given, model), f"share/{name}/{MANIFEST}": manifest, **libraries.files}
-    return Content(classes, {**files, **_entry(name, libraries, report)}, bool(libraries.files))
+    files = shared(model, manifest, libraries, report)
+    prefix = {
+        path: text.encode() if isinstance(text, str) else text for path, text in files.items()
+    }
+    return Content(classes, prefix, bool(libraries.files))
 
 
 def _required_prefixes() -> list[str]:
@@ -72,12 +71,11 @@ def _required_prefixes() -> list[str]:
 
     They install what `requires` names on sys.path, and not always below sys.prefix.
     """
-    libraries = (
-        Path(path) for path in sys.path if path.endswith(("site-packages", "dist-packages"))
-    )
-    prefixes = (path.parents[2] for path in libraries if len(path.parents) > 2)
-    found = [path for path in prefixes if is_folder(path / _INDEX / "rosidl_interfaces")]
-    return [f"{path}/share" for path in dict.fromkeys(found) if path != Path(sys.prefix)]
+    ends = ("site-packages", "dist-packages")
+    places = dict.fromkeys(Path(path) for path in sys.path if path.endswith(ends))
+    prefixes = [place.parents[2] for place in places if len(place.parents) > 2]
+    found = [path for path in prefixes if is_folder(path / INTERFACES)]
+    return [f"{path}/share" for path in found if path != Path(sys.prefix)]
 
 
 def _package(name: str, where: Scope, report: Report) -> Inputs | None:
@@ -92,27 +90,3 @@ def _package(name: str, where: Scope, report: Report) -> Inputs | None:
         hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
         report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
     return None if report.had_errors else given[0]
-
-
-def _share(given: Inputs, model: Model) -> dict[str, bytes]:
-    """Return the interfaces as ROS 2 installs them, and the list of them."""
-    files = {one.file.key: one.data for one in given.files}
-    for own in model.own:
-        stem = f"{own.name.kind}/{own.name.name}"
-        installed = model.describer.installed(str(own.name))
-        files[f"{stem}.idl"] = idl(own).encode()
-        files[f"{stem}.json"] = json.dumps(installed, indent=2).encode()
-    listed = sorted(key for key in files if not key.endswith(".json"))
-    shared = {f"share/{given.package}/{key}": data for key, data in files.items()}
-    return {**shared, f"{_INDEX}/rosidl_interfaces/{given.package}": "\n".join(listed).encode()}
-
-
-def _entry(name: str, libraries: Libraries, report: Report) -> dict[str, bytes]:
-    """Return the entry in the index of packages; recorders stop at one without libraries."""
-    if libraries.missing:
-        report.notes.append(
-            f"`{name}` is not entered in the index of ROS 2's packages, because recorders stop at "
-            f"one without a library for C++ tools: {libraries.missing}"
-        )
-        return {}
-    return {f"{_INDEX}/packages/{name}": b""}
