@@ -364,9 +364,10 @@ def test_the_distribution_can_be_told(source, tmp_path, capfd):
     }
     assert libraries["jazzy"] == libraries["kilted"]
     assert libraries["jazzy"] != libraries["humble"] != libraries["lyrical"]
-    with pytest.raises(SystemExit):
-        built(tmp_path, settings={"distro": "foxy"})
-    assert "which idlc does not know" in capfd.readouterr().err
+    for unknown in ("foxy", "", ["humble", "jazzy"], True):
+        with pytest.raises(SystemExit):
+            built(tmp_path, settings={"distro": unknown})
+        assert "which idlc does not know" in capfd.readouterr().err
 
 
 def test_a_package_may_refer_to_others_and_leave_files_out(source, tmp_path):

@@ -109,12 +109,13 @@ def _distribution(settings: Mapping[str, Any], report: Report) -> Distribution |
     from idlc.native.layouts import LAYOUTS
 
     wanted = settings.get("distro")
+    if isinstance(wanted, str) and wanted in LAYOUTS:
+        return Distribution(wanted, f"distro={wanted}")
     if wanted is None:
         return None
-    if wanted not in LAYOUTS:
-        message = f"the setting `distro` is {wanted!r}, which idlc does not know"
-        report.add(codes.BAD_CONFIG.of("", message, hint=f"it is one of {', '.join(LAYOUTS)}"))
-    return Distribution(str(wanted), f"distro={wanted}")
+    message = f"the setting `distro` is {wanted!r}, which idlc does not know"
+    report.add(codes.BAD_CONFIG.of("", message, hint=f"it is one of {', '.join(LAYOUTS)}"))
+    return None
 
 
 def _packed(
