@@ -79,6 +79,17 @@ def change(package, number):
     return hashes(package)
 
 
+def checked(prefix):
+    """Return the status of a check of what is installed, and what it says."""
+    command = [sys.executable, "-m", "idlc", "check", "--prefix", prefix]
+    return programs.ended(*command, cwd=ROOT, environment={**os.environ, "PYTHONPATH": str(ROOT)})
+
+
+def test_what_rosidl_built_is_in_order():
+    status, said = checked(sys.prefix)
+    assert (status, said.startswith("no problems in ")) == (0, True), said
+
+
 def commands(prefix, package="demo"):
     """Return the files that `ros2 run` and launch files start: executable ones below lib/NAME."""
     code = (
@@ -103,7 +114,10 @@ def test_colcon_builds_it_with_links_and_without_in_any_order(scaffolded, ask, t
             assert (prefix / path).is_file()
             assert (prefix / path).is_symlink() == bool(options)
         assert [path.name for path in commands(prefix)] == ["hello"]
+        assert checked(tmp_path / "install")[0] == 0
         expected = change(package, number)
+    status, said = checked(tmp_path / "install")
+    assert (status, "is out of date: `demo/msg/Drive` changed" in said) == (1, True)
     new = {path for path in package.rglob("*") if "demo/demo/" not in path.as_posix()} - before
     assert not [path for path in new if path.suffix not in ("", ".json")], "not part of the source"
 
