@@ -47,7 +47,7 @@ def distribution_class(package: str, libraries: Mapping[str, bytes], missing: st
         if missing:
             sys.stderr.write(f"{package}: not entered in the index of ROS 2: {missing}\n")
             listed = [one for one in listed if not _enters(one)]
-        self.data_files = listed + _made(place, added)
+        self.data_files = _made(place, added) + listed  # the index comes after what it leads to
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
         base.run_commands(self)
 

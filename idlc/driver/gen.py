@@ -60,6 +60,7 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     done: list[Generated] = []
     for run in runs:
         done += () if report.had_errors else _written(run, report)
+    report.notes[:] = dict.fromkeys(report.notes)
     return () if report.had_errors else tuple(done)
 
 
