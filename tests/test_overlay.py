@@ -137,8 +137,8 @@ def test_a_named_type_brings_its_whole_package(idlc, tmp_path):
 
 
 def test_both_an_out_and_a_prefix(idlc, tmp_path):
-    write(tmp_path / "arm", Reach="float64 metres\n")
-    assert idlc("gen", "arm", "--ament", "out", "-o", "code/arm")[0] == 0
+    write(tmp_path / "interfaces", Reach="float64 metres\n")
+    assert idlc("gen", "interfaces", "--ament", "out", "-o", "code/arm")[0] == 0
     assert (tmp_path / "out" / LIBRARY.format("arm")).is_file()
     assert (tmp_path / "code" / "arm" / "msg" / "_reach.py").is_file()
 

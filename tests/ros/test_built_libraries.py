@@ -247,6 +247,7 @@ def test_a_full_disk_leaves_the_old_library(scaffolded, ask, tmp_path):
             limited, cwd=package, env=environment, check=False, capture_output=True
         )
         assert done.returncode != 0, step
+        assert b"Traceback" not in done.stderr, step
         assert (prefix / LIBRARY).read_bytes() == old
         change(package, number)
     subprocess.run(install, cwd=package, env=environment, check=True, capture_output=True)
