@@ -137,8 +137,8 @@ def test_a_named_type_brings_its_whole_package(idlc, tmp_path):
 
 
 def test_both_an_out_and_a_prefix(idlc, tmp_path):
-    write(tmp_path / "arm", Reach="float64 metres\n")
-    assert idlc("gen", "arm", "--ament", "out", "-o", "code/arm")[0] == 0
+    write(tmp_path / "interfaces", Reach="float64 metres\n")
+    assert idlc("gen", "interfaces", "--ament", "out", "-o", "code/arm")[0] == 0
     assert (tmp_path / "out" / LIBRARY.format("arm")).is_file()
     assert (tmp_path / "code" / "arm" / "msg" / "_reach.py").is_file()
 
@@ -159,6 +159,30 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
     assert "zazzy" in said or "Linux on x86_64 and aarch64" in said
     assert not (tmp_path / "out" / INDEX / "packages" / "arm").exists()
     assert not (tmp_path / "out" / LIBRARY.format("arm")).exists()
+
+
+@pytest.mark.parametrize("shell", ["sh", "bash", "zsh"])
+def test_a_shell_only_ever_sees_a_path(shell, idlc, tmp_path):
+    if not shutil.which(shell):
+        pytest.skip(f"no {shell}")
+    name = "a '$(touch x)`touch y`\"{{ z }}}"
+    write(tmp_path / "arm", Reach="float64 metres\n")
+    assert idlc("gen", "arm", "--ament", name)[0] == 0
+    line = '. "$1" && printf "%s\\n" "$AMENT_PREFIX_PATH" "$PYTHONPATH"'
+    for before in ("", "/opt/ros/jazzy"):
+        environment = {**os.environ, "AMENT_PREFIX_PATH": before, "PYTHONPATH": before}
+        command = [shell, "-euc", f"{line}; {line}", shell, f"{tmp_path}/{name}/setup.{shell}"]
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True, cwd=tmp_path
+        )
+        rest = f":{before}" if before else ""
+        prefix, modules, *again = done.stdout.splitlines()
+        assert prefix == f"{tmp_path}/{name}{rest}"
+        assert modules.startswith(f"{tmp_path}/{name}/lib/python3")
+        assert modules.endswith(f"/site-packages{rest}")
+        assert again == [prefix, modules]
+        assert not done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {".git", "arm", name}
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from idlc.disk.read import reason
+
 #: By an entry here, recorders and others take a package for one whose library can be loaded.
 INDEX = "share/ament_index/resource_index/packages"
 #: How a file is called until it is whole.
@@ -47,7 +49,11 @@ def distribution_class(package: str, libraries: Mapping[str, bytes], missing: st
         if missing:
             sys.stderr.write(f"{package}: not entered in the index of ROS 2: {missing}\n")
             listed = [one for one in listed if not _enters(one)]
-        self.data_files = listed + _made(place, added)
+        try:
+            made = _made(place, added)
+        except OSError as error:
+            raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
+        self.data_files = made + listed  # the index comes after what it leads to
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
         base.run_commands(self)
 

@@ -56,10 +56,11 @@ class Generated(NamedTuple):
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
     runs = [options._replace(ament="")] if options.out else []
-    runs += [options._replace(out="")] if options.ament else []
+    runs += [options] if options.ament else []  # OUT may give the package its name
     done: list[Generated] = []
     for run in runs:
         done += () if report.had_errors else _written(run, report)
+    report.notes[:] = dict.fromkeys(report.notes)
     return () if report.had_errors else tuple(done)
 
 
