@@ -8,19 +8,19 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from idlc.cli import terminal
-from idlc.disk import config
+from idlc.cli import output
+from idlc.diagnostics.report import Report
+from idlc.disk import pyproject
 from idlc.disk.find import look
 from idlc.disk.inputs import packages
-from idlc.disk.project import Project
+from idlc.disk.output.project import Project
 from idlc.disk.scope import scope
 from idlc.disk.setup_command import distribution_class
 from idlc.driver.gen import GenOptions, gen
 from idlc.driver.libraries import Libraries, libraries_of
 from idlc.driver.query import describe
 from idlc.driver.stages import models_of
-from idlc.scaffold import interface
-from idlc.text.diagnostics import Report
+from idlc.scaffold import new_interface
 
 
 def compile_interfaces(package: str) -> dict[str, type]:
@@ -59,22 +59,22 @@ def _link(paths: Iterable[str], source: Path, here: Path) -> None:
 def _compile(package: str) -> tuple[Iterable[str], Libraries]:
     """Compile the package in the working folder; return the files that ROS 2's tools read."""
     report = Report()
-    where = scope(config.load(report), package)
+    where = scope(pyproject.load(report), package)
     found = packages(look((".",), Report(), where.exclude).files, where, report)
     if not found:
         return (), Libraries({})
     (given,) = found
     gen(GenOptions(paths=(".",), out=package, scope=where), report)
     project = Project(".", report)
-    files = dict([interface.index(package, given.digests)])
+    files = dict([new_interface.index(package, given.digests)])
     for one in given.files:
         if not report.had_errors:
             content = json.dumps(describe(one.file.shown, where, report), indent=2)
-            files[f"{interface.RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
+            files[f"{new_interface.RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
     planned = None if report.had_errors else project.plan({}, files)
     if planned is not None:
         project.apply(planned[0])
-    terminal.show(report, "text", sys.stderr)
+    output.show(report, "text", sys.stderr)
     if report.had_errors:
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
     ((_, model),) = models_of(found, where, Report())

@@ -4,12 +4,12 @@ import random
 
 import reference_cdr
 
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 TYPES = (
     "bool byte char int8 uint8 int16 uint16 int32 uint32 int64 uint64 float32 float64 "

@@ -18,7 +18,7 @@ from pathlib import Path
 import fuzzing_edits as edits
 
 from idlc.cli.main import main
-from idlc.disk.lock import FILE
+from idlc.disk.output.lock_file import FILE
 
 ROOT = Path(__file__).parents[1]
 CORPUS = Path(__file__).parent / "corpus"

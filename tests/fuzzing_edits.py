@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from idlc.scaffold import ini, launch_py, package_xml, setup_py
-from idlc.scaffold.edit import Edited, Outcome, Script
+from idlc.scaffold.edits import ini, launch_py, package_xml, setup_py
+from idlc.scaffold.edits.outcome import Edited, Outcome, Script
 
 TALKER = Script("talker", "demo.talker:main")
 

@@ -7,13 +7,13 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.emit.render import render_package
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 ROOT = Path(__file__).parent.parent
 RECORDED = ROOT / "golden" / "rosidl" / "interfaces"

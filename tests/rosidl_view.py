@@ -5,13 +5,13 @@ A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `te
 """
 
 from idlc import checks
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
 from idlc.model.link import Model, link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.escapes import through_idl
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 
 class Siblings:

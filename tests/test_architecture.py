@@ -33,7 +33,7 @@ IO_CALLS = {"open", "print", "input"}
 READS_ITS_OWN = {
     "idlc/emit/render.py",
     "idlc/model/catalog.py",
-    "idlc/scaffold/package.py",
+    "idlc/scaffold/new_package.py",
     "idlc/syntax/grammar.py",
 }
 
@@ -47,9 +47,9 @@ MODULE_BUDGET = 300
 FUNCTION_BUDGET = 40
 #: path, or path:function, that is over budget -> why it stays so.
 OVER_BUDGET: dict[str, str] = {
-    "idlc/emit/decode.py": "one method for each step of a layout plan, over one state",
-    "idlc/runtime/typesupport_services.py:event": "two callbacks over what they close over",
-    "idlc/emit/encode.py": "one method for each step of a layout plan, over one state",
+    "idlc/emit/codec/decode.py": "one method for each step of a layout plan, over one state",
+    "idlc/runtime/typesupport/services.py:event": "two callbacks over what they close over",
+    "idlc/emit/codec/encode.py": "one method for each step of a layout plan, over one state",
 }
 
 
@@ -270,5 +270,5 @@ def test_checking_a_file_imports_little(tmp_path):
     needless |= {"numpy", "pkgutil", "rich", "shutil", "subprocess", "tempfile", "tomllib"}
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
-    assert "idlc.checks.package" in own
+    assert "idlc.checks.package_rules" in own
     assert len(own) <= 70, "what a run without problems does not need can wait"

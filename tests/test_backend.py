@@ -15,7 +15,7 @@ import pytest
 from programs import ended
 
 from idlc import backend
-from idlc.disk import surroundings
+from idlc.disk import environment
 
 ROOT = Path(__file__).parents[1]
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
@@ -74,7 +74,7 @@ def source(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def an_x86_64(monkeypatch):
-    monkeypatch.setattr(surroundings, "machine", lambda: "x86_64")
+    monkeypatch.setattr(environment, "machine", lambda: "x86_64")
 
 
 def built(folder, hook=backend.build_wheel, settings=None):
@@ -344,7 +344,7 @@ def test_the_builder_may_be_missing(source, tmp_path, capfd, monkeypatch):
 def test_without_a_library_a_package_is_not_entered_in_the_index(
     source, tmp_path, capfd, monkeypatch
 ):
-    monkeypatch.setattr(surroundings, "machine", lambda: "")
+    monkeypatch.setattr(environment, "machine", lambda: "")
     wheel = built(tmp_path)
     assert wheel.name == "demo_msgs-1.2.3-py3-none-any.whl"
     files, _ = read(wheel)

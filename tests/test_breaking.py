@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from evolution import Evolution, compile_texts
 
+from idlc.breaking.packages import Comparison, compare
+from idlc.breaking.version import part_to_raise, raised
 from idlc.cli.main import main
-from idlc.model.changes.packages import Comparison, compare
-from idlc.model.changes.version import part_to_raise, raised
 
 
 def found(old, new):

@@ -13,9 +13,9 @@ import pytest
 from sarif_schema import path_of, run_of
 
 from idlc.checks.lint import RULES as LINT_RULES
-from idlc.checks.package import RULES as PACKAGE_RULES
+from idlc.checks.package_rules import RULES as PACKAGE_RULES
 from idlc.cli.main import main
-from idlc.text.codes import CODES
+from idlc.diagnostics.codes import CODES
 
 #: Ten mistakes of ten kinds in five files.
 MISTAKES = {

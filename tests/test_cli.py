@@ -14,7 +14,7 @@ import pytest
 from idlc import __version__
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
-from idlc.text import codes
+from idlc.diagnostics import codes
 
 MSG = "float64 speed\n"
 
@@ -445,7 +445,7 @@ def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monk
 
     make("demo/msg/A.msg", "stereo_msgs/DisparityImage image\nstd_msgs/Header header\n")
     here = {"rclpy": ["/ros/rclpy"]}
-    folders = "idlc.disk.surroundings.python_folders"
+    folders = "idlc.disk.environment.python_folders"
     monkeypatch.setattr(folders, lambda package: [Path(one) for one in here.get(package, ())])
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
     assert "warning[IDL617]" in capsys.readouterr().err

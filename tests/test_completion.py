@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.app import COMMANDS
-from idlc.text.codes import CODES
+from idlc.diagnostics.codes import CODES
 
 MANIFEST = '<package format="3"><name>greenhouse</name></package>'
 CODE = "import sys\nfrom idlc.cli.main import main\nsys.argv = ['idlc']\nmain()\n"

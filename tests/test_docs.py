@@ -150,7 +150,7 @@ def test_a_page_holds_the_text_of_its_file(site):
 
 
 def test_only_what_is_drawn_is_kept_as_drawn():
-    from idlc.emit.site.html import prose
+    from idlc.site.html import prose
 
     assert prose(["-PI..+PI,  (radians)"]).startswith("<p>")
     assert prose(["one  two"]).startswith("<p>"), "one line is no drawing"

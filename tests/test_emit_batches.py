@@ -37,7 +37,7 @@ def msg(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def runtime(msg):
-    import batch_msgs._idlc.batches
+    import batch_msgs._idlc.on_demand.batches
 
     return batch_msgs._idlc
 

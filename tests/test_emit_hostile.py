@@ -9,11 +9,11 @@ import generated
 import pytest
 import values
 
+from idlc.diagnostics.report import Report
 from idlc.model import catalog, derive
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
 
 pytestmark = pytest.mark.usefixtures("standard")
 

@@ -9,7 +9,7 @@ import generated
 import pytest
 import values
 
-from idlc.emit import pretty
+from idlc.emit import python_lines
 from idlc.emit.render import render_package
 
 PARTS = {
@@ -54,7 +54,7 @@ def rendered(monkeypatch):
     """Return a function that renders a model with lines of some width."""
 
     def render(model, width):
-        monkeypatch.setattr(pretty, "WIDTH", width)
+        monkeypatch.setattr(python_lines, "WIDTH", width)
         return {file.path: file.text for file in render_package(model) if "/_" in file.path}
 
     return render
@@ -79,7 +79,9 @@ def test_statements_say_the_same_in_lines_of_every_width(rendered):
 def test_one_target_that_does_not_fit_on_a_line_remains_a_tuple():
     for width in range(60, 120):
         name = "x" * (width - len("(,) = read(data)"))
-        found = pretty.assign(pretty.tuple_of(name), pretty.call("read", "data"), 0)
+        found = python_lines.assign(
+            python_lines.tuple_of(name), python_lines.call("read", "data"), 0
+        )
         assert isinstance(ast.parse("\n".join(found)).body[0].targets[0], ast.Tuple), found
 
 

@@ -9,8 +9,8 @@ import pytest
 import reference_cdr
 from evolution import Evolution, compile_texts, old_bytes_are_misread
 
+from idlc.breaking.packages import compare
 from idlc.emit.render import render_package
-from idlc.model.changes.packages import compare
 
 EDITS = int(os.environ.get("IDLC_EVOLUTION_EDITS", "20000"))
 PARTS = 8

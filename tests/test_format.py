@@ -11,13 +11,13 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from inventions import Inventor
 
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.model import ir
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.model.meaning import meaning
 from idlc.syntax.format import format_file
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 GOLDEN = Path(__file__).parents[1] / "golden" / "spec" / "accept_reject.jsonl"
 CASES = [

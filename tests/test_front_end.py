@@ -7,13 +7,13 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from idlc import checks
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.literals import Fault, scalar
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
+from idlc.model.lowering.literals import Fault, scalar
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 WORDS = [
     "int32",

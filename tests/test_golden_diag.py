@@ -15,8 +15,8 @@ import pytest
 import refresh
 
 from idlc.cli.main import main
-from idlc.text.codes import CODES
-from idlc.text.pages import page
+from idlc.diagnostics.code_pages import page
+from idlc.diagnostics.codes import CODES
 
 FOLDER = Path(__file__).parents[1] / "golden" / "diag"
 CASES = sorted(FOLDER.glob("*.txt"))
@@ -45,7 +45,7 @@ def test_every_code_has_a_case(code):
 def parts(code: str, title: str) -> tuple[dict[str, str], list[str]]:
     """Return the files and the commands of a section of a code's page."""
     text = page(code)
-    assert text is not None, f"idlc/text/explain/{code}.md is missing"
+    assert text is not None, f"idlc/diagnostics/explain/{code}.md is missing"
     section = text.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
     blocks = dict(re.findall(r"^```(\S+)\n(.*?)^```$", section, re.MULTILINE | re.DOTALL))
     console = blocks.pop("console", "$ idlc check .\n")
@@ -82,7 +82,7 @@ def tried(tmp_path, monkeypatch, capsys):
         return done.stdout + done.stderr
 
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.setattr("idlc.disk.surroundings.runs_nodes", lambda: True)
+    monkeypatch.setattr("idlc.disk.environment.runs_nodes", lambda: True)
     return run
 
 

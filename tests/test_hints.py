@@ -5,13 +5,13 @@ import re
 import pytest
 
 from idlc import checks
+from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.source import Source
+from idlc.diagnostics.suggest import closest, package_hint
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report, Severity
-from idlc.text.source import Source
-from idlc.text.suggest import closest, package_hint
 
 
 def errors(text, kind="msg"):

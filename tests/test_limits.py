@@ -17,8 +17,8 @@ import pytest
 
 import idlc.disk.inputs
 import idlc.model.pool
+from idlc.checks.size import MAX_DEPTH
 from idlc.cli.main import main
-from idlc.emit.limits import MAX_DEPTH
 
 #: How much larger input is when there is time, as in `make fuzz`.
 SCALE = 5 if os.environ.get("IDLC_LONG") else 1
@@ -155,7 +155,7 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
         return read_bytes_(path, *rest)
 
     lower_, read_bytes_ = idlc.model.lower.lower, idlc.disk.read.read_bytes
-    for module in ("idlc.model.lower.lower", "idlc.model.pool.lower"):
+    for module in ("idlc.model.lowering.file.lower", "idlc.model.pool.lower"):
         monkeypatch.setattr(module, lower)
     for module in ("idlc.disk.read.read_bytes", "idlc.disk.inputs.read_bytes"):
         monkeypatch.setattr(module, read_bytes)

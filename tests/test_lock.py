@@ -10,8 +10,8 @@ from fuzzing import idlc
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from idlc.disk import lock, tree
-from idlc.text.diagnostics import Report
+from idlc.diagnostics.report import Report
+from idlc.disk.output import lock_file, tree
 
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)
 JSON = st.recursive(
@@ -76,14 +76,14 @@ def attempt(folder: Path, data: bytes) -> None:
     out = folder / "out/demo"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    (out / lock.FILE).write_bytes(data)
+    (out / lock_file.FILE).write_bytes(data)
     report = Report()
-    known = lock.load(out, "demo", report)
+    known = lock_file.load(out, "demo", report)
     assert [one.code for one in report] == ([] if known else ["IDL615"])
     here = str(folder / "demo")
     checked = idlc("gen", here, "-o", str(out), "--check")
     assert known or checked == 2
-    assert idlc("breaking", here, "--against", str(out / lock.FILE)) == 2 or known
+    assert idlc("breaking", here, "--against", str(out / lock_file.FILE)) == 2 or known
     assert idlc("gen", here, "-o", str(out)) == (0 if known else 2)
     assert sorted(path.name for path in folder.iterdir()) == [".git", "demo", "out"]
 

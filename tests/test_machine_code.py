@@ -10,19 +10,19 @@ from pathlib import Path
 import pytest
 from tools import MACHINES, assemble, emulator, is_foreign, run, tool
 
-from idlc.runtime import (
-    typesupport_fastrtps_aarch64,
-    typesupport_fastrtps_x86_64,
-    typesupport_structs_aarch64,
-    typesupport_structs_x86_64,
+from idlc.runtime.typesupport import (
+    fastrtps_aarch64,
+    fastrtps_x86_64,
+    structs_aarch64,
+    structs_x86_64,
 )
 
 HERE = Path(__file__).parent
 MODULES = {
-    ("structs", "x86_64"): typesupport_structs_x86_64,
-    ("structs", "aarch64"): typesupport_structs_aarch64,
-    ("fastrtps", "x86_64"): typesupport_fastrtps_x86_64,
-    ("fastrtps", "aarch64"): typesupport_fastrtps_aarch64,
+    ("structs", "x86_64"): structs_x86_64,
+    ("structs", "aarch64"): structs_aarch64,
+    ("fastrtps", "x86_64"): fastrtps_x86_64,
+    ("fastrtps", "aarch64"): fastrtps_aarch64,
 }
 
 

@@ -11,8 +11,8 @@ import pytest
 from machine import running, tree
 
 from idlc.cli.main import main
+from idlc.diagnostics.codes import CANNOT_WRITE
 from idlc.disk.distribution import Distribution
-from idlc.text.codes import CANNOT_WRITE
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n"}
 NEW = {"msg/A.msg": "int16 a\n", "msg/B.msg": "A a\nbuiltin_interfaces/Time time\n"}
@@ -149,7 +149,7 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
     assert idlc("gen", "arm", "--ament", "out")[0] == 0
     assert (tmp_path / "out" / INDEX / "packages" / "arm").is_file()
     if missing == "processor":
-        monkeypatch.setattr("idlc.disk.surroundings.machine", lambda: "riscv64")
+        monkeypatch.setattr("idlc.disk.environment.machine", lambda: "riscv64")
     else:
         strange = Distribution("", "rosidl 9.9 in /opt/ros/zazzy")
         monkeypatch.setattr("idlc.driver.overlay.distribution", lambda _: strange)

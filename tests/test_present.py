@@ -8,17 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from idlc.text import codes, present
-from idlc.text.diagnostics import Label, Report
-from idlc.text.source import Source, Span
-from idlc.text.visible import display_width, one_line, visible
+from idlc.diagnostics import codes
+from idlc.diagnostics.formats import terminal
+from idlc.diagnostics.report import Label, Report
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.visible import display_width, one_line, visible
 
 
 def shown(text: str, start: int, end: int, **options) -> list[str]:
     report = Report()
     span = Span(Source("a.msg", text), start, end)
     report.add(codes.UNKNOWN_TYPE.at(span, "unknown", hint="do this", **options))
-    (block,) = present.text(report)
+    (block,) = terminal.text(report)
     return block.splitlines()
 
 
@@ -56,7 +57,7 @@ def test_labels_in_the_same_file_and_in_another():
     labels = (Label(Span(source, 0, 4), "first"), Label(Span(other, 0, 1), "also"))
     report = Report()
     report.add(codes.DUPLICATE_FIELD.at(Span(source, 85, 88), "again", labels=labels))
-    (block,) = present.text(report)
+    (block,) = terminal.text(report)
     assert block.splitlines() == [
         "error[IDL208]: again",
         "  --> a.msg:11:6",
@@ -77,7 +78,7 @@ def test_long_lines_are_cut_around_the_caret():
     text = "a" * 5000 + " here " + "b" * 5000
     block = shown(text, 5001, 5005)
     line, caret = block[3].partition("| ")[2], block[4].partition("| ")[2]
-    assert len(line) <= present.LINE_WIDTH + 2
+    assert len(line) <= terminal.LINE_WIDTH + 2
     assert line.startswith("…a")
     assert line.endswith("b…")
     assert line[caret.index("^") : caret.rindex("^") + 1] == "here"
@@ -88,30 +89,30 @@ def test_a_hundred_problems_are_shown_and_the_rest_counted():
     source = Source("a.msg", "x" * 200)
     for number in range(150):
         report.add(codes.UNKNOWN_TYPE.at(Span(source, number, number + 1), f"number {number}"))
-    *blocks, rest = present.text(report)
-    assert len(blocks) == present.LIMIT
+    *blocks, rest = terminal.text(report)
+    assert len(blocks) == terminal.LIMIT
     assert "50 more" in rest
-    assert present.summary(report) == "150 errors in 1 file"
-    assert len(list(present.json_lines(report))) == 150
+    assert terminal.summary(report) == "150 errors in 1 file"
+    assert len(list(terminal.json_lines(report))) == 150
 
 
 def test_colour_is_an_argument_and_changes_no_letter():
     report = Report()
     source = Source("a.msg", "flot64 a\n")
     report.add(codes.UNKNOWN_TYPE.at(Span(source, 0, 6), "unknown", hint="do"))
-    plain, colourful = "".join(present.text(report)), "".join(present.text(report, colour=True))
+    plain, colourful = "".join(terminal.text(report)), "".join(terminal.text(report, colour=True))
     assert "\x1b" not in plain
     assert re.sub(r"\x1b\[[0-9;]*m", "", colourful) == plain
 
 
 def test_the_summary_counts():
     report = Report()
-    assert present.summary(report) == "no problems"
+    assert terminal.summary(report) == "no problems"
     source = Source("a.msg", "xyz")
     report.add(codes.UNKNOWN_TYPE.at(Span(source, 0, 1), "m"))
     report.add(codes.UNKNOWN_TYPE.at(Span(source, 1, 2), "m"))
     report.add(codes.FLOAT32_RANGE.at(Span(Source("b.msg", "x"), 0, 1), "m"))
-    assert present.summary(report) == "2 errors, 1 warning in 2 files"
+    assert terminal.summary(report) == "2 errors, 1 warning in 2 files"
 
 
 @given(st.text(max_size=300), st.data())
@@ -137,7 +138,7 @@ def test_no_error_is_left_out_for_a_warning():
     for at in range(200):
         report.add(codes.UNUSUAL_LINE_END.at(Span(source, at, at + 1), "a warning"))
     report.add(codes.BAD_VALUE.at(Span(source, 250, 251), "an error"))
-    first, *_, rest = present.text(report)
+    first, *_, rest = terminal.text(report)
     assert "an error" in first
     assert rest.startswith("… and 101 more")
 
@@ -146,7 +147,7 @@ def test_no_error_is_left_out_for_a_warning():
 def test_json_lines_are_lines_of_ascii(path, message):
     report = Report()
     report.add(codes.UNREADABLE.of(path, message))
-    (line,) = present.json_lines(report)
+    (line,) = terminal.json_lines(report)
     assert line.isascii()
     assert line.count("\n") == 1
     facts = json.loads(line)

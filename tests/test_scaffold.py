@@ -44,7 +44,7 @@ def nothing_installed(monkeypatch):
     """Types come from the catalogue and no name from git, so that every machine writes the same."""
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
     monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
-    monkeypatch.setattr("idlc.disk.surroundings.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -203,12 +203,12 @@ def test_outside_of_a_package(tmp_path, monkeypatch, capsys):
 def test_the_wizard_asks_for_the_same(package, monkeypatch):
     from click.testing import CliRunner
 
-    from idlc.cli.scaffold_node import command
+    from idlc.cli.commands.scaffold_node import command
 
     answers = ["publish", "std_msgs/Strin", "Imu:imu@50", "std_srvs/Empty", "std_msgs/String"]
     answers += ["bad topic", "chatter", "often", "2", "latched", "timer", "soon", "0.5"]
     answers += ["parameter", "speed", "speed:int=3", "done", "n"]
-    monkeypatch.setattr("idlc.cli.scaffold_node.interactive", lambda: True)
+    monkeypatch.setattr("idlc.cli.commands.scaffold_node.interactive", lambda: True)
     result = CliRunner().invoke(command, ["asker"], input="\n".join(answers) + "\n")
     assert result.exception is None or isinstance(result.exception, SystemExit), result.output
     complaints = [line for line in result.output.splitlines() if "Error: " in line]

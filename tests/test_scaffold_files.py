@@ -5,9 +5,9 @@ import difflib
 import pytest
 from catkin_pkg.package import parse_package_string
 
-from idlc.scaffold import data_files, launch_py, package_xml
-from idlc.scaffold.console_script import add_script
-from idlc.scaffold.edit import Edited, Outcome, Refused, Script
+from idlc.scaffold.edits import data_files, launch_py, package_xml
+from idlc.scaffold.edits.console_script import add_script
+from idlc.scaffold.edits.outcome import Edited, Outcome, Refused, Script
 
 TALKING = launch_py.Started("demo", "talker")
 TALKER = Script("talker", "demo.talker:main")

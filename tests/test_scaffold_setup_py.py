@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from idlc.scaffold.edit import Edited, Refused, Script
-from idlc.scaffold.setup_py import add_script
+from idlc.scaffold.edits.outcome import Edited, Refused, Script
+from idlc.scaffold.edits.setup_py import add_script
 
 TALKER = Script("talker", "demo.talker:main")
 HEAD = "from setuptools import setup\n\npackage_name = 'demo'\n"

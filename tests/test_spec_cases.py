@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 import rosidl_view
 
+from idlc.diagnostics.report import Report, Severity
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report, Severity
 
 SPEC = Path(__file__).parents[1] / "golden" / "spec"
 

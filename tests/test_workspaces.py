@@ -19,7 +19,7 @@ COMMANDS = ("check", "hash", "gen", "docs", "breaking", "fmt")
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.surroundings.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
     (tmp_path / ".git").mkdir()
     return tmp_path
 

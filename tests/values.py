@@ -15,8 +15,8 @@ ALPHABET = "aZ_0 9éß漢😀"
 
 def fields_of(message):
     """Return the fields of a message as the package's own type information has them."""
-    typeinfo = __import__(f"{type(message).__module__.partition('.')[0]}._idlc.typeinfo")
-    typeinfo = typeinfo._idlc.typeinfo
+    typeinfo = __import__(f"{type(message).__module__.partition('.')[0]}._idlc.on_demand.typeinfo")
+    typeinfo = typeinfo._idlc.on_demand.typeinfo
     return typeinfo, typeinfo.fields_of(typeinfo.type_name(type(message)))
 
 

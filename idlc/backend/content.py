@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.disk import config
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk import pyproject
 from idlc.disk.distribution import Distribution
+from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.find import look, nothing_in
 from idlc.disk.inputs import Inputs, packages
-from idlc.disk.package import MANIFEST
 from idlc.disk.read import is_folder, read_bytes
 from idlc.disk.scope import Scope, scope
 from idlc.driver.gen import GenOptions, gen
 from idlc.driver.libraries import libraries_of
 from idlc.driver.share import INTERFACES, shared
 from idlc.driver.stages import models_of
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 
 class Content(NamedTuple):
@@ -42,7 +42,7 @@ def compiled(
 
     Returns `None` after a problem.
     """
-    settings = scope(config.load(report))
+    settings = scope(pyproject.load(report))
     where = msgspec.structs.replace(
         settings, package=None, include=(*settings.include, *_required_prefixes())
     )

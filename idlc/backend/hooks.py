@@ -14,14 +14,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from idlc.cli import terminal
-from idlc.cli.ending import ended
-from idlc.disk import config
+from idlc.cli import output
+from idlc.cli.exit_status import ended
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk import pyproject
 from idlc.disk.distribution import Distribution
-from idlc.disk.package import MANIFEST
+from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.read import reason
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface
@@ -51,9 +51,9 @@ def finished(build: Callable[[Report], str | None]) -> str:
         except OSError as error:
             message = f"cannot write the archive: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
-        terminal.show(report, "text", sys.stderr)
-        terminal.notes(report, sys.stderr)
-        return 0 if built else terminal.status(report) or 1
+        output.show(report, "text", sys.stderr)
+        output.notes(report, sys.stderr)
+        return 0 if built else output.status(report) or 1
 
     status = ended(command)
     if status:
@@ -92,7 +92,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     """Return the package's name and its `[project]` table; `None` after a problem."""
     from idlc.backend import manifest, pyproject
 
-    config.load(report)  # which reports what is no TOML
+    pyproject.load(report)  # which reports what is no TOML
     if not Path(MANIFEST).is_file():
         message = f"there is no {MANIFEST} beside pyproject.toml"
         hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"
@@ -161,6 +161,6 @@ def _written(builder: BuilderInterface[Any, Any], directory: str, report: Report
     try:
         builder.metadata.validate_fields()
     except (OSError, TypeError, ValueError) as error:
-        report.add(codes.BAD_CONFIG.of(config.FILE, f"{error}"))
+        report.add(codes.BAD_CONFIG.of(pyproject.FILE, f"{error}"))
         return None
     return Path(next(iter(builder.build(directory=directory, versions=["standard"])))).name

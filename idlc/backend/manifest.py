@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from idlc.checks.facts import Statement
-from idlc.disk.package import MANIFEST, declared_name
-from idlc.disk.statements import statements
+from idlc.checks.package.facts import Statement
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk.enclosing_package import MANIFEST, declared_name
+from idlc.disk.manifest_statements import statements
 from idlc.emit.pynames import why_not_package
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 #: What every generated package needs of others on PyPI. The packages of ROS 2 that it imports are
 #: no such names: who has ROS 2 has them, and `std-msgs` may be anybody's there.

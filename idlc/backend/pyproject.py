@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from idlc.disk.config import FILE
-from idlc.text import codes
-from idlc.text.diagnostics import Report
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk.pyproject import FILE
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -13,11 +13,11 @@ from collections.abc import Iterable, Iterator
 import msgspec
 
 from idlc.checks.select import Selection
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Severity
+from idlc.diagnostics.source import Source, Span
 from idlc.syntax import tree
 from idlc.syntax.parse import parse
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Edit, Severity
-from idlc.text.source import Source, Span
 
 # the lengths are bounded, or a long comment without an end would take for ever
 _REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"

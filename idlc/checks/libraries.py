@@ -11,10 +11,10 @@ from typing import TypeGuard
 
 import msgspec
 
-from idlc.checks.python_files import is_setup, parsed, read_setup, start_of
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Edit
-from idlc.text.source import Source, Span
+from idlc.checks.package.python_files import is_setup, parsed, read_setup, start_of
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit
+from idlc.diagnostics.source import Source, Span
 
 COMPILE = "compile_interfaces"
 RESULT = "compiled"

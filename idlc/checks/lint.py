@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from idlc.checks import portability, style
+from idlc.diagnostics.report import Report
 from idlc.model.link import Model
-from idlc.text.diagnostics import Report
 
 #: In no particular order.
 RULES = (

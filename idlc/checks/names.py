@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from idlc.checks.scope import sections
+from idlc.checks.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Label, Report
 from idlc.model import derive, ir, names
 from idlc.model.link import Model
-from idlc.text import codes
-from idlc.text.diagnostics import Label, Report
 
 
 def package_name(model: Model, report: Report) -> None:

@@ -6,14 +6,14 @@ import re
 
 import msgspec
 
-from idlc.checks.scope import sections
+from idlc.checks.sections import sections
 from idlc.checks.units import REMARK, is_unit
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Edit, Report, first_few
+from idlc.diagnostics.source import Span
 from idlc.model import ir
-from idlc.model.comments import brackets
 from idlc.model.link import Model
-from idlc.text import codes
-from idlc.text.diagnostics import Edit, Report, first_few
-from idlc.text.source import Span
+from idlc.model.lowering.comments import brackets
 
 #: Pairs of brackets that a message names.
 SHOWN = 5

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import keyword
 
-from idlc.checks.scope import sections
+from idlc.checks.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
 from idlc.model import ir
 from idlc.model.link import Model
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 # C11's keywords and the macros of stdbool.h
 _C = frozenset(

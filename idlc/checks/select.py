@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 
 import msgspec
 
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Severity
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Severity
 
 CATEGORIES = ("correctness", "portability", "style", "package")
 

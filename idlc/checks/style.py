@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterable
 
 from idlc.checks import units
-from idlc.checks.scope import sections
+from idlc.checks.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Span
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.source import Span
 
 HEADER = ir.Ref(ir.TypeName("std_msgs", "msg", "Header"))
 TIME = ir.Ref(ir.TypeName("builtin_interfaces", "msg", "Time"))

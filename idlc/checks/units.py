@@ -6,7 +6,7 @@ import re
 from itertools import islice
 
 from idlc.model import ir
-from idlc.model.comments import brackets
+from idlc.model.lowering.comments import brackets
 
 # the lengths are bounded, or a long comment without an end would take for ever
 REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")

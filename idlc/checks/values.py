@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
-from idlc.checks.scope import sections
-from idlc.model import ir, slips
+from idlc.checks.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.source import Span
+from idlc.model import ir
 from idlc.model.link import Model
-from idlc.model.literals import BACKSLASH_HINT, FLOAT32_MAX
+from idlc.model.lowering import slips
+from idlc.model.lowering.literals import BACKSLASH_HINT, FLOAT32_MAX
 from idlc.syntax.escapes import plain_meaning
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
-from idlc.text.source import Span
 
 
 def constants_and_defaults(model: Model, report: Report) -> None:

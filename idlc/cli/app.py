@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from idlc import __version__
-from idlc.cli.ending import PipeClosedError
-from idlc.cli.lazy import LazyGroup
+from idlc.cli.exit_status import PipeClosedError
+from idlc.cli.lazy_group import LazyGroup
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {

@@ -23,10 +23,10 @@ def _run(words: list[str]) -> int:
         return 0
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and to import click takes longer than to check a file
-        from idlc.cli.checking import check_paths
-        from idlc.cli.ending import ended
+        from idlc.cli.check_run import check_paths
+        from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
-    from idlc.cli.run import run
+    from idlc.cli.click_runner import run
 
     return run(words)

@@ -77,8 +77,8 @@ def check_rules(*lists: str | None) -> None:
     for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
-                from idlc.text.codes import CODES
-                from idlc.text.suggest import did_you_mean
+                from idlc.diagnostics.codes import CODES
+                from idlc.diagnostics.suggest import did_you_mean
 
                 hint = did_you_mean(word, (*CATEGORIES, *(one.slug for one in CODES.values())))
                 hint = hint or "`idlc explain` lists the codes"

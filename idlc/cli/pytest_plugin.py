@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Diagnostic
+    from idlc.diagnostics.report import Diagnostic
 
 SUFFIXES = frozenset({".msg", ".srv", ".action"})
 
@@ -51,8 +51,8 @@ class InterfaceItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fail with what idlc says about the file."""
-        from idlc.text.diagnostics import Severity
-        from idlc.text.present import text
+        from idlc.diagnostics.formats.terminal import text
+        from idlc.diagnostics.report import Severity
 
         found = _problems(self.path)
         strict = self.config.getoption("--idlc-strict")
@@ -78,14 +78,14 @@ class InterfaceItem(pytest.Item):
 
 
 def _problems(path: Path) -> list[Diagnostic]:
-    from idlc.disk import config, tables
+    from idlc.diagnostics.report import Report
+    from idlc.disk import command_settings, pyproject
     from idlc.disk.scope import scope
     from idlc.driver.check import CheckOptions, check
-    from idlc.text.diagnostics import Report
 
     report = Report()
-    settings = config.load(report)
-    selection = tables.selection(settings, report)
+    settings = pyproject.load(report)
+    selection = command_settings.selection(settings, report)
     if not report.had_errors:
         check(CheckOptions((str(path),), scope(settings), selection), report)
     return list(report)

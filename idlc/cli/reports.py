@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TextIO
 
 from idlc import __version__
-from idlc.cli import terminal
-from idlc.text.diagnostics import Report
-from idlc.text.present import MANY, counted, statistics, summary
+from idlc.cli import output
+from idlc.diagnostics.formats.terminal import MANY, counted, statistics, summary
+from idlc.diagnostics.report import Report
 
 if TYPE_CHECKING:
     from idlc.driver.check import Checked
@@ -30,7 +30,7 @@ def write(
     match style:
         case "text":
             if not numbers:
-                terminal.show(report, style, stream)
+                output.show(report, style, stream)
             if numbers or len(report) > MANY:
                 stream.writelines(statistics(report))
             done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
@@ -40,22 +40,22 @@ def write(
             rest = summary(report) if len(report) else f"no problems in {what}"
             stream.write(f"{done}{rest}\n")
         case "json":
-            terminal.show(report, style, stream)
+            output.show(report, style, stream)
             facts = {"files": len(files), **({"fixed": fixed} if fixed else {})}
-            terminal.fact(stream, "summary", **terminal.counts(report), **facts)
+            output.fact(stream, "summary", **output.counts(report), **facts)
         case "github":
-            from idlc.text import github
+            from idlc.diagnostics.formats import github
 
             stream.writelines(github.lines(report))
         case "sarif":
-            from idlc.text import sarif
+            from idlc.diagnostics.formats import sarif
 
             stream.write(sarif.document(report, __version__, command))
         case "junit":
-            from idlc.text import junit
+            from idlc.diagnostics.formats import junit
 
             stream.write(junit.document(report, files))
         case "gitlab":
-            from idlc.text import gitlab
+            from idlc.diagnostics.formats import gitlab
 
             stream.write(gitlab.document(report))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 import time
 
-from idlc.cli.generate import once
+from idlc.cli.gen_run import once
+from idlc.diagnostics.visible import one_line
 from idlc.disk.watch import snapshot
 from idlc.driver.gen import GenOptions
-from idlc.text.visible import one_line
 
 INTERVAL = 0.25
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.disk.package import declared_version
-from idlc.disk.surroundings import ament_prefixes
+from idlc.disk.enclosing_package import declared_version
+from idlc.disk.environment import ament_prefixes
 
 #: What is taken where nothing of ROS 2 is installed.
 DEFAULT = "jazzy"

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.suggest import closest
+from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.exclude import Exclusions
-from idlc.disk.package import MANIFEST, manifest
 from idlc.disk.read import is_folder, kind_of, unreadable
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.suggest import closest
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
     from idlc.model.ir import Kind
-    from idlc.text.diagnostics import Diagnostic
 
 KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
 KIND_FOLDERS = frozenset(KINDS.values())

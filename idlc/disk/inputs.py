@@ -7,15 +7,15 @@ from pathlib import Path
 
 import msgspec
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.disk.find import InterfaceFile
-from idlc.disk.lock import digest, meaning
-from idlc.disk.naming import by_home, locks, name_of
+from idlc.disk.output.lock_file import digest, meaning
+from idlc.disk.package_names import by_home, locks, name_of
 from idlc.disk.read import decode, read_bytes, shown
 from idlc.disk.scope import Scope
 from idlc.model.ir import TypeName
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 
 class Input(msgspec.Struct, frozen=True):

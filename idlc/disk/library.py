@@ -9,17 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idlc.disk import surroundings
+from idlc.diagnostics import codes
+from idlc.disk import environment
+from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
-from idlc.disk.package import declared_name, manifest
 from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
 from idlc.model import catalog, ir
-from idlc.text import codes
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Report
-    from idlc.text.source import Source
+    from idlc.diagnostics.report import Report
+    from idlc.diagnostics.source import Source
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -46,7 +46,7 @@ class Folder:
     @cached_property
     def _packages(self) -> dict[str, list[Path]]:
         """Every package at any depth, by name; made only when the direct look-up fails."""
-        from idlc.text.diagnostics import Report
+        from idlc.diagnostics.report import Report
 
         unheard = Report()
         found: dict[str, list[Path]] = {}
@@ -102,7 +102,7 @@ class Library:
                 report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
         self._places: tuple[Folder | Prefix, ...] = (
             *places,
-            *map(Prefix, surroundings.ament_prefixes()),
+            *map(Prefix, environment.ament_prefixes()),
         )
         self._own = own or {}
         self._exclude = exclude

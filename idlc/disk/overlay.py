@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from idlc.disk import surroundings, write
-from idlc.disk.alone import alone
+from idlc.diagnostics.report import Report
+from idlc.disk import environment
+from idlc.disk.enclosing_package import manifest
 from idlc.disk.library import Library
-from idlc.disk.package import manifest
-from idlc.disk.plan import Change, Plan
+from idlc.disk.output import transaction
+from idlc.disk.output.folder import Target
+from idlc.disk.output.folder_lock import alone
+from idlc.disk.output.tree import Tree
+from idlc.disk.output.write_plan import Change, Plan
 from idlc.disk.read import read_bytes, shown
-from idlc.disk.target import Target
-from idlc.disk.tree import Tree
-from idlc.text.diagnostics import Report
 
 #: How the files begin by which shells learn of a prefix, and which all packages in it share.
 MARK = b"# Written by idlc"
@@ -31,7 +32,7 @@ class Overlay(Target):
         #: The content of its package.xml; `None` if there is none to be copied.
         self.manifest = read_bytes(declared, shown(declared), report) if declared else None
         self.home = f"share/{package}/"
-        self.modules = f"{surroundings.modules_folder()}/{package}/"
+        self.modules = f"{environment.modules_folder()}/{package}/"
 
     @property
     def place(self) -> str:
@@ -41,7 +42,7 @@ class Overlay(Target):
     @property
     def prefixes(self) -> tuple[Path, ...]:
         """The prefixes in which what is installed here is used."""
-        return (self._path, *surroundings.ament_prefixes())
+        return (self._path, *environment.ament_prefixes())
 
     def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
@@ -75,4 +76,4 @@ class Overlay(Target):
                     f"`{self.name}/{path}` is not idlc's: put `{self.name}` into AMENT_PREFIX_PATH"
                 )
         plan = Plan(self._path, tuple(changes), {})
-        return write.apply_changes(plan, self.name, self.report)
+        return transaction.apply_changes(plan, self.name, self.report)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from idlc.diagnostics.report import Report
 from idlc.disk.read import is_file, is_folder, read_bytes, shown
 from idlc.model.names import is_package_name
-from idlc.text.diagnostics import Report
 
 _INDEX = Path("share", "ament_index", "resource_index")
 

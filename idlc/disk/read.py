@@ -12,11 +12,11 @@ import stat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idlc.text import codes
-from idlc.text.source import Source, Span
+from idlc.diagnostics import codes
+from idlc.diagnostics.source import Source, Span
 
 if TYPE_CHECKING:
-    from idlc.text.diagnostics import Diagnostic, Report
+    from idlc.diagnostics.report import Diagnostic, Report
 
 #: Bytes; the largest interface file that is read. Real ones stay below 64 KiB.
 MAX_SIZE = 16 << 20

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import msgspec
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.visible import one_line
+from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, InterfaceFile, look
-from idlc.disk.package import MANIFEST
 from idlc.disk.read import absolute
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.visible import one_line
 
 
 class Revision(NamedTuple):

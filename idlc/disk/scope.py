@@ -11,7 +11,7 @@ import msgspec
 from idlc.disk.exclude import Exclusions, exclusion
 
 if TYPE_CHECKING:
-    from idlc.disk.config import Config
+    from idlc.disk.pyproject import Config
 
 
 class Scope(msgspec.Struct, frozen=True):

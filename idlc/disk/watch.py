@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from idlc.diagnostics.report import Report
+from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.find import look
-from idlc.disk.package import MANIFEST
-from idlc.text.diagnostics import Report
 
 
 def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[int, int]]:

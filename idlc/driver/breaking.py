@@ -7,18 +7,9 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.disk import inputs, lock
-from idlc.disk.find import InterfaceFile, find, look, nothing_in
-from idlc.disk.package import manifest
-from idlc.disk.read import absolute
-from idlc.disk.revision import Revision, checked_out, is_revision
-from idlc.disk.scope import Scope
-from idlc.disk.statements import statements
-from idlc.driver.stages import models_of, stage
-from idlc.emit.limits import Extents, oversized
-from idlc.model.changes.allow import Allowance, without_allowed
-from idlc.model.changes.change import LEVELS
-from idlc.model.changes.packages import (
+from idlc.breaking.allow import Allowance, without_allowed
+from idlc.breaking.change import LEVELS
+from idlc.breaking.packages import (
     Comparison,
     added_package,
     compare,
@@ -26,10 +17,20 @@ from idlc.model.changes.packages import (
     removed_package,
     together,
 )
-from idlc.model.changes.version import part_to_raise, raised
+from idlc.breaking.version import part_to_raise, raised
+from idlc.checks.size import Extents, oversized
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk import inputs
+from idlc.disk.enclosing_package import manifest
+from idlc.disk.find import InterfaceFile, find, look, nothing_in
+from idlc.disk.manifest_statements import statements
+from idlc.disk.output import lock_file
+from idlc.disk.read import absolute
+from idlc.disk.revision import Revision, checked_out, is_revision
+from idlc.disk.scope import Scope
+from idlc.driver.stages import models_of, stage
 from idlc.model.link import Model
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 GIT = "git:"
 
@@ -94,7 +95,7 @@ def _against(
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], report) as revision:
             return None if revision is None else _compare(options, given, revision, report)
-    if options.against.endswith(lock.FILE):
+    if options.against.endswith(lock_file.FILE):
         return _compare_with_lock(options, given, report)
     if is_revision(options.against, options.paths[0]):
         report.add(
@@ -167,8 +168,8 @@ def _models(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dic
 def _compare_with_lock(
     options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
-    folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
-    known = lock.load(absolute(folder), folder, report)
+    folder = options.against.removesuffix(lock_file.FILE).rstrip("/") or "."
+    known = lock_file.load(absolute(folder), folder, report)
     if known is None:
         if not report.had_errors:
             report.add(codes.NO_SUCH_PATH.of(options.against, f"no such file: `{options.against}`"))

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk import inputs
 from idlc.disk.exclude import Exclusions
-from idlc.disk.facts import facts
 from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
+from idlc.disk.package_facts import facts
 from idlc.disk.read import absolute
 from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage
-from idlc.text.diagnostics import Diagnostic, Report
 
 if TYPE_CHECKING:
     from idlc.checks.select import Selection
+    from idlc.diagnostics.source import Source
     from idlc.model.link import Model
-    from idlc.text.source import Source
 
 
 class CheckOptions(msgspec.Struct, frozen=True):
@@ -47,7 +47,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
     """
     fixed = 0
     if options.fix:
-        from idlc.disk.rewrite import edit
+        from idlc.disk.output.rewrite import edit
 
         found = _once(options, report)[1]
         if not report.had_errors:
@@ -59,10 +59,10 @@ def check(options: CheckOptions, report: Report) -> Checked:
 
 def _tidied(name: str, old: str, new: str) -> str:
     """Return an edited file as `idlc fmt` has it, if it was so before."""
+    from idlc.diagnostics.source import Source
     from idlc.model.ir import KINDS
     from idlc.syntax.format import format_file
     from idlc.syntax.parse import parse
-    from idlc.text.source import Source
 
     is_interface = name.rpartition(".")[2] in KINDS
     if not is_interface or format_file(parse(Source(name, old))) != old:
@@ -93,7 +93,7 @@ def _advise(
 ) -> None:
     """Report what only `check` looks at: style, portability and the package around."""
     from idlc.checks.lint import lint
-    from idlc.checks.package import check_package
+    from idlc.checks.package_rules import check_package
 
     with stage("lint", given.package):
         lint(model, report)

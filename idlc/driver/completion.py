@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from idlc.disk import here
+from idlc.diagnostics.report import Report
+from idlc.disk import nearby
 from idlc.disk.library import Library
 from idlc.model import ir
-from idlc.text.diagnostics import Report
 
 
 def packages(word: str, include: Sequence[str]) -> list[str]:
@@ -27,7 +27,7 @@ def types(
     package, slash, rest = word.partition("/")
     if slash:
         return sorted(_within(package, rest, library, kinds))
-    near = list(here.near())
+    near = list(nearby.near())
     named = {
         one.name
         for name in (library.packages() if bare == "all" else near)
@@ -56,4 +56,4 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
 
 
 def _library(include: Sequence[str]) -> Library:
-    return Library(include, Report(), own=here.near())
+    return Library(include, Report(), own=nearby.near())

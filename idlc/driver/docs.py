@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from idlc.diagnostics.report import Report
 from idlc.disk import inputs
+from idlc.disk.enclosing_package import manifest
 from idlc.disk.find import find
-from idlc.disk.package import manifest
+from idlc.disk.manifest_statements import statements
+from idlc.disk.output.site import write
 from idlc.disk.scope import Scope
-from idlc.disk.site import write
-from idlc.disk.statements import statements
 from idlc.driver.stages import sound_models, stage
-from idlc.text.diagnostics import Report
 
 if TYPE_CHECKING:
-    from idlc.emit.site.pages import About
+    from idlc.site.pages import About
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
@@ -29,7 +29,7 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     models = [model for model, _ in sound_models(given, scope, report) if model.own]
     if not models:
         return 0
-    from idlc.emit.site.pages import site
+    from idlc.site.pages import site
 
     about = {one.package: _about(one) for one in given}
     with stage("document", out):
@@ -42,7 +42,7 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
 def _about(given: inputs.Inputs) -> About:
     """Return what a package's package.xml says of it."""
-    from idlc.emit.site.pages import About
+    from idlc.site.pages import About
 
     path = manifest(given.folders[0]) if given.folders else None
     said = statements(path, path.as_posix(), Report()) if path else ()

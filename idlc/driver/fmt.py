@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from idlc.diagnostics.report import Report, Severity
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import InterfaceFile, find
+from idlc.disk.output.rewrite import replace
 from idlc.disk.read import read_source
-from idlc.disk.rewrite import replace
 from idlc.driver.stages import stage
 from idlc.model import ir
-from idlc.text.diagnostics import Report, Severity
 
 if TYPE_CHECKING:
-    from idlc.text.source import Source
+    from idlc.diagnostics.source import Source
 
 
 class Formatted(NamedTuple):
@@ -49,11 +49,11 @@ def fmt(
 
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
-    from idlc.model.lower import lower
+    from idlc.diagnostics.source import Source
+    from idlc.model.lowering.file import lower
     from idlc.model.meaning import meaning
     from idlc.syntax.format import format_file
     from idlc.syntax.parse import parse
-    from idlc.text.source import Source
 
     problems, again = Report(), Report()
     name = ir.TypeName("package", file.kind, file.name)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, Severity
 from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.library import Library
-from idlc.disk.naming import accept_name
+from idlc.disk.output.folder import Target
 from idlc.disk.overlay import Overlay
+from idlc.disk.package_names import accept_name
+from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
-from idlc.disk.target import Target
-from idlc.disk.wanted import borrowed, completed, targets, wanted
-from idlc.driver import known
+from idlc.driver import named_types
+from idlc.driver.gen_package import Package, as_inputs, package_of
 from idlc.driver.overlay import enter
-from idlc.driver.rendered import Package, as_inputs, package_of
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import derive, ir
-from idlc.text import codes
-from idlc.text.diagnostics import Report, Severity
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -112,7 +112,7 @@ def _named(
     chosen: dict[str, set[ir.TypeName]] = {}
     found = []
     for word in words:
-        library, meant = known.resolve(word, scope.include, report)
+        library, meant = named_types.resolve(word, scope.include, report)
         for one in meant:
             package = one.interface.package
             names = library.interfaces(package) if whole else (one.interface,)

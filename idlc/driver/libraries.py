@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from idlc.disk import surroundings
+from idlc.disk import environment
 from idlc.disk.distribution import Distribution, distribution
 from idlc.driver.stages import stage
 
@@ -46,7 +46,7 @@ def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
     from idlc.native.layouts import LAYOUTS
     from idlc.native.library import MACHINES
 
-    machine = MACHINES.get(surroundings.machine())
+    machine = MACHINES.get(environment.machine())
     layout = LAYOUTS.get(found.name)
     if machine is None:
         return f"idlc makes libraries for Linux on {' and '.join(MACHINES)}, and this is neither"

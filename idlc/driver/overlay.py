@@ -23,7 +23,7 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Overlay) -> dict
     They are in the order in which to write them: what leads to others comes after these.
     """
     manifest = overlay.manifest or _rendered(
-        "overlay_package.xml.jinja", name=model.package, depends=dependencies(model)
+        "overlay/package.xml.jinja", name=model.package, depends=dependencies(model)
     )
     libraries = libraries_of(model, distribution(overlay.prefixes))
     placed = {f"{overlay.modules}{path}": modules[path] for path in modules}

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from idlc.disk import inputs, surroundings
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.disk import environment, inputs
 from idlc.disk.distribution import distribution
 from idlc.disk.find import look
 from idlc.disk.prefix import Installed, installed, prefixes
@@ -18,8 +20,6 @@ from idlc.native.descriptions import hash_bytes
 from idlc.native.inspect import Inspected, inspect
 from idlc.native.layouts import LAYOUTS
 from idlc.native.library import FIELDS_CPP, MACHINES, OWN, symbol, told
-from idlc.text import codes
-from idlc.text.diagnostics import Report, first_few
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -65,9 +65,9 @@ def _problem(one: Installed, name: str, identifier: str, model: Model | None) ->
     library = inspect(data)
     if library is None:
         return "is no shared library, or a part of one"
-    machine = MACHINES.get(surroundings.machine())
+    machine = MACHINES.get(environment.machine())
     if machine is not None and library.machine != machine.number:
-        return f"is for another processor than {surroundings.machine()}"
+        return f"is for another processor than {environment.machine()}"
     if model is None:
         return ""
     return next(_differences(one, data, library, identifier, model), "")
@@ -98,7 +98,7 @@ def _differences(
     if stale:
         names = first_few((f"`{name}`" for name in stale), 3)
         yield f"is out of date: {names} changed since"
-    here = distribution((one.prefix, *surroundings.ament_prefixes()))
+    here = distribution((one.prefix, *environment.ament_prefixes()))
     layout = LAYOUTS.get(here.name)
     if layout is not None and library.told != told(layout):
         yield f"is for another distribution of ROS 2 than {here.name} ({here.why})"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
 from idlc.disk import inputs
 from idlc.disk.find import find, is_path
 from idlc.disk.scope import Scope
-from idlc.driver import known
+from idlc.driver import named_types
 from idlc.driver.stages import compile_package, derived_names, sound_models, stage
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -66,7 +66,7 @@ def wanted_models(
 
 def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[Model, list[str]]]:
     """Yield the models that a type's or package's name means, and the names that are meant."""
-    library, meant = known.resolve(text, include, report)
+    library, meant = named_types.resolve(text, include, report)
     for name, interface in meant:
         source = library.source(interface)
         model = source and compile_package(

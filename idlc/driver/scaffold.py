@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.disk.enclosing_package import MANIFEST, declared_name, manifest
 from idlc.disk.library import Library
-from idlc.disk.package import MANIFEST, declared_name, manifest
-from idlc.disk.project import Done, Project
+from idlc.disk.output.project import Done, Project
 from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.scaffold import cmake, data_files, package_xml
-from idlc.scaffold import interface as interface_text
-from idlc.scaffold import package as package_files
-from idlc.scaffold.edit import Edited, Outcome
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
+from idlc.scaffold import new_interface as interface_text
+from idlc.scaffold import new_package as package_files
+from idlc.scaffold.edits import cmake, data_files, package_xml
+from idlc.scaffold.edits.outcome import Edited, Outcome
 
 
 class Settings(NamedTuple):
@@ -134,7 +134,7 @@ def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:
     if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
         return {}
     plain = package_files.Package(own, "", "", "", package_files.LICENSES[0])
-    return {path: package_files.rendered("scaffold_test_interfaces.py.jinja", plain)}
+    return {path: package_files.rendered("package/test_interfaces.py.jinja", plain)}
 
 
 def _reached_only(model: Model) -> set[str]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.suggest import did_you_mean
+from idlc.disk.environment import python_folders
 from idlc.disk.library import Library
-from idlc.disk.project import Project
-from idlc.disk.surroundings import python_folders
+from idlc.disk.output.project import Project
 from idlc.driver.scaffold import (
     Result,
     Settings,
@@ -16,14 +19,12 @@ from idlc.driver.scaffold import (
 )
 from idlc.driver.stages import compile_package, stage
 from idlc.model import ir
-from idlc.scaffold import console_script, data_files, launch_py, node_test, spec
+from idlc.scaffold import new_package as package_files
 from idlc.scaffold import node as node_page
-from idlc.scaffold import package as package_files
-from idlc.scaffold.edit import Edited, Outcome, Script
-from idlc.scaffold.plan import Plan, plan
-from idlc.text import codes
-from idlc.text.diagnostics import Report
-from idlc.text.suggest import did_you_mean
+from idlc.scaffold import node_tests, spec
+from idlc.scaffold.edits import console_script, data_files, launch_py
+from idlc.scaffold.edits.outcome import Edited, Outcome, Script
+from idlc.scaffold.planned import Plan, plan
 
 
 def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None:
@@ -39,7 +40,7 @@ def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None
     with stage("scaffold", wanted.name):
         added = {
             f"{own}/{wanted.name}.py": node_page.render(planned),
-            f"test/test_{wanted.name}.py": node_test.render(planned),
+            f"test/test_{wanted.name}.py": node_tests.render(planned),
         }
         for path, text in added.items():
             compile(text, path, "exec", dont_inherit=True)
@@ -140,7 +141,7 @@ def _support(project: Project, own: str) -> dict[str, str]:
     plain = package_files.Package(own, "", "", "", "Apache-2.0")
     found = {}
     if not project.has("test/conftest.py"):
-        template = "scaffold_conftest.py.jinja"
+        template = "package/conftest.py.jinja"
         found["test/conftest.py"] = package_files.rendered(template, plain)
     if not project.has(f"{own}/__init__.py"):
         found[f"{own}/__init__.py"] = ""
@@ -187,7 +188,7 @@ def _launched(
         where = f"`{project.shown(launch)}` is not edited: {outcome.why}"
         return [f"{where}; add this {outcome.where}: {outcome.line.rstrip(',')}"]
     plain = package_files.Package(own, "", "", "", "Apache-2.0")
-    made = launch_py.add_node(package_files.rendered("scaffold_launch.py.jinja", plain), started)
+    made = launch_py.add_node(package_files.rendered("package/launch.py.jinja", plain), started)
     assert isinstance(made, Edited)
     added[launch] = made.text
     setup = project.text("setup.py")

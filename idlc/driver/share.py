@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+from idlc.diagnostics.report import Report
 from idlc.driver.libraries import Libraries
-from idlc.model.idl import idl
-from idlc.text.diagnostics import Report
+from idlc.export.idl import idl
 
 if TYPE_CHECKING:
     from idlc.model.link import Model

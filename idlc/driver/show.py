@@ -6,11 +6,11 @@ import json
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
 from idlc.disk.scope import Scope
 from idlc.driver.query import wanted_models
 from idlc.driver.stages import stage
-from idlc.text import codes
-from idlc.text.diagnostics import Report
 
 if TYPE_CHECKING:
     from idlc.model import ir
@@ -35,7 +35,7 @@ def show(wanted: str, style: str, scope: Scope, report: Report) -> list[str]:
 
 
 def _text(interface: ir.Interface, model: Model, style: str) -> str:
-    from idlc.model import idl, outline, schemas
+    from idlc.export import idl, outline, schemas
 
     match style:
         case "json":

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.source import Source
 from idlc.disk import inputs
 from idlc.disk.library import Library
 from idlc.disk.scope import Scope
 from idlc.model import derive, ir
-from idlc.text import codes
-from idlc.text.diagnostics import Report, Severity, first_few
-from idlc.text.source import Source
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -59,7 +59,7 @@ class Compiler:
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
     ) -> tuple[ir.Interface, ...]:
         """Return what texts define; from now on, references to their names mean these."""
-        from idlc.model.lower import lower
+        from idlc.model.lowering.file import lower
         from idlc.syntax.parse import parse
 
         own = []

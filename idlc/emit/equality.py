@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from idlc.emit import fields, pynames
-from idlc.emit.pretty import WIDTH, Group, all_of, any_of, call, lines
+from idlc.emit.python_lines import WIDTH, Group, all_of, any_of, call, lines
 from idlc.emit.references import References
 from idlc.model import ir
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 
 from idlc.emit import literals, pynames
-from idlc.emit.pretty import WIDTH, Group, Node, assign, call, flat, tuple_of
+from idlc.emit.codec.constants import numpy_name
+from idlc.emit.python_lines import WIDTH, Group, Node, assign, call, flat, tuple_of
 from idlc.emit.references import References
-from idlc.emit.tables import numpy_name
 from idlc.model import ir
 
 ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from idlc.emit import pynames
-from idlc.emit.pretty import Group, lines
+from idlc.emit.python_lines import Group, lines
 from idlc.model import derive, ir, link
 
 TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}

@@ -11,7 +11,7 @@ import math
 import textwrap
 import unicodedata
 
-from idlc.emit.pretty import WIDTH
+from idlc.emit.python_lines import WIDTH
 from idlc.model import ir
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable
 
-from idlc.emit import layout, pynames
+from idlc.emit import pynames
+from idlc.emit.codec import wire_plan
 from idlc.model import derive, ir
 
 
@@ -18,7 +19,7 @@ class References:
     """
 
     def __init__(
-        self, interface: ir.Interface, messages: layout.Messages, modules: pynames.Modules
+        self, interface: ir.Interface, messages: wire_plan.Messages, modules: pynames.Modules
     ) -> None:
         self._modules = modules
         self.package = interface.name.package
@@ -100,7 +101,7 @@ def referred(message: ir.Message) -> list[ir.TypeName]:
     return [element.target for element in elements if isinstance(element, ir.Ref)]
 
 
-def _closure(own: set[ir.TypeName], messages: layout.Messages) -> set[ir.TypeName]:
+def _closure(own: set[ir.TypeName], messages: wire_plan.Messages) -> set[ir.TypeName]:
     found: set[ir.TypeName] = set()
     waiting = list(own)
     while waiting:

@@ -57,7 +57,7 @@ def module_file(
 ) -> RenderedFile:
     """Return the module of one interface."""
     page = view.module(interface, model.messages, modules)
-    return RenderedFile(page.path, _template("module.py.jinja").render(module=page))
+    return RenderedFile(page.path, _template("message/module.py.jinja").render(module=page))
 
 
 def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
@@ -69,7 +69,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
     files = [module_file(interface, model, modules) for interface in model.own]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = listing.package(model, kind, modules)
-        text = _template("package.py.jinja").render(package=page)
+        text = _template("message/package_init.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
     files.append(RenderedFile("_idlc/type_data.py", type_data.source(model)))
     # a package without it would lose to any other of its name, wherever that stands on the path

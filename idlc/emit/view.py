@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import msgspec
 
-from idlc.emit import code, documentation, fields, groups, layout, literals, pynames
-from idlc.emit.decode import decode, is_bulk
-from idlc.emit.encode import encode
+from idlc.emit import documentation, fields, groups, literals, pynames
+from idlc.emit.codec import statements, wire_plan
+from idlc.emit.codec.constants import Tables
+from idlc.emit.codec.decode import decode, is_bulk
+from idlc.emit.codec.encode import encode
 from idlc.emit.equality import equality
-from idlc.emit.pretty import WIDTH, Group, assign, call, if_any, lines, tuple_of
+from idlc.emit.python_lines import WIDTH, Group, assign, call, if_any, lines, tuple_of
 from idlc.emit.references import References, referred, wrapped
-from idlc.emit.tables import Tables
 from idlc.model import derive, ir
 from idlc.model.names import snake_case
 
@@ -60,7 +61,7 @@ def origin(name: ir.TypeName) -> str:
 
 
 def module(
-    interface: ir.Interface, messages: layout.Messages, modules: pynames.Modules
+    interface: ir.Interface, messages: wire_plan.Messages, modules: pynames.Modules
 ) -> ModuleView:
     """Return the view of an interface's module; `modules` names all of its package."""
     name = interface.name
@@ -86,7 +87,7 @@ def _hides_methods(structure: ir.Message) -> bool:
     return any(pynames.hides_method(field.name) for field in structure.fields)
 
 
-def _has_others(references: References, messages: layout.Messages) -> bool:
+def _has_others(references: References, messages: wire_plan.Messages) -> bool:
     waiting = [*references.direct, *references.implied]
     while waiting:
         name = waiting.pop()
@@ -125,16 +126,18 @@ def _message(
     structure: ir.Message,
     interface: ir.Interface,
     references: References,
-    messages: layout.Messages,
+    messages: wire_plan.Messages,
 ) -> MessageView:
     views = _field_views(structure, references)
     names = pynames.Locals()
-    steps = layout.steps(structure, messages, names)
+    steps = wire_plan.steps(structure, messages, names)
     tables = Tables(names)
     writing = encode(steps, tables, 8)
     makers, needed = _makers(structure.name, steps, references, tables)
     bulk = is_bulk(steps)
-    reading = code.text_of(decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8)
+    reading = statements.text_of(
+        decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8
+    )
     definitions = tuple(
         line for name, value in tables.definitions for line in assign(name, value, 4)
     )
@@ -242,7 +245,7 @@ def _init(structure: ir.Message, views: list[fields.FieldView]) -> list[str]:
 
 
 def _makers(
-    own: ir.TypeName, steps: tuple[layout.Step, ...], references: References, tables: Tables
+    own: ir.TypeName, steps: tuple[wire_plan.Step, ...], references: References, tables: Tables
 ) -> tuple[dict[ir.TypeName, str], list[ir.TypeName]]:
     """Return the functions that make empty objects, and the types to import for them."""
     makers: dict[ir.TypeName, str] = {}
@@ -256,12 +259,12 @@ def _makers(
     return makers, [type_ for type_ in makers if type_ not in known]
 
 
-def _types(steps: tuple[layout.Step, ...]) -> list[ir.TypeName]:
+def _types(steps: tuple[wire_plan.Step, ...]) -> list[ir.TypeName]:
     found: list[ir.TypeName] = []
     for step in steps:
-        if isinstance(step, layout.Enter):
+        if isinstance(step, wire_plan.Enter):
             found.append(step.type)
-        elif isinstance(step, layout.Items):
+        elif isinstance(step, wire_plan.Items):
             found += [step.type, *_types(step.body)]
     return found
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import msgspec
 
+from idlc.diagnostics.source import Source
 from idlc.model import ir
-from idlc.text.source import Source
 
 
 @lru_cache(maxsize=1)

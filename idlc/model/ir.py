@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import msgspec
 
-from idlc.text.source import Source, Span
+from idlc.diagnostics.source import Source, Span
 
 Kind: TypeAlias = Literal["msg", "srv", "action"]
 KINDS: tuple[Kind, ...] = ("msg", "srv", "action")

@@ -6,14 +6,15 @@ from collections.abc import Container, Iterable, Mapping, MutableMapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
-from idlc.model import catalog, derive, ir, names, slips
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.suggest import did_you_mean, package_hint
+from idlc.model import catalog, derive, ir, names
 from idlc.model.circles import circles
+from idlc.model.lowering import slips
+from idlc.model.lowering.types import STRINGS
 from idlc.model.pool import Pool
-from idlc.model.types import STRINGS
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report
-from idlc.text.source import Source, Span
-from idlc.text.suggest import did_you_mean, package_hint
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer

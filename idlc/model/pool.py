@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, Severity
 from idlc.model import derive, ir
 from idlc.model.circles import circles
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
-from idlc.text import codes
-from idlc.text.diagnostics import Diagnostic, Report, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from idlc.diagnostics.source import Span
     from idlc.model.describe import Describer
     from idlc.model.link import Library
-    from idlc.text.source import Span
 
 
 class Entry(msgspec.Struct):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from idlc.emit import pynames
 from idlc.model import ir
-from idlc.scaffold.layout import call
+from idlc.scaffold.line_breaks import call
 from idlc.scaffold.samples import Page, clean, constructed, sample
 
 #: What the parser has already.

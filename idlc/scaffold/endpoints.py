@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from idlc.emit import pynames
 from idlc.model import derive, ir
-from idlc.scaffold.layout import call, logged, signature
+from idlc.scaffold.line_breaks import call, logged, signature
 from idlc.scaffold.samples import Page, assigned, constructed
 from idlc.scaffold.spec import Endpoint
 

@@ -8,8 +8,8 @@ from idlc.emit.render import environment
 from idlc.model import derive
 from idlc.scaffold import arguments, spec
 from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part
-from idlc.scaffold.layout import call, imports
-from idlc.scaffold.plan import Plan
+from idlc.scaffold.line_breaks import call, imports
+from idlc.scaffold.planned import Plan
 from idlc.scaffold.samples import INDENT, Page
 from idlc.scaffold.states import PAUSING, StatesView, kept, pauses, states
 
@@ -87,7 +87,7 @@ class NodeView(NamedTuple):
 
 def render(planned: Plan) -> str:
     """Return the text of a node's module."""
-    return environment().get_template("node.py.jinja").render(node=view(planned))
+    return environment().get_template("node/module.py.jinja").render(node=view(planned))
 
 
 def view(planned: Plan) -> NodeView:
@@ -131,7 +131,7 @@ def _main(planned: Plan, page: Page) -> MainView:
     has_arguments = bool(planned.clients)
     goals = [word for endpoint, word, _ in planned.clients if endpoint.role == "action_client"]
     return MainView(
-        template="node_main_once.py.jinja" if planned.once else "node_main.py.jinja",
+        template="node/main_once.py.jinja" if planned.once else "node/main.py.jinja",
         run="sys.exit(main())" if planned.once else "main()",
         init_arguments=_given(planned).call,
         before=("given = parse_arguments(args)",) if has_arguments else (),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from idlc.scaffold import spec
 from idlc.scaffold.endpoints import ACTIVATE, Part, interval, undo
-from idlc.scaffold.layout import call
+from idlc.scaffold.line_breaks import call
 
 #: Roles whose methods wait for something.
 PAUSING = {"client", "action_client", "action_server"}

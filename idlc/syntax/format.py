@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from itertools import takewhile
 
 from idlc.syntax import tree
-from idlc.syntax.columns import lay_out
+from idlc.syntax.alignment import lay_out
 
 #: Blanks at the end of a line.
 _INVISIBLE = re.compile(r"[ \t]+$", re.MULTILINE)

@@ -6,9 +6,9 @@ from functools import lru_cache
 from types import ModuleType
 from typing import Any, cast
 
+from idlc.diagnostics.source import Source
 from idlc.syntax import quick, tree
 from idlc.syntax.grammar import LINE_ENDS
-from idlc.text.source import Source
 
 #: Longer lines are parsed again rather than remembered.
 SHARED_LENGTH = 1000

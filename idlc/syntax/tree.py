@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import msgspec
 
-from idlc.text.source import Source, Span
+from idlc.diagnostics.source import Source, Span
 
 #: An ordinary character for ROS 2, and therefore wrong wherever it stands (spec 1.1).
 BYTE_ORDER_MARK = "\ufeff"

@@ -178,7 +178,7 @@ def garbage_is_dropped():
 
 def without_machine_code(name):
     """Do something where there is no machine code, which Fast DDS can do without."""
-    native = importlib.import_module("std_msgs._idlc.typesupport_native")
+    native = importlib.import_module("std_msgs._idlc.typesupport.machine_code")
     native._MACHINES = ()
     globals()[name]()
     assert not [name for name in sys.modules if name.startswith("std_msgs") and "x86_64" in name]
@@ -435,9 +435,9 @@ def tells_its_type_description():
 def says_what_to_do(case):
     """Print the error of a surrounding that type support cannot work in."""
     utilities = importlib.import_module("rclpy.utilities")
-    fastcdr = importlib.import_module("std_msgs._idlc.typesupport_fastcdr")
-    introspection = importlib.import_module("std_msgs._idlc.typesupport_introspection")
-    native = importlib.import_module("std_msgs._idlc.typesupport_native")
+    fastcdr = importlib.import_module("std_msgs._idlc.typesupport.fastcdr")
+    introspection = importlib.import_module("std_msgs._idlc.typesupport.introspection")
+    native = importlib.import_module("std_msgs._idlc.typesupport.machine_code")
     if case in {"machine", "memory"}:
         utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
     if case == "machine":

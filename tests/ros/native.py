@@ -6,13 +6,13 @@ from pathlib import Path
 from installed import HERE
 from tools import run, tool
 
+from idlc.diagnostics.report import Report
 from idlc.disk.find import look
 from idlc.disk.inputs import packages
 from idlc.disk.scope import Scope
 from idlc.driver.stages import models_of
 from idlc.native.layouts import LAYOUTS
 from idlc.native.library import MACHINES, libraries
-from idlc.text.diagnostics import Report
 
 INDEX = "share/ament_index/resource_index/packages"
 

@@ -4,9 +4,9 @@ import json
 import sys
 from pathlib import Path
 
+from idlc.diagnostics.report import Report
 from idlc.disk.scope import Scope
 from idlc.driver.query import describe
-from idlc.text.diagnostics import Report
 
 INSTALLED = [
     path

@@ -8,13 +8,13 @@ from rosidl_parser.parser import parse_idl_string
 from test_format import assert_only_the_layout_changes
 
 from idlc.cli.main import main
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.export.idl import idl
 from idlc.model import ir
-from idlc.model.idl import idl
-from idlc.model.lower import lower
+from idlc.model.lowering.file import lower
 from idlc.syntax.format import format_file
 from idlc.syntax.parse import parse
-from idlc.text.diagnostics import Report
-from idlc.text.source import Source
 
 SHARE = Path(sys.prefix) / "share"
 FILES = sorted(path for kind in ir.KINDS for path in SHARE.glob(f"*/{kind}/*.{kind}"))

@@ -1,0 +1,170 @@
+"""Two versions of a package → everything that changed between them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from idlc.breaking.change import LEVELS, Change
+from idlc.breaking.constants import added, constant_changes
+from idlc.breaking.fields import Sides, field_changes
+from idlc.diagnostics import codes
+from idlc.diagnostics.suggest import edit_distance
+from idlc.model import derive, ir
+from idlc.model.link import Model
+from idlc.model.meaning import meaning
+
+#: Interfaces of equal content among which a renamed one is looked for.
+CANDIDATES = 50
+
+
+class Comparison(NamedTuple):
+    """What breaks something, and what was added and breaks nothing.
+
+    `differs` is whether anything at all is different, comments included.
+    """
+
+    changes: tuple[Change, ...]
+    additions: tuple[str, ...] = ()
+    differs: bool = False
+
+
+def together(comparisons: Iterable[Comparison]) -> Comparison:
+    """Return the comparisons of several packages as one."""
+    found = list(comparisons)
+    return Comparison(
+        tuple(change for one in found for change in one.changes),
+        tuple(name for one in found for name in one.additions),
+        any(one.differs for one in found),
+    )
+
+
+def compare(before: Model, after: Model) -> Comparison:
+    """Return what changed in a package's own interfaces; both models must be free of errors."""
+    old = {interface.name: interface for interface in before.own}
+    new = {interface.name: interface for interface in after.own}
+    gone = [interface for name, interface in old.items() if name not in new]
+    come = [interface for name, interface in new.items() if name not in old]
+    renamed = dict(_renamed(gone, come))
+    changes = [_removed(one) for one in gone if one.name not in renamed]
+    changes += [_called(one, renamed[one.name]) for one in gone if one.name in renamed]
+    found = {new.name for new in renamed.values()}
+    additions = [_added(one) for one in come if one.name not in found]
+    differs = bool(gone or come)
+    for name in sorted(old.keys() & new.keys()):
+        differs = differs or _differ(old[name], new[name])
+        for sides in _sides(old[name], new[name], before, after):
+            changes += [*field_changes(sides), *constant_changes(sides)]
+            additions += added(sides)
+    return Comparison(tuple(changes), tuple(additions), differs or bool(changes))
+
+
+def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
+    for one, other in zip(derive.sections(old), derive.sections(new), strict=True):
+        yield Sides(one, other, before, after)
+
+
+def removed_package(before: Model) -> Comparison:
+    """Return the changes when a package is no longer there."""
+    return Comparison(tuple(map(_removed, before.own)), (), bool(before.own))
+
+
+def added_package(after: Model) -> Comparison:
+    """Return what a package adds that was not there before."""
+    return Comparison((), tuple(map(_added, after.own)), bool(after.own))
+
+
+def _differ(old: ir.Interface, new: ir.Interface) -> bool:
+    """Return whether two versions of an interface are not the same, line ends apart."""
+    texts = [one.source.text.splitlines() if one.source else None for one in (old, new)]
+    return texts[0] != texts[1] or meaning(old) != meaning(new)
+
+
+def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
+    """Return what changed since type hashes were recorded; nothing else is known of before."""
+    changes = []
+    sources = {str(own.name): own.source for own in after.own}
+    for name in sorted(recorded):
+        kind = name.split("/")[1]
+        if kind != "msg" and any(own in recorded for own in _shorter(name)):
+            continue  # follows from the interface that it is derived from
+        if name not in sources:
+            levels = frozenset(LEVELS[:3])
+            message = f"{_what(kind)} `{name}` was removed"
+            changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
+        elif recorded[name] != after.describer.hash(name):
+            source = sources[name]
+            changes.append(
+                Change(
+                    codes.HASH_CHANGED,
+                    name,
+                    f"the type hash of `{name}` changed",
+                    frozenset({"hash"}),
+                    path=source.path if source else name,
+                    hint="compare with a folder or a git revision to see what changed it",
+                )
+            )
+    come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
+    return Comparison(tuple(changes), come, bool(changes or come))
+
+
+def _shorter(name: str) -> Iterator[str]:
+    """Yield what stands before each underscore of a name."""
+    return (name[:at] for at, character in enumerate(name) if character == "_")
+
+
+def _what(kind: str) -> str:
+    return {"msg": "message", "srv": "service"}.get(kind, kind)
+
+
+def _path(interface: ir.Interface) -> str:
+    return interface.source.path if interface.source else str(interface.name)
+
+
+def _removed(interface: ir.Interface) -> Change:
+    return Change(
+        codes.INTERFACE_REMOVED,
+        str(interface.name),
+        f"{_what(interface.name.kind)} `{interface.name}` was removed",
+        frozenset(LEVELS[:3]),
+        path=_path(interface),
+    )
+
+
+def _added(interface: ir.Interface) -> str:
+    return f"{_what(interface.name.kind)} `{interface.name}`"
+
+
+def _called(old: ir.Interface, new: ir.Interface) -> Change:
+    return Change(
+        codes.INTERFACE_RENAMED,
+        str(old.name),
+        f"{_what(old.name.kind)} `{old.name}` is called `{new.name}` now",
+        frozenset({"hash", "source"}),
+        path=_path(new),
+    )
+
+
+def _renamed(
+    gone: list[ir.Interface], come: list[ir.Interface]
+) -> Iterator[tuple[ir.TypeName, ir.Interface]]:
+    """Yield each interface that disappeared with the one of the same content that appeared."""
+    left: dict[Hashable, list[ir.Interface]] = {}
+    for new in come:
+        left.setdefault(_shape(new), []).append(new)
+    for old in gone:
+        shape = _shape(old)
+        # of very many, the first ones are as good as any
+        alike = left.get(shape, [])[:CANDIDATES] if shape[1] else []
+        if alike:
+            best = min(alike, key=lambda new: edit_distance(old.name.name, new.name.name))
+            left[shape].remove(best)
+            yield old.name, best
+
+
+def _shape(interface: ir.Interface) -> tuple[ir.Kind, tuple[tuple[str, ir.FieldType], ...]]:
+    return interface.name.kind, tuple(
+        (f"{number}.{field.name}", field.type)
+        for number, section in enumerate(derive.sections(interface))
+        for field in section.fields
+    )

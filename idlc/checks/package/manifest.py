@@ -1,0 +1,151 @@
+"""Rules on package.xml: what the interfaces and nodes of a package need is declared in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import msgspec
+
+from idlc.checks.package.facts import Facts
+from idlc.checks.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Report
+from idlc.diagnostics.source import Span
+from idlc.model import catalog, ir
+from idlc.model.link import Model
+
+_NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
+#: What rosidl adds by itself.
+_IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
+#: What a package.xml begins with; dependencies come after it.
+_HEAD = frozenset(("name", "version", "description", "maintainer", "license", "url", "author"))
+_GROUP = "rosidl_interface_packages"
+#: The packages that generate interfaces, and those that generated code needs, usual first.
+_GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
+_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
+
+
+def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
+    """Packages whose messages are used are declared."""
+    # what CMake does not install is there for the package's own tests
+    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
+    seen = {facts.name, *declared}
+    for message in sections(model):
+        for field in message.fields:
+            element = ir.element_of(field.type)
+            if not isinstance(element, ir.Ref) or field.type_span is None:
+                continue
+            package = element.target.package
+            if package not in seen:
+                seen.add(package)
+                found = codes.MISSING_DEPENDENCY.at(
+                    field.type_span,
+                    f"`{facts.manifest.path}` does not declare `{package}`",
+                    hint=f"add `<depend>{package}</depend>`",
+                )
+                report.add(_with_lines(found, facts, [f"<depend>{package}</depend>"]))
+
+
+def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
+    """A package of interfaces alone declares no interfaces that it does not use."""
+    if facts.modules or facts.native or not facts.whole or _has_gaps(model):
+        return
+    used = {name.package for name in model.interfaces} | _IMPLICIT
+    for package, statement in facts.declared("depend", "build_depend").items():
+        if package not in used and package in set(catalog.packages()):
+            report.add(
+                codes.UNUSED_DEPENDENCY.at(
+                    statement.span,
+                    f"no interface of this package uses `{package}`",
+                    hint="remove the line",
+                )
+            )
+
+
+def _has_gaps(model: Model) -> bool:
+    """Return whether some field is of a type that is not known, and may be of any package."""
+    elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
+    return any(
+        element.target not in model.interfaces
+        if isinstance(element, ir.Ref)
+        else isinstance(element, ir.Unknown)
+        for element in elements
+    )
+
+
+def interface_group(facts: Facts, model: Model, report: Report) -> None:
+    """A package whose interfaces CMake generates is a member of the group of such packages."""
+    if not (facts.generates and model.own):
+        return
+    if _GROUP not in facts.declared("member_of_group"):
+        line = f"<member_of_group>{_GROUP}</member_of_group>"
+        found = codes.NO_INTERFACE_GROUP.at(
+            facts.place,
+            "CMake stops at a package with interfaces that is in no interface group",
+            hint=f"add `{line}`",
+        )
+        report.add(_with_lines(found, facts, [line]))
+
+
+def generators(facts: Facts, model: Model, report: Report) -> None:
+    """A package whose interfaces CMake generates declares the generators and their runtime."""
+    if not (facts.generates and model.own):
+        return
+    missing = [
+        (packages[0], f"<{tag}>{packages[0]}</{tag}>")
+        for packages, tag, others in (
+            (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
+            (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
+        )
+        if facts.declared(*others).keys().isdisjoint(packages)
+    ]
+    if missing:
+        needed = " and ".join(f"`{package}`" for package, _ in missing)
+        lines = " and ".join(f"`{line}`" for _, line in missing)
+        found = codes.NO_GENERATORS.at(
+            facts.place, f"a package with interfaces needs {needed}", hint=f"add {lines}"
+        )
+        report.add(_with_lines(found, facts, [line for _, line in missing]))
+
+
+def declared_imports(facts: Facts, _: Model, report: Report) -> None:
+    """ROS packages that the nodes import are declared."""
+    if not facts.modules:
+        return
+    from idlc.checks.package.python_files import imported_packages
+
+    declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
+    for source in facts.modules.values():
+        for package, span in imported_packages(source):
+            if package in facts.known and package not in declared:
+                declared.add(package)
+                found = codes.UNDECLARED_IMPORT.at(
+                    span,
+                    f"`{facts.manifest.path}` does not declare `{package}`",
+                    hint=f"add `<exec_depend>{package}</exec_depend>`",
+                )
+                report.add(_with_lines(found, facts, [f"<exec_depend>{package}</exec_depend>"]))
+
+
+def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
+    """Return a problem with the edits that add lines to package.xml, each after its like."""
+    edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
+    return msgspec.structs.replace(found, edits=edits)
+
+
+def _addition(facts: Facts, line: str) -> Edit | None:
+    text = facts.manifest.text
+    tag = line[1 : line.index(">")]
+    same = [one for one in facts.statements if one.tag == tag]
+    like = same or [one for one in facts.statements if "depend" in one.tag]
+    like = like or [one for one in facts.statements if one.tag in _HEAD]
+    if not like:
+        return None
+    last = like[-1]
+    start = last.span.start
+    end = re.compile(rf"</{last.tag}\s*>").search(text, start)
+    indent = text[text.rfind("\n", 0, start) + 1 : start]
+    if end is None or indent.strip():
+        return None
+    return Edit(Span(facts.manifest, end.end(), end.end()), f"\n{indent}{line}")

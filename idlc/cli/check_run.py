@@ -1,0 +1,62 @@
+"""What `idlc check` does, without the reading of its options."""
+
+from __future__ import annotations
+
+import sys
+
+import msgspec
+
+from idlc.checks.select import Selection
+from idlc.cli import output, reports
+from idlc.diagnostics.report import Report
+from idlc.disk import command_settings, pyproject
+from idlc.disk.scope import scope
+from idlc.driver.check import Checked, CheckOptions, check
+
+
+class Wishes(msgspec.Struct, frozen=True):
+    """What was typed besides paths; `select` and `ignore` are lists of rules with commas."""
+
+    select: str | None = None
+    ignore: str | None = None
+    fix: bool = False
+    strict: bool = False
+    package: str | None = None
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    style: str = "text"
+    statistics: bool = False
+    prefix: str | None = None
+
+
+def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
+    """Check what paths mean, or pyproject.toml, or the working folder; return the exit status."""
+    wishes = wishes or Wishes()
+    report = Report()
+    settings = pyproject.load(report)
+    chosen = _selection(command_settings.selection(settings, report), wishes)
+    checked = Checked(())
+    if wishes.prefix is not None:
+        from idlc.driver.prefix import check_prefix
+
+        checked = check_prefix(wishes.prefix, report)
+    elif not report.had_errors:
+        wanted = CheckOptions(
+            paths=paths or settings.paths or (".",),
+            scope=scope(settings, wishes.package, wishes.include, wishes.exclude),
+            selection=chosen,
+            fix=wishes.fix,
+        )
+        checked = check(wanted, report)
+    reports.write(report, wishes.style, checked, sys.stdout, numbers=wishes.statistics)
+    return output.status(report) or int(wishes.strict and bool(len(report)))
+
+
+def _selection(configured: Selection, wishes: Wishes) -> Selection:
+    """Return which warnings are wanted: what pyproject.toml says, and what was typed."""
+    if wishes.select:
+        configured = msgspec.structs.replace(configured, select=tuple(wishes.select.split(",")))
+    if wishes.ignore:
+        ignored = (*configured.ignore, *wishes.ignore.split(","))
+        configured = msgspec.structs.replace(configured, ignore=ignored)
+    return configured

@@ -1,0 +1,82 @@
+"""`idlc gen`."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import click
+
+from idlc.cli import options
+
+EPILOG = """\
+Example:
+
+\b
+  mkdir -p demo/msg
+  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
+  idlc gen demo -o out/demo
+
+All options can be kept in pyproject.toml:
+
+\b
+  [tool.idlc]
+  paths = ["demo"]
+  out = "out/demo"
+"""
+
+
+@click.command("gen", epilog=EPILOG)
+@click.argument("paths", metavar="PATH|PACKAGE|TYPE...", nargs=-1, type=click.Path())
+@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
+@click.option(
+    "--ament",
+    metavar="PREFIX",
+    type=click.Path(),
+    default="",
+    help="Install into a prefix, complete for ROS 2 and its C++ tools.",
+)
+@options.package
+@options.include
+@options.exclude
+@click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
+@click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
+@click.option(
+    "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
+)
+@click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
+@options.style
+def command(style: str, watch: bool, **given: Any) -> int:
+    """Compile interface files into a Python package.
+
+    PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
+    packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
+
+    OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
+    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`.
+    """
+    from idlc.cli import gen_run, output
+    from idlc.diagnostics.report import Report
+    from idlc.disk import pyproject
+    from idlc.disk.scope import scope
+    from idlc.driver.gen import GenOptions
+
+    report = Report()
+    settings = pyproject.load(report)
+    if report.had_errors:
+        output.show(report, style, sys.stdout if style == "json" else sys.stderr)
+        return output.status(report)
+    words = (given.pop("package"), given.pop("include"), given.pop("exclude"))
+    wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
+    if not wanted.paths or not (wanted.out or wanted.ament):
+        missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
+        raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
+    if wanted.check and (watch or wanted.force):
+        raise click.UsageError(
+            "--check writes nothing, so it goes with neither --watch nor --force"
+        )
+    if watch:
+        from idlc.cli.watch import run_again
+
+        return run_again(wanted, style)
+    return gen_run.once(wanted, style)

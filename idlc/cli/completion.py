@@ -1,0 +1,64 @@
+"""What shells offer for words that are not options: types, packages, codes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+_KINDS = {"publisher": "msg", "subscriber": "msg", "service": "srv", "client": "srv"}
+
+
+def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
+    """Offer packages."""
+    from idlc.driver import completion
+
+    return completion.packages(word, _include(context))
+
+
+def types_and_paths(
+    context: click.Context, _: click.Parameter, word: str
+) -> list[CompletionItem[str]]:
+    """Offer types and, in the shell's own way, files."""
+    from idlc.driver import completion
+
+    found = completion.types(word, _include(context))
+    # bash forgets what was offered before files
+    return [CompletionItem(word, type="file"), *map(CompletionItem, found)]
+
+
+def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
+    """Offer the types that an endpoint of a node can have; the topic is the user's."""
+    from idlc.driver import completion
+    from idlc.model.ir import KINDS
+
+    wanted = _KINDS.get(option.name or "", "action")
+    kinds = [kind for kind in KINDS if kind == wanted]
+    return completion.types(word, _include(context), kinds, bare="own")
+
+
+def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionItem[str]]:
+    """Offer the ids and names of codes."""
+    from idlc.diagnostics.codes import CODES
+
+    ids = [CompletionItem(code.id, help=code.slug) for code in CODES.values()]
+    names = [CompletionItem(code.slug, help=code.id) for code in CODES.values()]
+    return [one for one in (*ids, *names) if one.value.startswith(word)]
+
+
+def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:
+    """Offer what a list of rules can go on with."""
+    from idlc.checks.select import CATEGORIES
+
+    before, comma, last = word.rpartition(",")
+    groups = [CompletionItem(name) for name in ("all", *CATEGORIES) if name.startswith(last)]
+    return [
+        CompletionItem(f"{before}{comma}{one.value}", help=one.help)
+        for one in (*groups, *codes(context, option, last))
+    ]
+
+
+def _include(context: click.Context) -> tuple[str, ...]:
+    given: Any = context.params.get("include")
+    return tuple(given or ())

@@ -1,0 +1,60 @@
+"""One run of `idlc gen`: what it says and the status that it ends with."""
+
+from __future__ import annotations
+
+import sys
+
+from idlc.cli import output
+from idlc.diagnostics.formats.terminal import counted, summary
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.visible import one_line
+from idlc.disk.pyproject import Config
+from idlc.driver.gen import Generated, GenOptions, gen
+
+
+def completed(wanted: GenOptions, settings: Config) -> GenOptions:
+    """Return what was typed, with what pyproject.toml says where nothing was."""
+    return wanted._replace(
+        paths=wanted.paths or settings.paths,
+        out=wanted.out or ("" if wanted.ament else settings.out or ""),
+        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+    )
+
+
+def once(wanted: GenOptions, style: str) -> int:
+    """Run once, show what happened and return the exit status."""
+    report = Report()
+    packages = gen(wanted, report)
+    if style == "json":
+        output.show(report, style, sys.stdout)
+        for package in packages:
+            output.fact(sys.stdout, "package", **package._asdict(), check=wanted.check)
+        output.fact(sys.stdout, "summary", **output.counts(report))
+        return output.status(report)
+    output.show(report, style, sys.stderr)
+    output.notes(report, sys.stderr)
+    if report.had_errors:
+        outcome = "" if wanted.check else "; nothing was written"
+        sys.stderr.write(f"{summary(report)}{outcome}\n")
+    else:
+        for package in packages:
+            sys.stdout.write(_line(package, wanted.check))
+    return output.status(report)
+
+
+def _line(package: Generated, check: bool) -> str:
+    """Return what is said of a package: what it is, and what was done if that is not all of it."""
+    done = []
+    if check:
+        done.append("up to date")
+    elif not package.written and not package.removed:
+        done.append("unchanged")
+    elif package.written < package.files or package.removed:
+        done += [f"{package.written} written"] if package.written else []
+        done += [f"{package.removed} removed"] if package.removed else []
+    note = f" ({', '.join(done)})" if done else ""
+    needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
+    return (
+        f"{package.package}: {counted(package.interfaces, 'interface')} → "
+        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}{needs}\n"
+    )

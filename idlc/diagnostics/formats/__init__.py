@@ -1,0 +1,1 @@
+"""Formats: a report as people and programs read it, a module for each."""

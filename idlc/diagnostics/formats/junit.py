@@ -1,0 +1,53 @@
+"""A report as JUnit XML, as `colcon test-result` and CI servers read it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from xml.sax.saxutils import escape, quoteattr
+
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.report import Diagnostic
+from idlc.diagnostics.visible import one_line
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def document(diagnostics: Iterable[Diagnostic], files: Iterable[str], suite: str = "idlc") -> str:
+    """Return the XML document: one failed test for each problem, one passed for each clean file."""
+    found = list(diagnostics)
+    clean = [file for file in files if file not in {one.where[0] for one in found}]
+    head = (
+        f'<testsuite name={_quoted(suite)} tests="{len(found) + len(clean)}" '
+        f'failures="{len(found)}" errors="0" skipped="0">'
+    )
+    cases = [_failed(one) for one in found]
+    cases += [f"  <testcase classname={_quoted(suite)} name={_quoted(file)}/>" for file in clean]
+    return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""])
+
+
+def _failed(one: Diagnostic) -> str:
+    path, line = one.where[0], ""
+    if one.span:
+        line = ":{}:{}".format(*one.span.source.position(one.span.start))
+    slug = CODES[one.code].slug if one.code in CODES else ""
+    lines = (
+        f"{path}{line}: {one.message}",
+        *filter(None, (one.breaks, one.hint and f"hint: {one.hint}")),
+    )
+    text = "\n".join(map(one_line, lines))
+    name = f"{one.code} {slug}{line}"
+    return (
+        f"  <testcase classname={_quoted(path or 'idlc')} name={_quoted(name)}>\n"
+        f"    <failure type={_quoted(one.severity.name.lower())} message={_quoted(one.message)}>"
+        f"{escape(_legal(text))}</failure>\n"
+        "  </testcase>"
+    )
+
+
+def _quoted(text: str) -> str:
+    return quoteattr(_legal(one_line(text)))
+
+
+def _legal(text: str) -> str:
+    return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)

@@ -1,0 +1,111 @@
+"""Diagnostics as values: what is wrong, where, and what to do about it.
+
+Passes append to one `Report`; nothing here prints, raises or knows a file system.
+Messages are lower-case, without a final stop, with the user's words in backticks.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterable, Iterator
+
+import msgspec
+
+from idlc.diagnostics.source import Span
+
+
+class Severity(enum.IntEnum):
+    """How bad it is: an error rejects the file, a warning does not."""
+
+    ERROR = 0
+    WARNING = 1
+
+
+class Label(msgspec.Struct, frozen=True):
+    """A second place that explains the first, such as an earlier definition."""
+
+    span: Span
+    text: str
+
+
+class Edit(msgspec.Struct, frozen=True):
+    """A replacement that fixes a problem and does no harm."""
+
+    span: Span
+    text: str
+
+
+class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
+    """One problem.
+
+    `span` is the smallest guilty piece; a problem with a whole file or folder has none
+    and names it in `path`. `hint` is something to do, in the imperative or as a question.
+    `detail` is preformatted text of several lines, such as a diff.
+    `levels` is what a change between two versions breaks, `edits` is what `check --fix` does.
+    """
+
+    code: str
+    severity: Severity
+    message: str
+    span: Span | None = None
+    path: str = ""
+    labels: tuple[Label, ...] = ()
+    hint: str | None = None
+    detail: str = ""
+    levels: tuple[str, ...] = ()
+    edits: tuple[Edit, ...] = ()
+
+    @property
+    def where(self) -> tuple[str, int]:
+        """The path and offset that order diagnostics."""
+        return (self.span.source.path, self.span.start) if self.span else (self.path, -1)
+
+    @property
+    def breaks(self) -> str:
+        """What it breaks, in words, such as `breaks: wire, hash`; empty if that is not said."""
+        return f"breaks: {', '.join(self.levels)}" if self.levels else ""
+
+
+class Report:
+    """The problems of one run, one per cause: the same code at the same place counts once.
+
+    `notes` are no problems: what was assumed or left out, for commands that tell it.
+    """
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, str, int, int, str], Diagnostic] = {}
+        self._had_errors = False
+        self.notes: list[str] = []
+
+    def add(self, diagnostic: Diagnostic) -> None:
+        """Add a problem unless the same code already stands at the same place."""
+        path, start = diagnostic.where
+        end = diagnostic.span.end if diagnostic.span else -1
+        # what is gone has no place of its own
+        about = "" if diagnostic.span and not diagnostic.levels else diagnostic.message
+        self._found.setdefault((path, diagnostic.code, start, end, about), diagnostic)
+        self._had_errors = self._had_errors or diagnostic.severity is Severity.ERROR
+
+    def extend(self, diagnostics: Iterable[Diagnostic]) -> None:
+        """Add several problems."""
+        for diagnostic in diagnostics:
+            self.add(diagnostic)
+
+    def __iter__(self) -> Iterator[Diagnostic]:
+        """Yield problems by file, place and code."""
+        return iter(sorted(self._found.values(), key=lambda found: (found.where, found.code)))
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    @property
+    def had_errors(self) -> bool:
+        """Whether any problem rejects its file."""
+        return self._had_errors
+
+
+def first_few(texts: Iterable[str], most: int) -> str:
+    """Return the first texts of a list, for a sentence, and how many more there are."""
+    found = list(texts)
+    shown = ", ".join(found[:most])
+    return f"{shown} and {len(found) - most} more" if len(found) > most else shown

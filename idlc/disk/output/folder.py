@@ -1,0 +1,163 @@
+"""The folder that a generated package is written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from functools import cached_property
+from pathlib import Path
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.disk import environment
+from idlc.disk.library import Library
+from idlc.disk.output import transaction, up_to_date
+from idlc.disk.output.folder_lock import alone
+from idlc.disk.output.lock_file import FILE, Lock, digest, encode, load
+from idlc.disk.output.write_plan import Change, Plan, plan
+from idlc.disk.read import absolute, is_file, is_folder
+
+
+class Target:
+    """A package folder, existing or not; `name` is how messages call it."""
+
+    #: Where the lock is, below the folder; empty, or with a slash at its end.
+    home = ""
+    #: Where the package's modules are, in the same words.
+    modules = ""
+
+    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+        self.name = name
+        self.package = package
+        self._path = absolute(name)
+        self.report = report
+        self._force = force
+
+    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
+        return alone(self._path.parent if beside else self._path)
+
+    def beside(self, package: str) -> Target:
+        """Return the folder of another package next to this one."""
+        name = (Path(self.name).parent / package).as_posix()
+        return Target(name, package, self.report, force=self._force)
+
+    @cached_property
+    def lock(self) -> Lock | None:
+        """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
+        report = Report() if self._force else self.report
+        return load(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+
+    def usable(self) -> bool:
+        """Whether this is or can become a folder; reports IDL612."""
+        for path in (self._path, *self._path.parents):
+            if is_folder(path):
+                return True
+            if os.path.lexists(path):
+                message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
+                self.report.add(codes.CANNOT_WRITE.of(self.name, message))
+                return False
+        return False
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Whether what is here is what compiling the inputs would write."""
+        found = up_to_date.unchanged(
+            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
+        )
+        if found:
+            transaction.sweep(self._path)
+        return found
+
+    def missing(self) -> list[str]:
+        """Return the packages that the generated code needs and this Python cannot import."""
+        modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
+        return sorted({package for package, kind in modules if not self._finds(package, kind)})
+
+    def is_at_home(self) -> bool:
+        """Return whether this Python is one that the generated code is imported with.
+
+        It is if nodes run in it, or if some package that the code needs is installed.
+        """
+        needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
+        return environment.runs_nodes() or any(map(environment.python_folders, needed))
+
+    def _finds(self, package: str, kind: str) -> bool:
+        """Whether a package can be imported, found without importing, or lies next to this one."""
+        inside = f"{kind}/__init__.py"
+        beside = (self._path / self.modules).parent
+        return is_file(beside / package / inside) or any(
+            is_file(place / inside) for place in environment.python_folders(package)
+        )
+
+    def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not.
+
+        With `check` the changes are only to be looked at, and edited files are among them.
+        """
+        content = {
+            path: text.encode("utf-8") if isinstance(text, str) else text
+            for path, text in files.items()
+        }
+        owned = transaction.owned(self._path / self.home, self.lock)
+        force = check or self._force
+        return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
+
+    def apply(self, changes: Plan, record: Lock) -> bool:
+        """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        self.lock = record
+        return transaction.apply(changes, encode(record), self.name, self.report)
+
+    def drift(self, changes: Plan, record: Lock) -> None:
+        """Report IDL616 for each file that is not what a run would write."""
+        if self.lock is None:
+            if self.report.had_errors:
+                return
+            message = f"there is no {self.home}{FILE} in `{self.name}`, so nothing can be compared"
+            self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
+            return
+        why = _reasons(self.lock, record) or "idlc itself changed"
+        for change in changes.changes:
+            self.report.add(self._drifted(change, self.lock, why))
+        # a dependency found elsewhere that compiles to the same is no drift
+        if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
+            path = f"{self.name}/{self.home}{FILE}"
+            self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}"))
+
+    def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
+        path = f"{self.name}/{change.path}"
+        wrote = old.outputs.get(change.path)
+        hint = "run idlc gen without --check"
+        if change.new is None:
+            message = f"`{path}` is no longer generated: {why}"
+        elif change.old is None:
+            message = f"`{path}` is missing" + ("" if wrote else f": {why}")
+        elif wrote is not None and digest(change.old) != wrote:
+            message = f"`{path}` was edited since idlc wrote it"
+            hint = "idlc gen --force replaces it"
+        elif wrote is None:
+            message = f"`{path}` was not written by idlc"
+            hint = "idlc gen --force replaces it"
+        else:
+            message = f"`{path}` is out of date: {why}"
+        return codes.DRIFT.of(path, message, hint=hint)
+
+
+def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
+    """Say what differs between the last run and one now; empty if nothing does."""
+    pairs = [(old.inputs, new.inputs)]
+    if dependencies:
+        pairs.append((old.dependencies, new.dependencies))
+    found = []
+    if old.idlc != new.idlc:
+        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.package != new.package:
+        found.append(f"the package was called `{old.package}`")
+    for before, after in pairs:
+        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        common = sorted(before.keys() & after.keys())
+        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
+    return first_few(found, 3)

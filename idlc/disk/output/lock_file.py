@@ -1,0 +1,147 @@
+"""idlc.lock: what a run was given and what it wrote, so that the next one knows what is its own.
+
+The file is JSON, sorted and indented, and names nothing of the machine that it was made on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.visible import one_line
+from idlc.disk.output.tree import may_be_own
+from idlc.disk.read import is_file, read_bytes
+from idlc.model.ir import TypeName
+from idlc.model.names import is_package_name
+
+Content = TypeVar("Content")
+
+FILE = "idlc.lock"
+#: Raised when an older idlc could not read what a newer one writes.
+FORMAT = 1
+
+
+class _Header(msgspec.Struct):
+    format: int
+    idlc: str
+
+
+class Lock(msgspec.Struct, frozen=True, kw_only=True):
+    """The record of one generated package.
+
+    `inputs` are the compiled files by name within the package, `dependencies` the other
+    interfaces that were read, by full name, `outputs` the files written, by path below the
+    lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
+    other packages that the generated code needs, `vendored` the packages written beside it.
+    """
+
+    format: int = FORMAT
+    idlc: str
+    package: str
+    vendor_deps: bool = False
+    vendored: tuple[str, ...] = ()
+    imports: tuple[str, ...] = ()
+    inputs: dict[str, str]
+    dependencies: dict[str, str]
+    types: dict[str, str]
+    outputs: dict[str, str]
+
+
+def digest(data: bytes) -> str:
+    """Return the SHA-256 of bytes."""
+    import hashlib  # loads OpenSSL, which a check does without
+
+    return hashlib.sha256(data).hexdigest()
+
+
+def meaning(text: str, package: str) -> str:
+    """Return a SHA-256 of an interface's text that ignores its comments and spelling.
+
+    Dependencies are recorded by it: the built-in catalogue has no comments and spells out what
+    an installed package abbreviates, and both compile to the same.
+    """
+    constants: list[str] = []
+    fields: list[str] = []
+    for line in text.splitlines():
+        code = line.partition("#")[0].replace("\t", " ").rstrip()
+        kind, _, rest = code.removeprefix(f"{package}/").partition(" ")
+        name, sign, value = rest.lstrip(" ").partition("=")
+        if sign:
+            constants.append(f"{kind} {name.rstrip(' ')}={_value(kind, value.strip(' '))}")
+        elif code:
+            name, _, value = name.partition(" ")
+            fields.append(f"{kind} {name} {_value(kind, value.strip(' '))}")
+        if kind.startswith("---"):
+            constants.append(kind)
+    return digest("\n".join((*constants, *fields)).encode())
+
+
+def _value(kind: str, text: str) -> str:
+    if kind in ("float32", "float64"):
+        with contextlib.suppress(ValueError):
+            return repr(float(text))
+    return text.lower() if kind == "bool" else text
+
+
+def encode(lock: Lock) -> bytes:
+    """Return the content of the file."""
+    return msgspec.json.format(msgspec.json.encode(lock, order="sorted"), indent=2) + b"\n"
+
+
+def load(out: Path, name: str, report: Report) -> Lock | None:
+    """Return the lock of a generated package, `None` if it has none; report IDL615."""
+    path = out / FILE
+    if not is_file(path):
+        return None
+    shown = f"{name}/{FILE}"
+    data = read_bytes(path, shown, report)
+    if data is None:
+        return None
+    try:
+        return decode(data)
+    except ValueError as error:
+        report.add(_bad(shown, str(error)))
+        return None
+
+
+def _decoded(data: bytes, kind: type[Content]) -> Content:
+    try:
+        return msgspec.json.decode(data, type=kind)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+    except msgspec.MsgspecError as error:  # no ValueError in older versions
+        raise ValueError(str(error)) from error
+
+
+def decode(data: bytes) -> Lock:
+    """Return a lock from a file's content; raise ValueError for one that cannot be used."""
+    header = _decoded(data, _Header)
+    if header.format > FORMAT:
+        raise ValueError(f"it was written by idlc {header.idlc}, which is newer than this one")
+    lock = _decoded(data, Lock)
+    for path in lock.outputs:
+        if not may_be_own(path):
+            raise ValueError(f"it lists a file that idlc cannot have written: {path}")
+    names = [*lock.types, *(name.replace(".", "/") + "/X" for name in lock.imports)]
+    names += [f"{package}/msg/X" for package in lock.vendored]
+    for name in names:
+        if not is_package_name(TypeName.parse(name).package):
+            raise ValueError(f"it names what cannot be a package: {name}")
+    return lock
+
+
+def _bad(shown: str, why: str) -> Diagnostic:
+    newer = "newer" in why
+    return codes.BAD_LOCK.of(
+        shown,
+        f"`{shown}` cannot be used: {one_line(why)}",
+        hint="upgrade idlc"
+        if newer
+        else "restore it from version control, or run again with --force, which keeps a copy "
+        "of every file that it replaces",
+    )

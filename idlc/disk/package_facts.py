@@ -1,0 +1,128 @@
+"""Reading what surrounds the interfaces of a package."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from idlc.checks.package.facts import Facts, Output
+from idlc.diagnostics.report import Report
+from idlc.disk.enclosing_package import manifest
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
+from idlc.disk.inputs import Inputs
+from idlc.disk.manifest_statements import read_statements
+from idlc.disk.output import lock_file
+from idlc.disk.read import decode, read_bytes, read_source, shown
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.source import Source
+
+#: Python packages of ROS 2 that have no interfaces.
+_LIBRARIES = frozenset(
+    "ament_index_python cv_bridge geometry_msgs launch launch_ros launch_testing message_filters "
+    "rclpy ros2cli ros2launch rosbag2_py rosidl_runtime_py sensor_msgs_py tf2_geometry_msgs "
+    "tf2_ros tf_transformations".split()
+)
+_NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
+_NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
+
+
+def facts(
+    given: Inputs, known: Callable[[], Iterable[str]], exclude: Exclusions = NOTHING
+) -> Facts | None:
+    """Return what surrounds a package's interfaces; `None` without a package.xml.
+
+    `known` tells the names of ROS packages; it is asked only for a package with Python code.
+    """
+    path = manifest(next(iter(given.folders), given.home))
+    unheard = Report()
+    source = read_source(path, shown(path), unheard) if path else None
+    if path is None or source is None or not (said := read_statements(source)):
+        return None
+    folder = path.parent
+    files = list(_files(folder))
+    locks = [file for file in files if file.name == lock_file.FILE]
+    generated = {
+        file.parent / path
+        for file in locks
+        if (known_lock := lock_file.load(file.parent, "", Report()))
+        for path in known_lock.outputs
+    }
+    cmake = folder / "CMakeLists.txt"
+    makes = read_bytes(cmake, "", unheard) if cmake.is_file() else None
+    modules = dict(_modules(folder, files, generated))
+    return Facts(
+        name=given.package,
+        manifest=source,
+        statements=said,
+        inputs=given.digests if locks else {},
+        modules=modules,
+        setup_py=_optional(folder / "setup.py"),
+        setup_cfg=_optional(folder / "setup.cfg"),
+        generates=_generates(makes or b""),
+        native=any(file.suffix in _NATIVE for file in files),
+        whole=bool(given.files)
+        and {one.file.path.resolve() for one in given.files}
+        >= {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)},
+        marker=(folder / "resource" / given.package).is_file(),
+        outputs=tuple(filter(None, map(_output, locks))),
+        known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
+    )
+
+
+def _generates(cmake: bytes) -> bool:
+    """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
+    code = re.sub(rb"#[^\n]*", b"", cmake)
+    calls = re.findall(rb"rosidl_generate_interfaces\s*\(([^()]*)", code)
+    return any(b"SKIP_INSTALL" not in call.split() for call in calls)
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    """Yield every file below a package's folder that may be a source, other packages' excluded."""
+    waiting = [folder]
+    while waiting:
+        here = waiting.pop()
+        try:
+            entries = sorted(here.iterdir())
+        except OSError:
+            continue
+        if here != folder and any(
+            one.name in CLOSING or one.name == "package.xml" for one in entries
+        ):
+            continue
+        for entry in entries:
+            if entry.name.startswith(".") or entry.name in SKIPPED:
+                continue
+            if entry.is_dir() and not entry.is_symlink():
+                waiting.append(entry)
+            elif entry.is_file():
+                yield entry
+
+
+def _modules(
+    folder: Path, files: Iterable[Path], generated: Container[Path]
+) -> Iterator[tuple[str, Source]]:
+    """Yield a package's own Python files by their dotted names, without tests and the like.
+
+    Nodes may lie in the folder that classes are generated into.
+    """
+    for file in files:
+        parts = file.relative_to(folder).parts
+        ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
+        if ours and file not in generated and (source := _optional(file)):
+            yield ".".join((*parts[:-1], file.stem)), source
+
+
+def _optional(path: Path) -> Source | None:
+    """Return a file's text, `None` if it is not there or no text, which others complain about."""
+    unheard = Report()
+    data = read_bytes(path, shown(path), unheard) if path.is_file() else None
+    return None if data is None else decode(data, shown(path), unheard)
+
+
+def _output(path: Path) -> Output | None:
+    known = lock_file.load(path.parent, "", Report())
+    return Output(shown(path), known.package, known.inputs) if known else None

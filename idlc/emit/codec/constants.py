@@ -1,0 +1,178 @@
+"""The values that a codec makes once for a byte order and then uses: Structs and functions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable
+from typing import NamedTuple
+
+from idlc.emit import pynames
+from idlc.emit.codec import wire_plan
+from idlc.emit.python_lines import Group, Node, call
+
+
+class Mark(NamedTuple):
+    """What was named at some point."""
+
+    made: dict[Hashable, tuple[str, Node]]
+    numbers: dict[str, int]
+    names: frozenset[str]
+
+
+class Tables:
+    """Gives each distinct expression one name, in order of first use."""
+
+    def __init__(self, names: pynames.Locals) -> None:
+        self._names = names
+        self._made: dict[Hashable, tuple[str, Node]] = {}
+        self._numbers: dict[str, int] = {}
+
+    @property
+    def definitions(self) -> tuple[tuple[str, Node], ...]:
+        """Names and expressions, in order of first use."""
+        return tuple(self._made.values())
+
+    def local(self, wanted: str) -> str:
+        """Return a free local variable."""
+        return self._names.new(wanted)
+
+    def mark(self) -> Mark:
+        """Return what `reset` needs."""
+        return Mark(self._made.copy(), self._numbers.copy(), self._names.mark())
+
+    def reset(self, mark: Mark) -> None:
+        """Forget everything named since `mark`."""
+        self._made, self._numbers = mark.made, mark.numbers
+        self._names.reset(mark.names)
+
+    def define(self, wanted: str, key: Hashable, expression: Node) -> str:
+        """Return the name of an expression, making it on first use of `key`."""
+        known = self._made.get(key)
+        if known is None:
+            known = self._made[key] = (self._names.new(wanted), expression)
+        return known[0]
+
+    def numbered(self, stem: str, function: str, *arguments: str, after: str = "") -> str:
+        """Return the name of a runtime function's result, made as `stem` and a number."""
+        key = (stem, function, *arguments, after)
+        known = self._made.get(key)
+        if known:
+            return known[0]
+        number = self._numbers[stem] = self._numbers.get(stem, 0) + 1
+        value = Group(f"_idlc.{function}", ("order", *arguments), after)
+        return self.define(f"{stem}_{number}", key, value)
+
+    def function(self, name: str, expression: str) -> str:
+        """Return the name of a runtime function."""
+        return self.define(name, expression, f"_idlc.{expression}")
+
+    def reader(self, fields: str, start: int | None) -> str:
+        """Return what unpacks a run: a function, or without `start` a table by position."""
+        if start is None:
+            return self.numbered("read", "phases", f'"{fields}"')
+        arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
+        return self.numbered("read", "layout", *arguments, after=".unpack_from")
+
+    def rows(self, fields: str) -> str:
+        """Return the function that yields the values of one structure after the other."""
+        return self.numbered("rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
+
+    def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
+        """Return what packs a frame: a function, or a table by text size or by position."""
+        arguments = [f'"{fields}"']
+        if start:
+            arguments.append(f"start={start}")
+        if align > 1:
+            arguments.append(f"align={align}")
+        if start is None:
+            return self.numbered("write", "text_phases" if texts else "phases", *arguments)
+        if texts:
+            return self.numbered("write", "Texts", *arguments)
+        return self.numbered("write", "layout", *arguments, after=".pack")
+
+    def pad(self, align: int) -> str:
+        """Return the table of padding to `align`, by position."""
+        return self.function(f"pad{align}", f"PAD{align}")
+
+    def gap(self, size: int) -> str:
+        """Return an expression for `size` zero bytes."""
+        return 'b"' + "\\x00" * size + '"'
+
+    def block_writer(self, step: wire_plan.Block) -> str:
+        """Return the function that turns a fixed-size array into bytes."""
+        if step.primitive in wire_plan.LIST_PRIMITIVES:
+            kind = wire_plan.LIST_PRIMITIVES[step.primitive]
+            name = f"{kind}_{step.count}"
+            return self.define(name, name, f"_idlc.{kind}_writer({step.count})")
+        return self._array("bytes", "array_writer", step)
+
+    def buffer_writer(self, step: wire_plan.Block) -> str:
+        """Return the function that turns a fixed-size array into any kind of buffer."""
+        if step.primitive in wire_plan.LIST_PRIMITIVES:
+            return self.block_writer(step)
+        return self._array("buffer", "buffer_writer", step)
+
+    def block_reader(self, step: wire_plan.Block) -> str:
+        """Return the function that turns bytes into a fixed-size array."""
+        if step.primitive in wire_plan.LIST_PRIMITIVES:
+            kind = wire_plan.LIST_PRIMITIVES[step.primitive]
+            return self.function(f"read_{kind}", f"read_{kind}")
+        return self._array("array", "array_reader", step, "reading")
+
+    def _array(self, stem: str, function: str, step: wire_plan.Block, *more: str) -> str:
+        dtype = numpy_name(step.primitive)
+        expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
+        return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
+
+    def sequence_writer(self, step: wire_plan.Numbers) -> str:
+        """Return the function that makes an array of another sequence of numbers."""
+        expression = f'_idlc.sequence_writer(order, "{step.code}")'
+        return self.define(f"buffer_{step.code}", expression, expression)
+
+    def sequence_copier(self, step: wire_plan.Numbers) -> str:
+        """Return the function that turns a sequence of numbers into bytes."""
+        expression = f'_idlc.sequence_copier(order, "{step.code}")'
+        return self.define(f"copy_{step.code}", expression, expression)
+
+    def sequence_reader(self, step: wire_plan.Numbers) -> str:
+        """Return the function that turns a buffer into a sequence of numbers."""
+        expression = f'_idlc.sequence_reader(order, "{step.code}", reading)'
+        return self.define(f"numbers_{step.code}", expression, expression)
+
+    def texts_writer(self, step: wire_plan.Texts) -> str:
+        """Return the function that writes an array of strings; one for each field."""
+        local = step.place.local
+        arguments = ["order"]
+        if step.size is not None:
+            arguments.append(f"size={step.size}")
+        elif step.bound is not None:
+            arguments.append(f"bound={step.bound}")
+        expression = call("_idlc.wide_block" if step.wide else "_idlc.text_block", *arguments)
+        return self.define(f"write_{local}", f"write texts {local}", expression)
+
+    def texts_reader(self, step: wire_plan.Texts) -> str:
+        """Return the function that reads an array of strings; one for each field."""
+        local = step.place.local
+        if step.wide:
+            expression = call("_idlc.wide_texts_reader", "order")
+        else:
+            expression = call("_idlc.texts_reader", "order", self.text())
+        return self.define(f"read_{local}", f"texts {local}", expression)
+
+    def text(self) -> str:
+        """Return the name of the function that makes a string of bytes."""
+        return self.define("text", "text", "reading.text")
+
+    def strings(self) -> str:
+        """Return the name of the function that prepares reading many strings."""
+        expression = call("_idlc.strings_reader", "order", "reading.text")
+        return self.define("strings", "strings", expression)
+
+    def small(self) -> str:
+        """Return the name of the size up to which no view is worth its cost."""
+        return self.define("small", "small", "reading.small")
+
+
+def numpy_name(primitive: str) -> str:
+    """Return the dtype of a numeric primitive."""
+    return {"char": "uint8"}.get(primitive, primitive)

@@ -1,0 +1,397 @@
+"""From a layout to the statements that read it.
+
+Numbers that follow each other are read by one precompiled Struct. A Struct and an index check
+their own bounds; a slice that ends behind the buffer's end is shorter, and whatever is read next,
+or a check at the end, fails. Before structures are made, their least size is compared with the
+bytes that are left: nothing is allocated that the buffer does not hold. Any failure is explained
+afterwards, by the runtime.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from idlc.emit.codec import wire_plan
+from idlc.emit.codec.constants import Tables
+from idlc.emit.codec.cursor import Cursor
+from idlc.emit.codec.encode import block_code
+from idlc.emit.codec.statements import Block, Line, Statement
+from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
+from idlc.model import ir
+
+TOO_SHORT = (Line('raise ValueError("too short")'),)
+UNENDED = (Line('raise ValueError("text without end")'),)
+TOO_MANY = (Line('raise ValueError("too many elements")'),)
+
+
+def is_bulk(steps: tuple[wire_plan.Step, ...]) -> bool:
+    """Whether a structure holds numeric buffers, which are read through a memoryview."""
+    return any(
+        isinstance(step, wire_plan.Numbers)
+        or (isinstance(step, wire_plan.Block) and step.is_large)
+        or (isinstance(step, wire_plan.Items) and is_bulk(step.body))
+        for step in steps
+    )
+
+
+def decode(
+    steps: tuple[wire_plan.Step, ...],
+    tables: Tables,
+    own: str,
+    makers: dict[ir.TypeName, str],
+    *,
+    bulk: bool,
+) -> tuple[Statement, ...]:
+    """Return the statements that read a message; what they use is defined in `tables`.
+
+    `own` and `makers` name the functions that make empty objects; `bulk` is what `is_bulk` says.
+    """
+    decoder = _Decoder(tables, makers, "view" if bulk else "data")
+    decoder.line(f"{own}()", "message")
+    for step in steps:
+        decoder.step(step)
+    decoder.flush(last=True)
+    decoder.finish()
+    first = []
+    if decoder.limited or decoder.source == "view":
+        first.append(Line("len(data)", "limit"))
+    if decoder.source == "view":
+        first.append(Line(f"data if limit < {tables.small()} else memoryview(data)", "view"))
+    return (*first, *decoder.body, Line("return message"))
+
+
+class _Run:
+    """Fixed-size values that are read together."""
+
+    def __init__(self) -> None:
+        self.fields: list[str] = []
+        self.targets: list[str] = []
+        self.sizes: list[tuple[int, int]] = []
+        self.after: list[Statement] = []
+
+    def add(self, token: str, align: int, size: int, target: str = "") -> None:
+        """Add a value of `size` bytes, stored in `target`."""
+        self.fields.append(token)
+        self.sizes.append((align, size))
+        if target:
+            self.targets.append(target)
+
+    def skipped(self, cursor: Cursor) -> Cursor:
+        """Return the position after the values, of which the first is at `cursor`."""
+        for align, size in self.sizes:
+            if align > cursor.modulus:
+                cursor = cursor.known(align, 4)
+            cursor = cursor.skip(cursor.padding(align) + size)
+        return cursor
+
+    def assignment(self, value: Group) -> Line:
+        """Return the statement that reads the values."""
+        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
+
+
+class _Decoder:
+    """The statements so far, the values to be read together, and the position before them."""
+
+    def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], source: str) -> None:
+        self.tables = tables
+        self.makers = makers
+        self.source = source
+        self.body: list[Statement] = []
+        self.here = Cursor()
+        self.run = _Run()
+        self.limited = False
+        self.looping = False
+        self.unchecked = False
+        self.worded = False
+
+    def step(self, step: wire_plan.Step) -> None:
+        """Emit one step."""
+        match step:
+            case wire_plan.Block() if step.is_large:
+                self.block(step)
+            case wire_plan.Number() | wire_plan.Dummy() | wire_plan.Block():
+                self.fixed(step, self.run)
+            case wire_plan.Enter(place, type_):
+                self.body += self.enter(place, type_)
+            case wire_plan.Text(place, wide):
+                self.line(self.wide_text() if wide else self.text(), place.text)
+            case wire_plan.Bytes(place, primitive, bound):
+                name = f"read_{wire_plan.LIST_PRIMITIVES[primitive]}"
+                raw = self.buffer(self.count(bound), 1, 1, self.source)
+                self.line(call(self.tables.function(name, name), raw), place.text)
+            case wire_plan.Numbers():
+                self.numbers(step)
+            case wire_plan.Texts():
+                self.texts(step)
+            case wire_plan.Items():
+                self.items(step)
+
+    def line(self, value: Node, target: Node = "") -> None:
+        """Emit a statement."""
+        self.body.append(Line(value, target))
+
+    # Values of fixed size.
+
+    def fixed(self, step: wire_plan.Step, run: _Run) -> None:
+        """Add a value to a run."""
+        match step:
+            case wire_plan.Number(place, letter, size):
+                run.add(letter, size, size, place.text)
+            case wire_plan.Block(place, primitive, count):
+                token = f"{count}{block_code(primitive)}"
+                run.add(token, step.unit, step.size, place.local)
+                reader = self.tables.block_reader(step)
+                run.after.append(Line(call(reader, place.local), place.text))
+            case _:
+                run.add("x", 1, 1)
+
+    def enter(self, place: wire_plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
+        """Return the statements that make a nested object."""
+        return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
+
+    def flush(self, *, last: bool = False) -> None:
+        """Read the run; the position after it is of no interest if it is the `last`."""
+        run, self.run = self.run, _Run()
+        if not run.fields:
+            return
+        self.unchecked = False
+        widest = max(align for align, _ in run.sizes)
+        if run.sizes[0][0] == widest:
+            self.align(widest)
+        fields = "".join(run.fields)
+        here = self.here.text()
+        if self.worded and fields == "I":
+            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
+            self.here = run.skipped(self.here)
+        elif widest <= self.here.modulus:
+            reader = self.tables.reader(fields, self.here.residue)
+            self.body.append(run.assignment(call(reader, "data", here)))
+            self.here = run.skipped(self.here)
+        else:
+            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
+            struct = table if last else "struct"
+            if not last:
+                self.line(table, struct)
+            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
+            if not last:
+                self.line(f"{here} + struct.size", "at")
+                self.here = run.skipped(self.here).at("at")
+        self.body += run.after
+
+    def align(self, align: int) -> None:
+        """Go to the next multiple of `align`, counted from the end of the header."""
+        if self.here.modulus >= align:
+            self.here = self.here.skip(self.here.padding(align))
+        elif align == 8:
+            self.line(f"({self.here.text(3)} & -8) + 4", "at")
+            self.here = Cursor("at", 0, 8, 4)
+        else:
+            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
+            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
+            self.here = Cursor("at", -lead, align, 4 % align)
+
+    def settle(self, target: Cursor) -> None:
+        """Bring the position into the variable of `target`."""
+        value = self.here.text(-target.offset)
+        if value != target.base:
+            self.line(value, target.base)
+        self.here = self.here.at(target.base, target.offset)
+
+    # Values of variable size.
+
+    def number(self, target: str) -> None:
+        """Read a count or size into a variable, together with the numbers before it."""
+        self.run.add("I", 4, 4, target)
+        self.flush()
+
+    def count(self, bound: int | None) -> str:
+        """Read the count of a sequence and check its upper limit."""
+        self.number("count")
+        if bound is not None:
+            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
+        return "count"
+
+    def start(self) -> str:
+        """Return the position as an expression that stays true when `end` changes."""
+        if self.here.base == "end":
+            self.settle(Cursor("at", 0))
+        return self.here.text()
+
+    def text(self) -> Node:
+        """Read the size of a string; return the expression that reads the string.
+
+        The last byte must be zero; to look at it is to check the bounds.
+        """
+        size = "size"
+        if self.worded and not self.run.fields:
+            self.align(4)
+            self.here = self.here.skip(4)
+            start = self.start()
+            size = f"words[{start} >> 2]"
+        else:
+            self.number(size)
+            start = self.start()
+        self.line(f"{self.here.text(-1)} + {size}", "end")
+        self.body.append(Block("if data[end]:", UNENDED))
+        self.here = Cursor("end", 1, 1, 0)
+        if self.worded:
+            return call("to_str", f"chars{slice_of(start)}")
+        return call(self.tables.text(), f"data{slice_of(start)}")
+
+    def wide_text(self) -> Node:
+        """Read the size of a wstring; return the expression that reads the wstring."""
+        self.number("count")
+        raw = self.buffer("count", 4, 4, "data")
+        return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
+
+    def buffer(self, count: str, align: int, size: int, source: str) -> str:
+        """Return the slice of `count` elements, and go behind it.
+
+        It is shorter if the buffer is, which whatever is read next notices.
+        """
+        if not self.here.aligned(align):
+            self.settle(Cursor("at", 0))
+            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
+            self.here = self.here.known(4, 0)
+        start = self.start()
+        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
+        self.unchecked = True
+        modulus = min(self.here.modulus, size & -size)
+        self.here = self.here.at("end").known(modulus, self.here.residue)
+        return f"{source}{slice_of(start)}"
+
+    def finish(self) -> None:
+        """Emit the check that nothing after the last buffer makes."""
+        if self.unchecked:
+            self.short_if(f"{self.here.text()} > limit")
+
+    def short_if(self, condition: str) -> None:
+        """Emit a check that the buffer is long enough."""
+        self.limited = True
+        self.body.append(Block(f"if {condition}:", TOO_SHORT))
+
+    def numbers(self, step: wire_plan.Numbers) -> None:
+        """Read a numeric sequence as one buffer."""
+        raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
+        self.line(call(self.tables.sequence_reader(step), raw), step.place.text)
+
+    def block(self, step: wire_plan.Block) -> None:
+        """Read a large array of fixed size as one buffer."""
+        self.flush()
+        self.align(step.unit)
+        start, end = self.here.text(), self.here.text(step.size)
+        self.short_if(f"{end} > limit")
+        self.here = self.here.skip(step.size)
+        reader = self.tables.block_reader(step)
+        self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
+
+    def begin(self, step: wire_plan.Texts | wire_plan.Items) -> str:
+        """Read the count, or return the size."""
+        if step.size is None:
+            return self.count(step.bound)
+        self.flush()
+        return str(step.size)
+
+    def texts(self, step: wire_plan.Texts) -> None:
+        """Read an array or sequence of strings."""
+        count = self.begin(step)
+        self.align(4)
+        reader = self.tables.texts_reader(step)
+        texts = call(reader, "data", self.here.text(), count)
+        self.line(texts, tuple_of(step.place.text, "end"))
+        self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
+
+    def items(self, step: wire_plan.Items) -> None:
+        """Read an array or sequence of structures."""
+        repeat = wire_plan.fixed(step.body)
+        if repeat is not None and repeat.stride == repeat.size:
+            self.rows(step, repeat)
+            return
+
+        def element() -> None:
+            for part in step.body:
+                self.step(part)
+            self.flush()
+
+        count = self.begin(step)
+        least = wire_plan.smallest(step.body)
+        if step.size is None:
+            wanted = count if least == 1 else f"{least} * {count}"
+            self.short_if(f"{self.here.text()} + {wanted} > limit")
+        else:
+            self.short_if(f"{self.here.text(least * step.size)} > limit")
+        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
+        self.line(empty, step.place.local)
+        self.line(step.place.local, step.place.text)
+        worded = self.worded
+        many = wire_plan.is_many(step) and wire_plan.is_text(step.body)
+        # not within a loop: it goes over all that follows
+        if many and not worded and self.source == "data" and not self.looping:
+            strings = call(self.tables.strings(), "data", self.here.text())
+            self.line(strings, tuple_of("words", "chars", "to_str"))
+            self.worded = True
+        self.loop(f"for {step.item} in {step.place.local}:", element)
+        self.worded = worded
+
+    def rows(self, step: wire_plan.Items, repeat: wire_plan.Fixed) -> None:
+        """Read structures of constant size: one Struct yields the values of each."""
+        count = self.begin(step)
+        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
+        self.line(step.place.local, step.place.text)
+        if step.size is not None:
+            self.align(repeat.align)
+        run = _Run()
+        entered: list[Statement] = []
+        for part in step.body:
+            if isinstance(part, wire_plan.Enter):
+                entered += self.enter(part.place, part.type)
+            else:
+                self.fixed(part, run)
+        reader = self.tables.rows("".join(run.fields))
+        values = self.tables.local(f"{step.item}_values") if run.targets else "_"
+        rows = self.buffer(count, repeat.align, repeat.size, self.source)
+        stored = [Line(values, tuple_of(*run.targets))] if run.targets else []
+        body = (
+            Line(f"{self.makers[step.type]}()", step.item),
+            Line(call(f"{step.place.local}.append", step.item)),
+            *entered,
+            *stored,
+            *run.after,
+        )
+        self.body.append(Block(f"for {values} in {reader}({rows}):", body))
+
+    def loop(self, head: str, emit: Callable[[], None]) -> None:
+        """Emit a loop; `emit` emits its body, until what is known of the position holds.
+
+        Between two rounds the position is in `at`, or in `end` if the body ends with a string.
+        """
+        outside, entry = self.body, self.here
+        unchecked = self.unchecked
+        first = entry.at("at")
+        looping, self.looping = self.looping, True
+        while True:
+            mark = self.tables.mark()
+            self.body, self.here = [], first
+            emit()
+            again = first.meet(self.here)
+            if first.base == "at" and self.here.base == "end":
+                again = again.at("end", self.here.offset)
+            if again == first:
+                break
+            first = again
+            self.tables.reset(mark)
+        self.looping = looping
+        self.settle(first)
+        loop = Block(head, tuple(self.body))
+        self.body, self.here = outside, entry
+        self.settle(first)
+        self.body.append(loop)
+        self.here = first
+        self.unchecked |= unchecked
+
+
+def slice_of(start: str, end: str = "end") -> str:
+    """Return the slice from one expression to another."""
+    if " " in start + end:
+        return f"[{start} : {end}]"
+    return f"[{start}:{end}]"

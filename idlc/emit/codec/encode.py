@@ -1,0 +1,424 @@
+"""From a layout to the statements that write it.
+
+Numbers that follow each other are written by one precompiled Struct; so is a string between
+them, by one Struct for each of its sizes. Positions modulo 8 are followed as far as they are
+known, so that padding is part of the Structs. Where a string or a sequence made them unknown,
+the statement picks the Struct by the position, which is noted in `at` (or, if 4 is enough, its
+remainder in `low`) only where somebody reads it.
+"""
+
+from __future__ import annotations
+
+import re
+
+from idlc.emit.codec import statements, wire_plan
+from idlc.emit.codec.constants import Tables
+from idlc.emit.codec.position import Position, aligned_to_8
+from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
+from idlc.model import ir
+
+NONE: frozenset[str] = frozenset()
+_POSITIONS = re.compile(r"\b(?:at|low)\b")
+
+
+class Frame:
+    """Fixed-size values that follow each other, with at most one text: one Struct."""
+
+    def __init__(self, start: Position) -> None:
+        self.modulus = start.modulus
+        self.residue = start.residue
+        self.fields: list[str] = []
+        self.values: list[Node] = []
+        self.text_size = ""
+        self.widest = 1
+
+    def phase(self) -> str:
+        """Return the subscript that picks a Struct by the position, empty if one is enough."""
+        if self.modulus >= self.widest:
+            return ""
+        return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
+
+
+def encode(steps: tuple[wire_plan.Step, ...], tables: Tables, indent: int) -> list[str]:
+    """Return the lines that write a message; what they use is defined in `tables`."""
+    encoder = _Encoder(tables, Position())
+    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
+    for step in steps:
+        encoder.step(step)
+    encoder.flush(1)
+    body = statements.prune(tuple(encoder.body), NONE)
+    return statements.function(body, indent, tuple(encoder.again))
+
+
+class _Encoder:
+    """The statements so far, the frame that grows, and the position after both."""
+
+    def __init__(self, tables: Tables, here: Position) -> None:
+        self.tables = tables
+        self.here = here
+        self.body: list[statements.Statement] = []
+        self.frame = Frame(here)
+        #: What is true if another thread changed the length of an array that was not copied.
+        self.again: list[str] = []
+        self.looping = False
+
+    def step(self, step: wire_plan.Step) -> None:
+        """Emit one step."""
+        match step:
+            case wire_plan.Block() if step.is_large:
+                self.block(step)
+            case wire_plan.Number() | wire_plan.Dummy() | wire_plan.Block():
+                self.fixed(step)
+            case wire_plan.Enter(place):
+                if not step.empty:
+                    self.line(place.text, place.local)
+            case wire_plan.Text(place, wide):
+                if wide:
+                    writer = self.tables.function("wide_text", "wide_text(order)")
+                    self.buffer(place, call(writer, place.text), 4)
+                else:
+                    self.text(place)
+            case wire_plan.Bytes(place, primitive, bound):
+                function = wire_plan.LIST_PRIMITIVES[primitive]
+                writer = self.tables.function(function, function)
+                self.buffer(place, call(writer, place.text), 1, bound)
+            case wire_plan.Numbers():
+                self.numbers(step)
+            case wire_plan.Texts():
+                self.texts(step)
+            case wire_plan.Items():
+                self.items(step)
+
+    def line(self, value: Node, target: str) -> None:
+        """Emit an assignment."""
+        self.body.append(statements.Line(value, target))
+
+    def put(self, part: Node, reads: str = "") -> None:
+        """Emit a part of the message."""
+        self.body.append(statements.Put(part, positions(reads)))
+
+    # Values of fixed size, and one text among them, gather in a frame.
+
+    def fixed(self, step: wire_plan.Step) -> None:
+        """Add a value of fixed size to the frame."""
+        match step:
+            case wire_plan.Number(place, "?"):
+                truths = self.tables.function("truths", "TRUTHS")
+                self.field("?", 1, 1, f"{truths}[{place.text}]")
+            case wire_plan.Number(place, letter, size):
+                self.field(letter, size, size, place.text)
+            case wire_plan.Block(place, primitive, count):
+                value = call(self.tables.block_writer(step), place.text)
+                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
+            case _:
+                self.field("x", 1, 1)
+
+    def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
+        """Add a value to the frame."""
+        frame = self.frame
+        frame.fields.append(token)
+        frame.widest = max(frame.widest, align)
+        if value is not None:
+            frame.values.append(value)
+        self.here.align(align)
+        self.here.advance(size)
+
+    def text(self, place: wire_plan.Place) -> None:
+        """Add a string to the frame; a frame has at most one."""
+        if self.frame.text_size:
+            self.flush(4)
+        size = self.tables.local(f"{place.local}_size")
+        self.line(f"{place.text}.encode()", place.local)
+        self.line(call("len", place.local), size)
+        self.field("I", 4, 4, f"{size} + 1")
+        self.frame.fields.append("*")
+        self.frame.values.append(place.local)
+        self.frame.text_size = size
+        self.here.skip(size, 1)
+        self.here.advance(1)
+
+    def flush(self, align: int) -> None:
+        """Write the frame; with the padding for a following `align` where that is known."""
+        frame = self.frame
+        if frame.fields:
+            if max(frame.modulus, frame.widest) < align:
+                align = 1
+            frame.widest = max(frame.widest, align)
+            phase = frame.phase()
+            start = None if phase else frame.residue
+            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
+            key = f"[{frame.text_size}]" if frame.text_size else ""
+            method = ".pack" if phase and not key else ""
+            self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
+            self.here.align(align)
+        self.settle()
+
+    def settle(self) -> None:
+        """Note the position in `at` and `low`, and begin a new frame there."""
+        here = self.here
+        for target, value in here.before:
+            self.note(target, value)
+        here.before.clear()
+        if not here.constant:
+            self.note("at", here.text)
+            if not here.known(4):
+                self.note("low", here.low)
+            self.here = Position.variable(here.modulus, here.residue)
+        self.frame = Frame(self.here)
+
+    def note(self, target: str, value: str) -> None:
+        """Note a position; dropped later unless it is read."""
+        value = without_parentheses(value)
+        if target != value:
+            self.body.append(statements.Note(target, value, positions(value)))
+
+    # Values of variable or large size are parts of their own.
+
+    def block(self, step: wire_plan.Block) -> None:
+        """Emit a large array of fixed size."""
+        self.flush(step.unit)
+        self.pad(step.unit)
+        self.put(call(self.tables.buffer_writer(step), step.place.text))
+        self.here.advance(step.size)
+        self.settle()
+
+    def check(self, condition: str, problem: str) -> None:
+        """Emit a check; `validate` finds the field and the words afterwards."""
+        raised = statements.Line(f'raise ValueError("{problem}")')
+        self.body.append(statements.Block(f"if {condition}:", (raised,)))
+
+    def bound(self, count: str, bound: int | None) -> None:
+        """Check a sequence's upper limit."""
+        if bound is not None:
+            self.check(f"{count} > {bound}", "too many elements")
+
+    def buffer(
+        self, place: wire_plan.Place, value: Node, unit: int, bound: int | None = None
+    ) -> None:
+        """Emit the count of a buffer's units, and the buffer."""
+        local = place.local
+        self.line(value, local)
+        self.bound(f"len({local})", bound)
+        count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
+        self.field("I", 4, 4, count)
+        self.flush(1)
+        self.put(local)
+        self.here.skip(f"len({local})", unit)
+        self.settle()
+
+    def numbers(self, step: wire_plan.Numbers) -> None:
+        """Emit a numeric sequence."""
+        local = step.place.local
+        count = self.tables.local(f"{local}_count")
+        if self.looping:
+            self.line(call(self.tables.sequence_copier(step), step.place.text), local)
+            self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
+        else:
+            self.line(step.place.text, local)
+            converted = statements.Line(call(self.tables.sequence_writer(step), local), local)
+            array = self.tables.function("array", "array_of(order)")
+            self.body.append(statements.Block(f"if type({local}) is not {array}:", (converted,)))
+            self.line(f"len({local})", count)
+            self.again.append(f"len({local}) != {count}")
+        self.bound(count, step.bound)
+        self.field("I", 4, 4, count)
+        self.flush(1)
+        repeat = wire_plan.Fixed(step.unit, step.unit, step.unit)
+        self.elements(local, count, repeat, unless=count)
+
+    def texts(self, step: wire_plan.Texts) -> None:
+        """Emit an array or sequence of strings, its count included."""
+        local = step.place.local
+        self.flush(4)
+        self.pad(4)
+        self.line(call(self.tables.texts_writer(step), step.place.text), local)
+        self.put(local)
+        self.here.skip(f"len({local})", 4 if step.wide else 1)
+        self.settle()
+
+    def count(self, step: wire_plan.Items, count: str) -> None:
+        """Emit the check of a size, or the count."""
+        self.bound(count, step.bound)
+        if step.size is None:
+            self.field("I", 4, 4, count)
+        else:
+            self.check(f"{count} != {step.size}", "wrong number of elements")
+
+    def pad(self, align: int, unless_empty: str = "") -> None:
+        """Emit padding as a part of its own."""
+        here = self.here
+        if here.aligned(align):
+            return
+        phase = "[at & 7]" if align == 8 else "[low & 3]"
+        index = f"[{here.residue}]" if here.known(align) else phase
+        part = f"{self.tables.pad(align)}{index}"
+        self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
+        if not unless_empty:
+            here.align(align)
+
+    def rows(self, step: wire_plan.Items) -> None:
+        """Emit structures of strings: what goes around each is looked up, all is encoded once."""
+        local = step.place.local
+        rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
+        sized = self.tables.function("sized", "sizes(order)")
+        ended = self.tables.function("ended", "ENDS")
+        places = [part.place for part in step.body if isinstance(part, wire_plan.Text)]
+        parts = [
+            part
+            for one in places
+            for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
+        ]
+        lines = [statements.Line(one.text, one.local) for one in places]
+        lines.append(statements.Line(tuple_of(*parts), rows, "+="))
+        loop = f"for {step.item} in {local}"
+        given = tuple_of(*(one.text for one in places)).flat()
+        each = self.tables.local("each")
+        texts = Comprehension(each, (loop, f"for {each} in {given}"))
+        unsized = call(self.tables.function("unsized", "unsized"), texts)
+        self.line(step.place.text, local)
+        self.line("[]", f"{rows}: list[str]")
+        attempt = statements.Block("try:", (statements.Block(f"{loop}:", tuple(lines)),))
+        instead = statements.Block("except IndexError:", (statements.Line(unsized, rows),))
+        self.body.append(statements.Block(f"if len({local}):", (attempt, instead)))
+        self.count(step, f"len({rows}) // {len(parts)}")
+        self.flush(4)
+        self.pad(4)
+        self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
+        self.put(block)
+        self.here.skip(f"len({block})", 1)
+        self.settle()
+
+    def items(self, step: wire_plan.Items) -> None:
+        """Emit an array or sequence of structures, as many as there are at one moment."""
+        repeat = wire_plan.fixed(step.body)
+        only_texts = all(isinstance(part, wire_plan.Text) and not part.wide for part in step.body)
+        if only_texts and wire_plan.is_many(step):
+            self.rows(step)
+            return
+        local = step.place.local
+        self.line(call(self.tables.function("listed", "listed"), step.place.text), local)
+        self.count(step, f"len({local})")
+        if repeat is None:
+            self.loop(step)
+        else:
+            self.fused(step, repeat)
+
+    def fused(self, step: wire_plan.Items, repeat: wire_plan.Fixed) -> None:
+        """Emit structures of constant size: one Struct, one join."""
+        local = step.place.local
+        self.flush(1 if step.size is None else repeat.align)
+        inner = _Encoder(self.tables, Position(8, 4))
+        for part in inlined(step):
+            inner.fixed(part)
+        writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
+        row = Group(writer, tuple(inner.frame.values))
+        block = self.tables.local(f"{local}_block")
+        gap = "\\x00" * (repeat.stride - repeat.size)
+        loop = f"for {step.item} in {local}"
+        self.line(Group(f'b"{gap}".join', (Comprehension(row, (loop,)),)), block)
+        self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
+
+    def elements(self, part: str, count: str, repeat: wire_plan.Fixed, *, unless: str) -> None:
+        """Emit elements of constant size; no padding goes before if `unless` is false."""
+        gap = repeat.stride - repeat.size
+        size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
+        size += f" - {gap}" if gap else ""
+        modulus = power_of_two(repeat.size, repeat.stride)
+        if not unless or (self.here.aligned(repeat.align) and not gap):
+            self.pad(repeat.align)
+            self.put(part)
+            self.here.skip(size, modulus)
+        else:
+            self.settle()
+            if self.here.constant:
+                self.note("at", self.here.text)
+            self.note("low", self.here.low)
+            self.pad(repeat.align, unless)
+            self.put(part)
+            outside, self.body = self.body, []
+            start = aligned_to_8("at") if repeat.align == 8 else "at"
+            self.note("at", f"{start} + {size}")
+            self.note("low", size)
+            outside.append(statements.Block(f"if {unless}:", tuple(self.body)))
+            self.body = outside
+            self.here = Position.variable(min(modulus, 4), 0)
+        self.settle()
+
+    def loop(self, step: wire_plan.Items) -> None:
+        """Emit structures one by one."""
+        self.flush(1)
+        entry = self.here
+        if entry.constant:
+            self.note("at", entry.text)
+        if entry.known(4):
+            self.note("low", entry.low)
+        outside = self.body
+        head = entry.meet(entry)
+        looping, self.looping = self.looping, True
+        while True:
+            mark = self.tables.mark()
+            self.body = []
+            self.here = Position.variable(head.modulus, head.residue)
+            self.frame = Frame(self.here)
+            for part in step.body:
+                self.step(part)
+            self.flush(1)
+            end = self.here
+            if end.modulus >= 4 > head.modulus:
+                self.note("low", end.low)
+            met = head.meet(end)
+            if met.modulus == head.modulus:
+                break
+            head = met
+            self.tables.reset(mark)
+        outside.append(
+            statements.Block(f"for {step.item} in {step.place.local}:", tuple(self.body))
+        )
+        self.looping = looping
+        self.body = outside
+        self.here = head
+        self.frame = Frame(head)
+
+
+def positions(expression: str) -> frozenset[str]:
+    """Return the variables in an expression that hold positions."""
+    return frozenset(_POSITIONS.findall(expression))
+
+
+def without_parentheses(value: str) -> str:
+    """Return an expression without parentheses around all of it."""
+    depth = 0
+    for place, character in enumerate(value):
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and place < len(value) - 1:
+            return value
+    return value[1:-1] if value.startswith("(") else value
+
+
+def block_code(primitive: str) -> str:
+    """Return the character for a fixed-size array in a layout."""
+    return "B" if primitive in wire_plan.LIST_PRIMITIVES else ir.PRIMITIVES[primitive].code
+
+
+def power_of_two(*sizes: int) -> int:
+    """Return the largest power of two, up to 8, that divides all sizes."""
+    return min(size & -size for size in (*sizes, 8))
+
+
+def inlined(step: wire_plan.Items) -> list[wire_plan.Step]:
+    """Return an element's fixed-size steps, with attribute chains instead of variables."""
+    paths = {step.item: step.item}
+    found: list[wire_plan.Step] = []
+    for part in step.body:
+        match part:
+            case wire_plan.Enter(place):
+                paths[place.local] = f"{paths[place.owner]}.{place.slot}"
+            case wire_plan.Number(place, letter, size):
+                moved = wire_plan.Place(paths[place.owner], place.slot, place.local)
+                found.append(wire_plan.Number(moved, letter, size))
+            case wire_plan.Block(place, primitive, count):
+                moved = wire_plan.Place(paths[place.owner], place.slot, place.local)
+                found.append(wire_plan.Block(moved, primitive, count))
+            case _:
+                found.append(part)
+    return found

@@ -1,0 +1,179 @@
+"""Mistakes of people who think of another language, and how interface files have it.
+
+Only lines and names that are wrong anyway are looked at: what is right is not decided here.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import takewhile
+
+from idlc.diagnostics import codes
+from idlc.model import ir, names
+from idlc.model.lowering.fault import Fault
+from idlc.syntax import tree
+
+#: What other languages call a type, in lower case, and its name here.
+_TYPES = {
+    "boolean": "bool",
+    "double": "float64",
+    "f32": "float32",
+    "f64": "float64",
+    "float": "float32",
+    "int": "int32",
+    "integer": "int32",
+    "long": "int64",
+    "number": "float64",
+    "real": "float64",
+    "short": "int16",
+    "signed": "int32",
+    "size_t": "uint64",
+    "str": "string",
+    "text": "string",
+    "uchar": "uint8",
+    "uint": "uint32",
+    "ulong": "uint64",
+    "unsigned": "uint32",
+    "ushort": "uint16",
+    **{f"{sign}{bits}": f"{sign}nt{bits}" for sign in ("i", "ui") for bits in (8, 16, 32, 64)},
+    **{f"u{bits}": f"uint{bits}" for bits in (8, 16, 32, 64)},
+    **{f"{sign}int{bits}_t": f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)},
+    **dict.fromkeys(("bytes", "bytearray", "buffer", "blob", "octets"), "uint8[]"),
+    **dict.fromkeys(("datetime", "timestamp"), "builtin_interfaces/Time"),
+    "timedelta": "builtin_interfaces/Duration",
+}
+#: Types of several words, without a last `int`.
+_C_TYPES = {
+    "long double": "float64",
+    "long long": "int64",
+    "short": "int16",
+    "signed char": "int8",
+    "unsigned char": "uint8",
+    "unsigned long": "uint64",
+    "unsigned long long": "uint64",
+    "unsigned short": "uint16",
+}
+_C_WORDS = ("char", "double", "int", "long", "short", "signed", "unsigned")
+_LISTS = ("array", "deque", "list", "sequence", "set", "tuple", "vector")
+_MAPS = ("dict", "dictionary", "hashmap", "map", "object", "struct", "union", "unordered_map")
+#: What other languages put before a type.
+_QUALIFIERS = ("const", "constexpr", "final", "optional", "required", "static")
+
+_COMMENTS = ("//", "/*")
+COMMENT_HINT = "a comment begins with `#`"
+_LIST_HINT = "a list of any length is `TYPE[]`, one of at most ten elements `TYPE[<=10]`"
+
+
+def type_hint(name: str) -> str | None:
+    """Return the hint for a name that other languages give to a type."""
+    word = re.split(r"::|\.", name)[-1].lower()
+    if word in (*ir.PRIMITIVES, "string", "wstring"):
+        return f"did you mean `{word}`?" if word != name else None
+    if word in _TYPES:
+        return f"did you mean `{_TYPES[word]}`?"
+    if word in _LISTS:
+        return _LIST_HINT
+    if word in _MAPS:
+        return "ROS 2 has no maps and no structures within messages; make a message for its fields"
+    if word == "enum":
+        return "ROS 2 has no enums; make a uint8 field, and a constant for each of its values"
+    return None
+
+
+def dotted(name: str) -> str | None:
+    """Return `package/Name` for a message's name as Python or C++ write it."""
+    parts = re.split(r"::|\.", name)
+    fits = names.is_package_name(parts[0]) and names.is_message_name(parts[-1])
+    return f"{parts[0]}/{parts[-1]}" if fits and parts[1:-1] in ([], ["msg"]) else None
+
+
+def is_comment(text: str) -> bool:
+    """Return whether a text begins with what begins a comment in other languages."""
+    return text.startswith(_COMMENTS)
+
+
+def has_comment(value: str) -> bool:
+    """Return whether a value is, or ends in, a comment as other languages have it."""
+    return any(map(is_comment, value.split(" ")))
+
+
+def slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
+    """Return what is wrong with a line as a whole, so that nothing else need be said about it."""
+    if is_comment(text):
+        message = f"`{text[:2]}` does not begin a comment"
+        return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
+    if isinstance(body, tree.Broken):
+        return _broken(text, body, kind)
+    return _qualified(text, body) or _of_c(text, body) or _other_shape(body)
+
+
+def _broken(text: str, body: tree.Broken, kind: ir.Kind) -> Fault | None:
+    if body.slug == "malformed-separator" and kind == "msg":
+        hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
+        return Fault(codes.MALFORMED_SEPARATOR, body.message, 0, len(text), hint)
+    word = re.match(r"(?:std::)?(\w+)[<(]", text)
+    if body.slug == "malformed-type" and word and word[1].lower() in (*_LISTS, *_MAPS):
+        piece = body.piece
+        return Fault(codes.MALFORMED_TYPE, body.message, piece.start, piece.end, type_hint(word[1]))
+    return None
+
+
+def _qualified(text: str, body: tree.Field | tree.Constant) -> Fault | None:
+    word = body.type.whole.text
+    if word not in _QUALIFIERS:
+        return None
+    hint = f"a line begins with its type: `{text[len(word) :].strip()}`"
+    return Fault(codes.TYPE_NAME, f"`{word}` cannot be a type name", 0, len(word), hint)
+
+
+def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
+    """Return what is wrong with a type of several words, such as `unsigned int`."""
+    if body.type.whole.text not in _C_WORDS:
+        return None
+    words = list(takewhile(lambda word: word.group() in _C_WORDS, re.finditer(r"\S+", text)))
+    if len(words) == 1 or words[0].group() == "char":
+        return None
+    whole = " ".join(word.group() for word in words)
+    known = whole.removesuffix(" int").removeprefix("signed ")
+    meant = _C_TYPES.get(known) or _TYPES.get(known) or "int32"
+    message = f"unknown type `{whole}`"
+    return Fault(codes.UNKNOWN_TYPE, message, 0, words[-1].end(), f"did you mean `{meant}`?")
+
+
+def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
+    type_, name = body.type.whole.text, body.name
+    if isinstance(body, tree.Constant):
+        return _constant(body)
+    if "," in name.text:
+        listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
+        found = [f"`{type_} {one.strip()}`" for one in listed if one.strip()]
+        hint = f"write each on a line of its own: {', '.join(found[:4])}"
+        return _name_fault(name, "a line defines one field", hint)
+    plain, bracket, size = name.text.partition("[")
+    if bracket and size.endswith("]"):
+        hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
+        return _name_fault(name, f"`{name.text}` cannot be a field name", hint)
+    if type_.endswith(":"):
+        hint = f"the type comes first: `{name.text} {type_[:-1]}`"
+        return Fault(codes.TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint)
+    return None
+
+
+def _name_fault(name: tree.Piece, message: str, hint: str) -> Fault:
+    return Fault(codes.FIELD_NAME, message, name.start, name.end, hint)
+
+
+def _constant(body: tree.Constant) -> Fault | None:
+    type_, name, value = body.type.whole.text, body.name, body.value.text
+    if not value or len(value) > 40:
+        value = "VALUE"
+    if not name.text:
+        hint = f"write `{type_} NAME={value}`"
+        return Fault(codes.CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint)
+    if names.is_field_name(name.text):
+        message = f"`{name.text}` cannot be a constant name"
+        hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
+        if type_ in (*ir.PRIMITIVES, "string", "wstring"):
+            hint += f"; a constant is called `{name.text.upper()}`"
+        return Fault(codes.CONSTANT_NAME, message, name.start, name.end, hint)
+    return None
