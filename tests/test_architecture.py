@@ -13,17 +13,20 @@ from jinja2 import Environment, nodes
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "idlc"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-TEMPLATES = sorted((ROOT / "templates").glob("*.jinja"))
-RUNTIME = [path for path in MODULES if path.parent.name == "runtime"]
+TEMPLATES = sorted((ROOT / "templates").rglob("*.jinja"))
+RUNTIME = [path for path in MODULES if "runtime" in path.parts]
 
 #: Each stage may import those before it; `runtime` stands apart and imports none.
-STAGES = "text syntax model checks emit native scaffold disk driver cli backend".split()
+STAGES = (
+    "diagnostics syntax model breaking export checks emit native site "
+    "scaffold disk driver cli backend"
+).split()
 #: Stages that need fewer of those before them.
 NEEDS_ONLY = {"native": {"native", "model"}}
 #: What emit shares with the runtime, so that there is one rule for the names in Python.
 SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 #: The outermost modules, which belong to the command line.
-OUTERMOST = {"__main__": "cli", "__init__": "text", "build": "cli"}
+OUTERMOST = {"__main__": "cli", "__init__": "diagnostics", "build": "cli"}
 
 #: Only these stages may touch files, the environment or the terminal.
 MAY_DO_IO = {"disk", "cli", "backend"}
@@ -41,7 +44,7 @@ READS_ITS_OWN = {
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
 RUNTIME_ON_DEMAND = {"numpy", "rclpy", "rosidl_parser"}
 #: The runtime modules that import numpy at once, and that no other imports at once.
-RUNTIME_WITH_NUMPY = {"arrays", "columns"}
+NUMPY_AT_ONCE = {"idlc/runtime/arrays.py", "idlc/runtime/on_demand/columns.py"}
 
 MODULE_BUDGET = 300
 FUNCTION_BUDGET = 40
@@ -128,16 +131,17 @@ def test_the_core_does_no_io(path):
 
 @pytest.mark.parametrize("path", RUNTIME, ids=name_of)
 def test_the_runtime_stands_alone(path):
-    with_numpy = {f"idlc.runtime.{name}" for name in RUNTIME_WITH_NUMPY}
+    with_numpy = {one.removesuffix(".py").replace("/", ".") for one in NUMPY_AT_ONCE}
     for name, node, at_import in imports_of(path):
         top = name.split(".")[0]
         if isinstance(node, ast.ImportFrom) and node.level:
-            assert node.level == 1, f"line {node.lineno}: reaches outside the package"
+            depth = len(path.relative_to(PACKAGE / "runtime").parts)
+            assert node.level <= depth, f"line {node.lineno}: reaches outside the package"
             borrowed = any(name == one or name.startswith(f"{one}.") for one in with_numpy)
             assert not (at_import and borrowed), f"line {node.lineno}: imports numpy at once"
         elif top not in sys.stdlib_module_names:
             assert top in RUNTIME_ON_DEMAND, f"line {node.lineno}: imports {name}"
-            by_right = top == "numpy" and path.stem in RUNTIME_WITH_NUMPY
+            by_right = top == "numpy" and name_of(path) in NUMPY_AT_ONCE
             assert by_right or not at_import, f"line {node.lineno}: imports {name} at once"
 
 
@@ -271,4 +275,4 @@ def test_checking_a_file_imports_little(tmp_path):
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
     assert "idlc.checks.package_rules" in own
-    assert len(own) <= 70, "what a run without problems does not need can wait"
+    assert len(own) <= 76, "what a run without problems does not need can wait"

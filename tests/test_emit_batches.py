@@ -37,9 +37,16 @@ def msg(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def runtime(msg):
-    import batch_msgs._idlc.on_demand.batches
+    import batch_msgs._idlc
 
     return batch_msgs._idlc
+
+
+@pytest.fixture(scope="module")
+def batches(msg):
+    from batch_msgs._idlc.on_demand import batches
+
+    return batches
 
 
 def many(cls, count=20, seed=1):
@@ -89,17 +96,19 @@ def test_a_batch_of_a_users_subclass(msg):
     assert {type(message) for message in found} == {Mine}
 
 
-def test_a_stream_of_sizes_and_messages(msg, runtime):
+def test_a_stream_of_sizes_and_messages(msg, runtime, batches):
     messages = many(msg.Joints)
-    stream = runtime.batches.delimited(msg.Joints.serialize_many(messages))
-    assert msg.Joints.deserialize_many(runtime.batches.split_delimited(stream)) == messages
-    assert list(runtime.batches.split_delimited(b"")) == []
+    stream = runtime.on_demand.batches.delimited(msg.Joints.serialize_many(messages))
+    assert (
+        msg.Joints.deserialize_many(runtime.on_demand.batches.split_delimited(stream)) == messages
+    )
+    assert list(runtime.on_demand.batches.split_delimited(b"")) == []
     for size in (1, 3, 4, 10, len(stream) - 1):
         with pytest.raises(runtime.DecodeError, match="ends within a message"):
-            list(runtime.batches.split_delimited(stream[:size]))
+            list(runtime.on_demand.batches.split_delimited(stream[:size]))
 
 
-def test_the_chunks_of_an_mcap_file(msg, runtime, tmp_path):
+def test_the_chunks_of_an_mcap_file(msg, runtime, batches, tmp_path):
     """The file is written by the mcap project's own library."""
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader
@@ -125,12 +134,14 @@ def test_the_chunks_of_an_mcap_file(msg, runtime, tmp_path):
     assert len(chunks) > 3
     for cls, messages in ((msg.Point, points), (msg.Odd, odds)):
         number = channels[cls.__name__]
-        split = [part for c in chunks for part in runtime.batches.split_mcap_chunk(c, number)]
+        split = [
+            part for c in chunks for part in runtime.on_demand.batches.split_mcap_chunk(c, number)
+        ]
         assert cls.deserialize_many(split) == messages
         assert len(cls.to_columns(split)) == len(messages)
     for size in (1, 8, 9, 20, len(chunks[0]) - 1):
         with pytest.raises(runtime.DecodeError, match="ends within a record"):
-            list(runtime.batches.split_mcap_chunk(chunks[0][:size], channels["Point"]))
+            list(runtime.on_demand.batches.split_mcap_chunk(chunks[0][:size], channels["Point"]))
 
 
 # columns

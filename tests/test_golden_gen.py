@@ -34,7 +34,7 @@ def outputs(case):
     for path in support:
         source = PACKAGE / "runtime" / path.removeprefix("_idlc/")
         assert files.pop(path) == source.read_text(encoding="utf-8")
-    assert len(support) == len(list((PACKAGE / "runtime").glob("*.py")))
+    assert len(support) == len(list((PACKAGE / "runtime").rglob("*.py")))
     return files
 
 

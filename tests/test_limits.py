@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 import idlc.disk.inputs
+import idlc.model.lowering.file
 import idlc.model.pool
 from idlc.checks.size import MAX_DEPTH
 from idlc.cli.main import main
@@ -154,7 +155,7 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
         read[str(path)] += 1
         return read_bytes_(path, *rest)
 
-    lower_, read_bytes_ = idlc.model.lower.lower, idlc.disk.read.read_bytes
+    lower_, read_bytes_ = idlc.model.lowering.file.lower, idlc.disk.read.read_bytes
     for module in ("idlc.model.lowering.file.lower", "idlc.model.pool.lower"):
         monkeypatch.setattr(module, lower)
     for module in ("idlc.disk.read.read_bytes", "idlc.disk.inputs.read_bytes"):
@@ -295,7 +296,7 @@ import contextlib, io, json, resource, sys
 resource.setrlimit(resource.RLIMIT_CPU, ({PROCESSOR_SECONDS}, {PROCESSOR_SECONDS}))
 resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY}))
 from idlc.cli.main import main
-from idlc.emit.limits import MAX_DEPTH
+from idlc.checks.size import MAX_DEPTH
 for words in json.load(sys.stdin):
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):

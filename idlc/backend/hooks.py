@@ -90,7 +90,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 
 def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     """Return the package's name and its `[project]` table; `None` after a problem."""
-    from idlc.backend import manifest, pyproject
+    from idlc.backend import manifest, project_table
 
     pyproject.load(report)  # which reports what is no TOML
     if not Path(MANIFEST).is_file():
@@ -100,7 +100,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     if report.had_errors:
         return None
     declared = manifest.project(report)
-    project = pyproject.completed(declared, report) if declared else {}
+    project = project_table.completed(declared, report) if declared else {}
     return None if report.had_errors else (declared["name"], project)
 
 

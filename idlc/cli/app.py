@@ -80,7 +80,7 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
 @click.group(
     cls=App,
     overview=COMMANDS,
-    modules="idlc.cli.",
+    modules="idlc.cli.commands.",
     meant=MEANT,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,

@@ -11,7 +11,7 @@ from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
-from idlc.disk.overlay import Overlay
+from idlc.disk.output.overlay import Overlay
 from idlc.disk.package_names import accept_name
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope

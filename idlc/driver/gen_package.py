@@ -10,9 +10,9 @@ from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.output import lock_file
 from idlc.disk.output.folder import Target
+from idlc.disk.output.overlay import Overlay
 from idlc.disk.output.up_to_date import dependencies
 from idlc.disk.output.write_plan import Plan
-from idlc.disk.overlay import Overlay
 from idlc.driver.overlay import overlaid
 from idlc.driver.stages import derived_names, stage
 from idlc.model import derive, ir

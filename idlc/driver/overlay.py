@@ -7,7 +7,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from idlc.disk.distribution import distribution
-from idlc.disk.overlay import Overlay
+from idlc.disk.output.overlay import Overlay
 from idlc.driver.libraries import libraries_of
 from idlc.driver.share import dependencies, shared
 
@@ -33,7 +33,7 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Overlay) -> dict
 def enter(overlay: Overlay) -> bool:
     """Write the files by which a shell learns of the prefix; return whether that went well."""
     files = {
-        f"{name}.{shell}": _rendered(f"overlay_setup.{shell}.jinja", prefix=quote(overlay.place))
+        f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))
         for shell in _SHELLS
         for name in ("local_setup", "setup")
     }

@@ -13,6 +13,7 @@ from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
 from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
+from idlc.emit.render import support_packages
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.scaffold import new_interface as interface_text
@@ -107,7 +108,8 @@ def interface(
     setup = project.text("setup.py")
     if setup is not None and lists is None:
         kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
-        packages = [own, f"{own}._idlc", *(f"{own}.{one}" for one in sorted(kinds))]
+        parts = [*support_packages(), *sorted(kinds)]
+        packages = [own, *(f"{own}.{part}" for part in parts)]
         wired = data_files.add_libraries(setup)
         edits.append(("setup.py", data_files.add_packages(wired, packages)))
     edited = accepted(project, edits, report)

@@ -46,10 +46,18 @@ def _template(name: str) -> jinja2.Template:
 @cache
 def runtime_files() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
+    runtime = PACKAGE / "runtime"
     return tuple(
-        RenderedFile(f"_idlc/{path.name}", path.read_text(encoding="utf-8"))
-        for path in sorted((PACKAGE / "runtime").glob("*.py"))
+        RenderedFile(
+            f"_idlc/{path.relative_to(runtime).as_posix()}", path.read_text(encoding="utf-8")
+        )
+        for path in sorted(runtime.rglob("*.py"))
     )
+
+
+def support_packages() -> list[str]:
+    """Return the Python packages that the support package consists of, itself first."""
+    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
 
 
 def module_file(

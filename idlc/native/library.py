@@ -52,7 +52,7 @@ def libraries(
 
 def told(layout: Layout) -> bytes:
     """Return what a library's constants begin with: who made it, and for which layout."""
-    return AUTHOR + pack("<6I", *layout)
+    return AUTHOR + pack(f"<{len(layout)}I", *layout)
 
 
 def symbol(identifier: str, name: ir.TypeName) -> str:
@@ -81,7 +81,7 @@ class _TypeSupport:
         self.layout = layout
         self.cpp = cpp
         self.descriptions = Descriptions(model, image)
-        self.structures = Structures(layout)
+        self.structures = Structures(layout.of_cpp() if cpp else layout)
         self.refuse = image.function("refuse")
         self.fields: dict[ir.TypeName, Place] = {}
         for message in _reached(model):

@@ -187,8 +187,8 @@ class Message(metaclass=MessageMeta):
     ) -> list[bytes]:
         """Return what `serialize` returns of each message.
 
-        A ValidationError's path begins with the message's index. `_idlc.on_demand.batches.delimited` makes
-        one stream of the buffers.
+        A ValidationError's path begins with the message's index. `delimited`, of
+        `_idlc.on_demand.batches`, makes one stream of the buffers.
         """
         from .on_demand.batches import serialize_many
 
@@ -200,8 +200,8 @@ class Message(metaclass=MessageMeta):
     ) -> list[typing_extensions.Self]:
         """Return what `deserialize` returns of each buffer: a rosbag's rows, for example.
 
-        A DecodeError's path begins with the buffer's index. `_idlc.on_demand.batches` splits length-delimited
-        streams and the chunks of MCAP files into buffers.
+        A DecodeError's path begins with the buffer's index. `_idlc.on_demand.batches` splits
+        length-delimited streams and the chunks of MCAP files into buffers.
         """
         from .on_demand.batches import deserialize_many
 

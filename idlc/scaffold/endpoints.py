@@ -86,7 +86,7 @@ class Endpoints:
             word=word,
             topic=shown(endpoint, word),
             type=self._page.use(interface.name),
-            template=f"node_{endpoint.role}.py.jinja",
+            template=f"node/{endpoint.role}.py.jinja",
             heads=(),
         )
         sections = derive.sections(interface)

@@ -64,7 +64,7 @@ def starter(word: str) -> tuple[str, str]:
 def index(package: str, keys: Iterable[str]) -> tuple[str, str]:
     """Return path and text of the file by which ROS 2's tools know a package's interfaces.
 
-    `keys` are the interface files, such as `msg/Drive.msg`. Source: spec section 9.
+    `keys` are the interface files, such as `msg/Drive.msg`. Source: language 9.
     """
     return f"{RESOURCE}/rosidl_interfaces/{package}", "".join(f"{key}\n" for key in sorted(keys))
 

@@ -142,7 +142,7 @@ def _part(
         for variable, at in _LOGGED[endpoint.role]
     ]
     return PartView(
-        template=f"test_{endpoint.role}.py.jinja",
+        template=f"node_test/{endpoint.role}.py.jinja",
         function=f"test_it_{_VERBS[endpoint.role]}_{word}",
         topic=word,
         type=type_,

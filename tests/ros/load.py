@@ -219,11 +219,15 @@ def victim():
     node.create_subscription(Thing, "things", check, QoSProfile(depth=2000))
     executor = MultiThreadedExecutor(2)
     executor.add_node(node)
-    threading.Thread(target=spin, args=(executor,), daemon=True).start()
+    spinning = threading.Thread(target=spin, args=(executor,))
+    spinning.start()
     print("ready", flush=True)
     for _ in sys.stdin:
         print(sound[""], flush=True)
     rclpy.shutdown()
+    # an interpreter that ends while rclpy's C++ waits for its lock ends with std::terminate
+    spinning.join()
+    executor.shutdown()
 
 
 def spin(executor):

@@ -44,7 +44,7 @@ def installed_libraries(facts: Facts, model: Model, report: Report) -> None:
     """setup.py installs what C++ tools load, where the package is in the index by which they go."""
     if facts.setup_py is None or facts.build_type != "ament_python" or not model.own:
         return
-    from idlc.checks.libraries import unusable_entry
+    from idlc.checks.package.libraries import unusable_entry
 
     report.extend(unusable_entry(facts.setup_py, facts.name))
 

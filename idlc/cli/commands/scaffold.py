@@ -45,7 +45,7 @@ MEANT = {
     "scaffold",
     cls=LazyGroup,
     overview=COMMANDS,
-    modules="idlc.cli.scaffold_",
+    modules="idlc.cli.commands.scaffold_",
     meant=MEANT,
     epilog=EPILOG,
 )

@@ -14,10 +14,10 @@ from idlc.disk.output.tree import Obstacle, Tree
 from idlc.disk.read import is_folder
 from idlc.model.ir import TypeName
 
-_PACKAGE = Path(__file__).parents[1]
+_PACKAGE = Path(__file__).parents[2]
 #: What makes the output, beside what is given: a change here counts although the version stays.
 _MAKERS = (
-    *(_PACKAGE / part for part in ("text", "syntax", "model", "checks", "emit", "runtime")),
+    *(_PACKAGE / part for part in ("diagnostics", "syntax", "model", "checks", "emit", "runtime")),
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )

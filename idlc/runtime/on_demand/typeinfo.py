@@ -27,7 +27,7 @@ class Primitive(NamedTuple):
 
 
 #: The package that this support package is part of.
-OWN = __name__.rpartition(".")[0].rpartition(".")[0]
+OWN = __name__.rsplit(".", 3)[0]
 
 #: Largest finite float32.
 FLOAT32_MAX = 3.4028234663852886e38
@@ -92,7 +92,7 @@ class FieldInfo(NamedTuple):
 @cache
 def types() -> dict[str, Any]:
     """Return the content of `type_data.py`."""
-    module = import_module(f"{__name__.rpartition('.')[0]}.type_data")
+    module = import_module(f"{__name__.rsplit('.', 2)[0]}.type_data")
     content: dict[str, Any] = json.loads(module.JSON)
     return content
 

@@ -4,7 +4,7 @@ Everything given to C must live as long as the process, so it is handed to `keep
 exception that leaves a ctypes callback leaves the result *uninitialised*, so callbacks
 whose result is a pointer are built from C callables only (`constant`, `resolver`): no
 bytecode runs in them, hence no signal handler either. All others are made by
-`typesupport_callbacks`.
+`callbacks`.
 """
 
 from __future__ import annotations
@@ -41,6 +41,12 @@ class Sequence(ctypes.Structure):
     """Any `X__Sequence`; `data` points to `size` elements."""
 
     _fields_ = (("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t))
+
+
+class FlaggedSequence(ctypes.Structure):
+    """A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before."""
+
+    _fields_ = (*Sequence._fields_, ("flags", c_uint64))
 
 
 class FieldType(ctypes.Structure):

@@ -1,4 +1,4 @@
-"""The machine code of `typesupport_fastrtps` for aarch64 (AAPCS64 calling convention).
+"""The machine code of `fastrtps` for aarch64 (AAPCS64 calling convention).
 
 `CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
 """

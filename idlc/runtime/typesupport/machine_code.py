@@ -33,7 +33,7 @@ def functions(road: str, words: dict[str, int]) -> dict[str, int]:
     machine = os.uname().machine
     if machine not in _MACHINES:
         raise RefusedError(f"there is none for {machine}")
-    module = import_module(f"{__package__}.typesupport_{road}_{machine}")
+    module = import_module(f"{__package__}.{road}_{machine}")
     start = _executable(module.CODE + pack(f"={len(words)}Q", *words.values()))
     return {name: start + offset for name, offset in module.ENTRIES.items()}
 

@@ -1,4 +1,4 @@
-"""The machine code of `typesupport_memory` for aarch64 (AAPCS64 calling convention).
+"""The machine code of `memory` for aarch64 (AAPCS64 calling convention).
 
 `CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
 """

@@ -1,4 +1,4 @@
-"""The machine code of `typesupport_memory` for x86-64 (System V calling convention).
+"""The machine code of `memory` for x86-64 (System V calling convention).
 
 `CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
 """

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import libcst as cst
 
-from idlc.checks.libraries import edits_for
+from idlc.checks.package.libraries import edits_for
 from idlc.diagnostics.edits import apply
 from idlc.diagnostics.source import Source
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused

@@ -30,7 +30,7 @@ from .codec import Codec, Reading, codec_for, maker
 from .construction import construct
 from .errors import DecodeError, ValidationError, importing
 from .interfaces import Action, Imported, Package, Service, several
-from .loading import Fresh, FreshList, lazily
+from .lazy import Fresh, FreshList, lazily
 from .message import Message, dataclass, table
 from .objects import same
 from .sequences import (
@@ -50,7 +50,7 @@ from .sequences import (
     sequence_writer,
     to_array,
 )
-from .texts import (
+from .strings import (
     ENDS,
     read_wide_text,
     rows_writer,

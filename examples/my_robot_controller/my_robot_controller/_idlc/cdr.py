@@ -14,7 +14,7 @@ from __future__ import annotations
 from struct import Struct, calcsize
 from sys import byteorder
 
-from .generics import TypeVar
+from .typing_stub import TypeVar
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from collections.abc import Set as AbstractSet
 from functools import cache
 from typing import Any
 
-from .dictionaries import close
 from .errors import FieldCheckError, FieldTypeError, ValidationError
 from .objects import owner_of
-from .typeinfo import FieldInfo, Primitive, class_of, fields_of, type_name
-from .validation import validate_field
+from .on_demand.dictionaries import close
+from .on_demand.typeinfo import FieldInfo, Primitive, class_of, fields_of, type_name
+from .on_demand.validation import validate_field
 
 #: rosidl's limits of a float32, which are not quite those of IEEE 754.
 _FLOAT32 = 3.402823466e38

@@ -217,7 +217,7 @@ def recover(kind: type, buffer: Any, failure: Exception) -> Any:
     """Return the message after all, if a middleware would; raise DecodeError otherwise."""
     if isinstance(failure, DecodeError):
         raise failure
-    from .careful import read_carefully
+    from .on_demand.field_reader import read_carefully
 
     data = bytes(buffer)
     return read_carefully(kind, data, order_of(data))
@@ -227,7 +227,7 @@ def encode_error(message: Message, byteorder: str, error: Exception) -> Exceptio
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .validation import validate
+    from .on_demand.validation import validate
 
     try:
         validate(message, wire_only=True)

@@ -11,7 +11,7 @@ import sys
 
 from . import codec
 from .construction import CHECK_FIELDS, call_checked, is_checked
-from .loading import OnDemand
+from .lazy import OnDemand
 from .names import public_name, slot_name
 from .objects import copied, deeply_copied, pretty, represented
 
@@ -34,19 +34,19 @@ table = dict
 
 
 def _slot_types(kind: type) -> tuple[Any, ...]:
-    from .typeinfo import slot_types
+    from .on_demand.typeinfo import slot_types
 
     return slot_types(kind)
 
 
 def _dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    from .fields import dataclass_fields
+    from .on_demand.fields import dataclass_fields
 
     return dataclass_fields(kind)
 
 
 def _dataclass_params(_kind: type) -> Any:
-    from .fields import PARAMETERS
+    from .on_demand.fields import PARAMETERS
 
     return PARAMETERS
 
@@ -187,10 +187,10 @@ class Message(metaclass=MessageMeta):
     ) -> list[bytes]:
         """Return what `serialize` returns of each message.
 
-        A ValidationError's path begins with the message's index. `_idlc.batches.delimited` makes
-        one stream of the buffers.
+        A ValidationError's path begins with the message's index. `delimited`, of
+        `_idlc.on_demand.batches`, makes one stream of the buffers.
         """
-        from .batches import serialize_many
+        from .on_demand.batches import serialize_many
 
         return serialize_many(cls, messages, byteorder)
 
@@ -200,10 +200,10 @@ class Message(metaclass=MessageMeta):
     ) -> list[typing_extensions.Self]:
         """Return what `deserialize` returns of each buffer: a rosbag's rows, for example.
 
-        A DecodeError's path begins with the buffer's index. `_idlc.batches` splits length-delimited
-        streams and the chunks of MCAP files into buffers.
+        A DecodeError's path begins with the buffer's index. `_idlc.on_demand.batches` splits
+        length-delimited streams and the chunks of MCAP files into buffers.
         """
-        from .batches import deserialize_many
+        from .on_demand.batches import deserialize_many
 
         return deserialize_many(cls, buffers, copy)
 
@@ -215,13 +215,13 @@ class Message(metaclass=MessageMeta):
         Names are those on the wire, texts are UTF-8 bytes. Raises DecodeError, and ValueError
         where a sequence has another number of elements than in the messages before.
         """
-        from .columns import to_columns
+        from .on_demand.columns import to_columns
 
         return to_columns(cls, buffers)
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .validation import validate
+        from .on_demand.validation import validate
 
         validate(self)
 
@@ -230,7 +230,7 @@ class Message(metaclass=MessageMeta):
 
         Nested messages become dictionaries, arrays lists, and bytes integers.
         """
-        from .dictionaries import to_dict
+        from .on_demand.dictionaries import to_dict
 
         return to_dict(self)
 
@@ -240,7 +240,7 @@ class Message(metaclass=MessageMeta):
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
         """
-        from .dictionaries import from_dict
+        from .on_demand.dictionaries import from_dict
 
         message: typing_extensions.Self = from_dict(cls, values)
         return message
@@ -265,14 +265,14 @@ class Message(metaclass=MessageMeta):
 
     def __rich_repr__(self) -> Iterable[tuple[str, Any]]:
         """Return names and values, for rich."""
-        from .fields import named_values
+        from .on_demand.fields import named_values
 
         return named_values(self)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a message."""
-        from .schemas import message_schema
+        from .on_demand.pydantic_schema import message_schema
 
         return message_schema(handler(source))
 

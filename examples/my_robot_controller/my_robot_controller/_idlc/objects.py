@@ -103,7 +103,7 @@ def _shown_name(kind: type) -> str:
 
 def pretty(message: Any, printer: Any, cycle: bool) -> None:
     """Show a message on as many lines as it takes, with IPython's pretty printer."""
-    from .fields import named_values
+    from .on_demand.fields import named_values
 
     name = _shown_name(type(message))
     if cycle:

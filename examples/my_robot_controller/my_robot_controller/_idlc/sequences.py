@@ -5,8 +5,8 @@ from __future__ import annotations
 from array import array
 
 from .cdr import NATIVE
-from .generics import Generic, TypeVar
 from .names import name_of
+from .typing_stub import Generic, TypeVar
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def to_array(code: str, values: Any, name: str) -> Any:
         return converted(code, values)
     except (TypeError, ValueError, OverflowError) as error:
         failure = error
-    from .validation import refused
+    from .on_demand.validation import refused
 
     raise refused(name, code, None, values, failure) from None
 
@@ -101,7 +101,7 @@ class NumberSequence(Generic[Number]):
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a sequence."""
-        from .schemas import numbers_schema
+        from .on_demand.pydantic_schema import numbers_schema
 
         kind = float if cls.code in "fd" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]

@@ -1,0 +1,1 @@
+"""What messages can do and most programs never ask for: imported when it is asked for."""

@@ -1,0 +1,239 @@
+"""The opaque road: rmw_fastrtps_cpp and others that use its type support.
+
+The middleware never looks into message memory here, so it is a `Memory` that holds the
+encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
+calls the two functions that copy the bytes while it holds the mutex of a writer or a
+reader, and another thread may wait for that mutex while it holds the interpreter's lock.
+Whoever gave that lock away in there would never get it back. So these functions are
+machine code that allocates nothing but `bytes`, which starts no garbage collection.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Callable
+from ctypes import PYFUNCTYPE, c_char_p, c_size_t, c_void_p, py_object
+from functools import cache
+from struct import Struct, pack
+from typing import Any
+
+from ..cdr import HEADERS, NATIVE
+from ..codec import encode_error, functions
+from . import c, callbacks, introspection
+from . import fastrtps_python as python
+from . import machine_code as native
+from .descriptions import about
+from .fastcdr import fast_cdr
+
+IDENTIFIER = "rosidl_typesupport_fastrtps_c"
+
+#: The encapsulation header, which the middleware reads and writes itself.
+_HEADER = 4
+#: An array with this many bytes is not copied on its way to the middleware.
+_LARGE = 16384
+_SPAN = Struct("=3Q").pack
+
+
+class Memory:
+    """Message memory: `message @ memory` encodes into it, `+memory` is the message."""
+
+    __slots__ = ("body", "message", "received", "size", "spans")
+
+    #: The encoded message without header: `bytes`, or a list with the parts of a large
+    #: one, which are not copied.
+    body: Any
+    size: int
+    #: For machine code: size, then address and size of each part, as words.
+    spans: bytes
+    #: The message that `body` was made from.
+    message: Any
+    #: What was received, with header; no attribute in a memory that is sent.
+    received: bytes
+
+    def keep(self, parts: list[Any]) -> int:
+        """Take the parts of a message, and return their size without header."""
+        parts[0] = parts[0][_HEADER:]
+        self.body = body = b"".join(parts)
+        size = len(body)
+        self.spans = _SPAN(size, id(body) + c.BYTES_OFFSET, size)
+        return size
+
+    def keep_apart(self, parts: list[Any]) -> int:
+        """Do the same without a copy; arrays cannot change their length until it is sent."""
+        parts[0] = parts[0][_HEADER:]
+        self.body = views = [memoryview(part).cast("B") for part in parts]
+        start = _view_start() >> 3
+        words: list[int] = []
+        for view in views:
+            words += c.WORDS[(id(view) >> 3) + start], len(view)
+        size = sum(words[1::2])
+        self.spans = pack(f"={1 + len(words)}Q", size, *words)
+        return size
+
+
+def _memory_type(name: str, cls: Any, apart: bool) -> type[Memory]:
+    """Return the memory of a message class; `apart`: large ones may stay in parts."""
+    codec = cls._codec_(NATIVE)
+    encode, bulk = codec.encode, codec.bulk and apart
+    true = c.TRUE
+    large = False
+
+    def store(memory: Any, message: Any) -> object:
+        nonlocal large
+        try:
+            size = encode(message, memory.keep_apart if large else memory.keep)
+            # what follows on a topic is as large as what came before
+            large = bulk and size >= _LARGE
+        except Exception as error:
+            raise encode_error(message, sys.byteorder, error) from error
+        memory.size = size
+        memory.message = message
+        return true
+
+    namespace = {"__slots__": (), "__rmatmul__": store, "__pos__": _taker(name, cls)}
+    return type("Memory", (Memory,), namespace)
+
+
+def _offset(owner: object, word: int) -> int:
+    """Return where in an object a word lies; raises RefusedError if that is unknown."""
+    first, last = id(owner), id(owner) + type(owner).__basicsize__
+    words = c.WORDS[first >> 3 : last >> 3].tolist()
+    if words.count(word) != 1:
+        raise native.RefusedError("the layout of this Python's objects is unknown")
+    return 8 * words.index(word)
+
+
+@cache
+def _view_start() -> int:
+    """Return where a memoryview says where its content is."""
+    content = b"content"
+    return _offset(memoryview(content), id(content) + c.BYTES_OFFSET)
+
+
+@cache
+def _words() -> dict[str, int]:
+    """Return what the machine code reads, the same for all types."""
+    position, end = fast_cdr()
+    memory, spans, received = Memory(), b"spans", b"received"
+    memory.spans, memory.received = spans, received
+    _view_start()
+    return {
+        "copy": c.address(ctypes.CDLL(None).memcpy),
+        "new_bytes": c.c_function("PyBytes_FromStringAndSize"),
+        "forget": c.c_function("Py_DecRef"),
+        "clear_error": c.c_function("PyErr_Clear"),
+        "position": 8 * position,
+        "end": 8 * end,
+        "spans": _offset(memory, id(spans)),
+        "received": _offset(memory, id(received)),
+        "content": c.BYTES_OFFSET,
+    }
+
+
+def _native(answers: dict[bytes, int]) -> dict[str, int]:
+    """Return the addresses of the functions that Fast DDS calls; raises RefusedError."""
+    words = [
+        word
+        for identifier, handle in answers.items()
+        for word in (id(c.keep(identifier)) + c.BYTES_OFFSET, handle)
+    ]
+    table = c.keep((c_size_t * (len(words) + 1))(*words))
+    answered = ctypes.addressof(table)
+    return native.functions("fastrtps", {**_words(), "answers": answered})
+
+
+def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
+    """Return the function that gives the message in a memory, or `None` for garbage."""
+    decode = cls._codec_(NATIVE).decode
+    _, decode_any = functions(cls)
+    native = HEADERS[NATIVE][1]
+
+    def taken(memory: Any) -> Any:
+        try:
+            data = memory.received
+        except AttributeError:
+            return memory.message
+        if data[1] == native and not data[0]:
+            try:
+                return decode(data)
+            except Exception:  # noqa: S110 (told exactly by what follows)
+                pass
+        return decode_any(data)
+
+    return callbacks.taking(name, taken)
+
+
+class _Callbacks(ctypes.Structure):
+    """`message_type_support_callbacks_t`."""
+
+    _fields_ = (
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("cdr_serialize", c_void_p),
+        ("cdr_deserialize", c_void_p),
+        ("get_serialized_size", c_void_p),
+        ("max_serialized_size", c_void_p),
+        ("key_callbacks", c_void_p),
+        # what later versions read: three words so far, zero for "none of it"
+        ("later", c_void_p * 9),
+    )
+
+
+class _ServiceCallbacks(ctypes.Structure):
+    """`service_type_support_callbacks_t`."""
+
+    _fields_ = (
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("request", c_void_p),
+        ("response", c_void_p),
+    )
+
+
+@cache
+def _identifier() -> int:
+    library = c.load_library(f"lib{IDENTIFIER}.so")
+    return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
+
+
+def message(cls: Any, name: str) -> c.MessageSupport:
+    """Return what rclpy needs to publish and take messages of a class."""
+    package, kind, short = name.split("/")
+    support = c.keep(c.MessageTypeSupport(_identifier()))
+    answers = {
+        IDENTIFIER.encode(): ctypes.addressof(support),
+        introspection.IDENTIFIER.encode(): introspection.handle(name, functional=False),
+    }
+    try:
+        functions, apart = _native(answers), True
+    except native.RefusedError:
+        functions, apart = python.functions(answers), False
+    support.data = c.pointer(
+        _Callbacks(
+            f"{package}::{kind}".encode(),
+            short.encode(),
+            functions["serialize"],
+            functions["deserialize"],
+            functions["serialized_size"],
+            functions["maximum_size"],
+        )
+    )
+    support.func = functions["resolve"]
+    support.about = about(name)
+    return c.MessageSupport(
+        ctypes.addressof(support),
+        c.address(PYFUNCTYPE(py_object)(_memory_type(name, cls, apart))),
+        c.c_function("Py_DecRef"),
+        c.c_function("PyNumber_MatrixMultiply"),
+        c.c_function("PyNumber_Positive"),
+    )
+
+
+def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
+    """Return identifier and data of a service's type support; handles of its messages given."""
+    package, kind, short = name.split("/")
+    functions = _ServiceCallbacks(
+        f"{package}::{kind}".encode(), short.encode(), request, response
+    )
+    return _identifier(), c.pointer(functions)

@@ -1,0 +1,153 @@
+"""The machine code of `fastrtps` for aarch64 (AAPCS64 calling convention).
+
+`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
+"""
+
+TEXT = """
+serialize:  // (memory, cdr) -> bool
+  hint #34
+  stp x29, x30, [sp, #-48]!
+  stp x19, x20, [sp, #16]
+  stp x21, x22, [sp, #32]
+  mov x29, sp
+  ldr x19, spans
+  ldr x19, [x0, x19]  // size of all; address and size of each
+  mov w0, #0
+  cbz x19, 3f
+  ldr x2, content
+  add x19, x19, x2
+  ldr x20, position
+  add x20, x20, x1
+  ldr x21, [x20]  // where to write
+  ldr x2, end
+  ldr x2, [x1, x2]
+  sub x2, x2, x21
+  ldr x22, [x19], #8  // bytes that are left
+  cmp x2, x22
+  b.lo 3f
+1: cbz x22, 2f
+  mov x0, x21
+  ldp x1, x2, [x19], #16
+  add x21, x21, x2
+  sub x22, x22, x2
+  ldr x16, copy
+  blr x16
+  b 1b
+2: str x21, [x20]
+  mov w0, #1
+3: ldp x19, x20, [sp, #16]
+  ldp x21, x22, [sp, #32]
+  ldp x29, x30, [sp], #48
+  ret
+
+.balign 8
+deserialize:  // (cdr, memory) -> bool
+  hint #34
+  stp x29, x30, [sp, #-32]!
+  str x19, [sp, #16]
+  mov x29, sp
+  mov x19, x1
+  ldr x2, position
+  ldr x2, [x0, x2]
+  sub x2, x2, #4  // the header is kept
+  ldr x1, end
+  ldr x1, [x0, x1]
+  sub x1, x1, x2
+  mov x0, x2
+  ldr x16, new_bytes
+  blr x16
+  cbz x0, 1f
+  ldr x2, received
+  add x19, x19, x2
+  ldr x1, [x19]
+  str x0, [x19]
+  mov x0, x1
+  ldr x16, forget
+  blr x16
+  mov w0, #1
+  b 2f
+1: ldr x16, clear_error
+  blr x16
+  mov w0, #0
+2: ldr x19, [sp, #16]
+  ldp x29, x30, [sp], #32
+  ret
+
+.balign 8
+serialized_size:  // (memory) -> size
+  hint #34
+  ldr x1, spans
+  ldr x0, [x0, x1]
+  cbz x0, 1f
+  ldr x1, content
+  ldr x0, [x0, x1]
+1: ret
+
+.balign 8
+maximum_size:  // (bounds) -> 0, and there is no maximum
+  hint #34
+  strb wzr, [x0]
+  mov x0, #0
+  ret
+
+.balign 8
+resolve:  // (handle, identifier) -> handle
+  hint #34
+  ldr x2, answers
+1: ldr x3, [x2]
+  cbz x3, 4f
+  mov x4, x1
+2: ldrb w5, [x3], #1
+  ldrb w6, [x4], #1
+  cmp w5, w6
+  b.ne 3f
+  cbnz w5, 2b
+  ldr x0, [x2, #8]
+  ret
+3: add x2, x2, #16
+  b 1b
+4: mov x0, #0
+  ret
+
+.balign 8
+copy: .quad 0
+new_bytes: .quad 0
+forget: .quad 0
+clear_error: .quad 0
+position: .quad 0
+end: .quad 0
+spans: .quad 0
+received: .quad 0
+content: .quad 0
+answers: .quad 0
+"""
+
+CODE = bytes.fromhex(
+    # serialize
+    "5f2403d5fd7bbda9f35301a9f55b02a9fd030091730c0058136873f800008052"
+    "d30200b4620c00587302028b340b00589402018b950240f9020b0058226862f8"
+    "420015cb768640f85f0016eb63010054160100b4e00315aa610ac1a8b502028b"
+    "d60202cb7008005800023fd6f9ffff17950200f920008052f35341a9f55b42a9"
+    "fd7bc3a8c0035fd6"
+    # deserialize
+    "5f2403d5fd7bbea9f30b00f9fd030091f30301aaa2070058026862f8421000d1"
+    "81070058016861f8210002cbe00302aa1006005800023fd6400100b422070058"
+    "7302028b610240f9600200f9e00301aa5005005800023fd62000805204000014"
+    "1005005800023fd600008052f30b40f9fd7bc2a8c0035fd6"
+    # serialized_size
+    "5f2403d5e1040058006861f8600000b401050058006861f8c0035fd61f2003d5"
+    # maximum_size
+    "5f2403d51f000039000080d2c0035fd6"
+    # resolve
+    "5f2403d522040058430040f9630100b4e40301aa6514403886144038bf00066b"
+    "8100005485ffff35400440f9c0035fd642400091f5ffff17000080d2c0035fd6"
+)
+
+#: Where each function begins.
+ENTRIES = {
+    "serialize": 0x0,
+    "deserialize": 0x88,
+    "serialized_size": 0x100,
+    "maximum_size": 0x120,
+    "resolve": 0x130,
+}

@@ -1,0 +1,156 @@
+"""The machine code of `fastrtps` for x86-64 (System V calling convention).
+
+`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
+"""
+
+TEXT = """
+.intel_syntax noprefix
+serialize:  # (memory, cdr) -> bool
+  endbr64
+  push rbx
+  push rbp
+  push r12
+  push r13
+  sub rsp, 8
+  xor eax, eax
+  mov rbx, [rip+spans]
+  mov rbx, [rdi+rbx]  # size of all; address and size of each
+  test rbx, rbx
+  je 3f
+  add rbx, [rip+content]
+  mov rbp, [rip+position]
+  add rbp, rsi
+  mov r12, [rbp]  # where to write
+  mov rdx, [rip+end]
+  mov rdx, [rsi+rdx]
+  sub rdx, r12
+  mov r13, [rbx]  # bytes that are left
+  cmp rdx, r13
+  jb 3f
+  add rbx, 8
+1: test r13, r13
+  je 2f
+  mov rdi, r12
+  mov rsi, [rbx]
+  mov rdx, [rbx+8]
+  add r12, rdx
+  sub r13, rdx
+  call [rip+copy]
+  add rbx, 16
+  jmp 1b
+2: mov [rbp], r12
+  mov eax, 1
+3: add rsp, 8
+  pop r13
+  pop r12
+  pop rbp
+  pop rbx
+  ret
+
+.balign 8
+deserialize:  # (cdr, memory) -> bool
+  endbr64
+  push rbx
+  mov rbx, rsi
+  mov rax, [rip+position]
+  mov rax, [rdi+rax]
+  sub rax, 4  # the header is kept
+  mov rsi, [rip+end]
+  mov rsi, [rdi+rsi]
+  sub rsi, rax
+  mov rdi, rax
+  call [rip+new_bytes]
+  test rax, rax
+  je 1f
+  add rbx, [rip+received]
+  mov rdi, [rbx]
+  mov [rbx], rax
+  call [rip+forget]
+  mov eax, 1
+  pop rbx
+  ret
+1: call [rip+clear_error]
+  xor eax, eax
+  pop rbx
+  ret
+
+.balign 8
+serialized_size:  # (memory) -> size
+  endbr64
+  mov rax, [rip+spans]
+  mov rax, [rdi+rax]
+  test rax, rax
+  je 1f
+  add rax, [rip+content]
+  mov rax, [rax]
+1: ret
+
+.balign 8
+maximum_size:  # (bounds) -> 0, and there is no maximum
+  endbr64
+  mov byte ptr [rdi], 0
+  xor eax, eax
+  ret
+
+.balign 8
+resolve:  # (handle, identifier) -> handle
+  endbr64
+  mov rdx, [rip+answers]
+1: mov rax, [rdx]
+  test rax, rax
+  je 4f
+  mov rcx, rsi
+2: mov r8b, [rax]
+  cmp r8b, [rcx]
+  jne 3f
+  inc rax
+  inc rcx
+  test r8b, r8b
+  jne 2b
+  mov rax, [rdx+8]
+  ret
+3: add rdx, 16
+  jmp 1b
+4: ret
+
+.balign 8
+copy: .quad 0
+new_bytes: .quad 0
+forget: .quad 0
+clear_error: .quad 0
+position: .quad 0
+end: .quad 0
+spans: .quad 0
+received: .quad 0
+content: .quad 0
+answers: .quad 0
+"""
+
+CODE = bytes.fromhex(
+    # serialize
+    "f30f1efa5355415441554883ec0831c0488b1d61010000488b1c1f4885db7459"
+    "48031d61010000488b2d3a0100004801f54c8b6500488b1534010000488b1416"
+    "4c29e24c8b2b4c39ea722e4883c3084d85ed741c4c89e7488b33488b53084901"
+    "d44929d5ff15de0000004883c310ebdf4c896500b8010000004883c408415d41"
+    "5c5d5bc30f1f4000"
+    # deserialize
+    "f30f1efa534889f3488b05d1000000488b04074883e804488b35ca000000488b"
+    "34374829c64889c7ff159a0000004885c0741a48031dbe000000488b3b488903"
+    "ff158a000000b8010000005bc3ff158500000031c05bc390"
+    # serialized_size
+    "f30f1efa488b058d000000488b04074885c0740a4803058d000000488b00c390"
+    # maximum_size
+    "f30f1efac6070031c0c3660f1f440000"
+    # resolve
+    "f30f1efa488b1575000000488b024885c074214889f1448a00443a01751048ff"
+    "c048ffc14584c075ed488b4208c34883c210ebd7c30f1f00"
+)
+
+#: Where each function begins.
+ENTRIES = {
+    "serialize": 0x0,
+    "deserialize": 0x88,
+    "serialized_size": 0xE0,
+    "maximum_size": 0x100,
+    "resolve": 0x110,
+}
