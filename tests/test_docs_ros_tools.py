@@ -80,7 +80,7 @@ def test_a_package_is_found_as_is_said(tmp_path):
 def test_the_file_that_is_needed_is_the_one_shown(tmp_path, monkeypatch):
     shown, project, cache = blocks(PACKAGES, "toml")
     assert shown == BUILD
-    template = (ROOT / "templates/scaffold_interfaces_pyproject.toml.jinja").read_text()
+    template = (ROOT / "templates/package/interfaces_pyproject.toml.jinja").read_text()
     assert cache.partition("\n")[2] in template
     files = {**FILES, "pyproject.toml": f"{shown}\n{project}"}
     monkeypatch.chdir(write(tmp_path / "demo_msgs", files))
