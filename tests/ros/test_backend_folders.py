@@ -10,12 +10,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from installed import HERE, SHARE, interfaces, names_in
-from sides import Side
-from test_backend import BUILD
-from test_backend_installs import PIP, run, site
 
 from idlc import backend
+from tests.backend.test_hooks import BUILD
+from tests.backend.test_installs import PIP, run, site
+from tests.support.installed import SHARE, interfaces, names_in
+from tests.support.paths import PROGRAMS
+from tests.support.sides import Side
 
 INDEX = "share/ament_index/resource_index/rosidl_interfaces"
 #: The namespace of the second side.
@@ -72,13 +73,13 @@ def test_nodes_with_either_build_talk(ros_environment, shapes, sides, tmp_path, 
     file.write_text(json.dumps({"names": names, "shapes": shapes[0]}), encoding="utf-8")
     environment = {
         **ros_environment,
-        "FASTDDS_DEFAULT_PROFILES_FILE": str(HERE / "no_type_lookup.xml"),
+        "FASTDDS_DEFAULT_PROFILES_FILE": str(PROGRAMS / "no_type_lookup.xml"),
         "AMENT_PREFIX_PATH": str(prefix),
     }
-    peer, far = (HERE / "peer.py", "messages"), ("--ros-args", "--remap", f"__ns:={FAR}")
-    sides.append(Side((*peer, "one", "two", file), environment, f"{HERE}:{site(prefix)}"))
-    sides.append(Side((*peer, "two", "one", file, *far), environment, str(HERE)))
-    sides.append(Side((HERE / "native_bridge.py", FAR, file), environment, str(HERE)))
+    peer, far = (PROGRAMS / "peer.py", "messages"), ("--ros-args", "--remap", f"__ns:={FAR}")
+    sides.append(Side((*peer, "one", "two", file), environment, f"{PROGRAMS}:{site(prefix)}"))
+    sides.append(Side((*peer, "two", "one", file, *far), environment, str(PROGRAMS)))
+    sides.append(Side((PROGRAMS / "native_bridge.py", FAR, file), environment, str(PROGRAMS)))
     assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
     assert [side.finish() for side in reversed(sides)] == [[], [], []]
     assert Path(site(prefix) / "diagnostic_msgs" / "idlc.lock").is_file()

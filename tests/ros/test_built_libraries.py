@@ -9,11 +9,11 @@ import venv
 from pathlib import Path
 
 import msgspec
-import native
-import programs
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.support import native, programs
+from tests.support.paths import ROOT
+
 #: Where Python finds idlc and what it needs.
 SITE = str(Path(msgspec.__file__).parents[1])
 IDLC = f"{ROOT}:{SITE}"

@@ -4,14 +4,14 @@ import signal
 import subprocess
 
 import pytest
-from installed import HERE, SHARE, interfaces_in, names_in
-from native import built, install, model_of
-from tools import MACHINES, emulator, run, tool
 
 from idlc.native.library import OWN
+from tests.support.installed import SHARE, interfaces_in, names_in
+from tests.support.native import built, install, model_of
+from tests.support.paths import EVERY_KIND, EXAMPLE
+from tests.support.tools import MACHINES, emulator, run, tool
 
-EXAMPLE = HERE.parents[1] / "examples" / "my_robot_controller"
-FOLDERS = (EXAMPLE, HERE / "every_kind", SHARE / "sensor_msgs", SHARE / "action_msgs")
+FOLDERS = (EXAMPLE, EVERY_KIND, SHARE / "sensor_msgs", SHARE / "action_msgs")
 #: How the program is started: on 64 KiB pages too, and where code checks where it is jumped to.
 WAYS = {"x86_64": [[]], "aarch64": [[], ["-p", "65536"], ["-cpu", "max"]]}
 

@@ -8,10 +8,12 @@ import json
 import sys
 
 import pytest
-from installed import HERE, SHARE, interfaces, interfaces_in, names_in
-from native import install, model_of
-from sides import OURS, PACKAGES, STANDARD, Side
-from tools import run
+
+from tests.support.installed import SHARE, interfaces, interfaces_in, names_in
+from tests.support.native import install, model_of
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS, PACKAGES, STANDARD, Side
+from tests.support.tools import run
 
 #: The namespace of the second side.
 FAR = "/far"
@@ -39,7 +41,7 @@ def environment(ros_environment, prefix):
 def talk(environment, tmp_path, path_of, shapes):
     """Let two sides talk over a bridge; fail on any complaint."""
     sides = []
-    environment["FASTDDS_DEFAULT_PROFILES_FILE"] = str(HERE / "no_type_lookup.xml")
+    environment["FASTDDS_DEFAULT_PROFILES_FILE"] = str(PROGRAMS / "no_type_lookup.xml")
 
     def start(packages, *command):
         sides.append(Side(command, environment, path_of(*packages)))
@@ -50,8 +52,8 @@ def talk(environment, tmp_path, path_of, shapes):
         known = {"names": names, "shapes": shapes[0], "topics": topics}
         file.write_text(json.dumps(known), encoding="utf-8")
         for (step, packages, *words), me, other in ((one, "one", "two"), (two, "two", "one")):
-            start(packages, HERE / "peer.py", step, me, other, file, *words)
-        start((), HERE / "native_bridge.py", file)
+            start(packages, PROGRAMS / "peer.py", step, me, other, file, *words)
+        start((), PROGRAMS / "native_bridge.py", file)
         assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
         assert [side.finish() for side in reversed(sides)] == [[], [], []]
 
@@ -115,4 +117,4 @@ def test_events_and_feedback_of_own_packages(talk):
 def test_a_hundred_creations(environment, path_of):
     """The library is opened in each way, closed, and opened again; Fast DDS is as it comes."""
     environment["PYTHONPATH"] = path_of("my_robot_controller")
-    assert run(sys.executable, HERE / "native_cycles.py", env=environment) == "cycles 100\n"
+    assert run(sys.executable, PROGRAMS / "native_cycles.py", env=environment) == "cycles 100\n"
