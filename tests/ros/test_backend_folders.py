@@ -15,12 +15,11 @@ from idlc import backend
 from tests.backend.test_hooks import BUILD
 from tests.backend.test_installs import PIP, run, site
 from tests.support.installed import SHARE, interfaces, names_in
+from tests.support.native import FAR, both_ways
 from tests.support.paths import PROGRAMS
 from tests.support.sides import Side
 
 INDEX = "share/ament_index/resource_index/rosidl_interfaces"
-#: The namespace of the second side.
-FAR = "/far"
 
 
 def wheel_of(package, folder, monkeypatch):
@@ -70,7 +69,8 @@ def test_nodes_with_either_build_talk(ros_environment, shapes, sides, tmp_path, 
     run(*PIP, "--ignore-installed", "--prefix", prefix, *wheels, cwd=tmp_path)
     names = names_in(packages, interfaces())
     file = tmp_path / "known.json"
-    file.write_text(json.dumps({"names": names, "shapes": shapes[0]}), encoding="utf-8")
+    known = {"names": names, "shapes": shapes[0], "topics": both_ways(names)}
+    file.write_text(json.dumps(known), encoding="utf-8")
     environment = {
         **ros_environment,
         "FASTDDS_DEFAULT_PROFILES_FILE": str(PROGRAMS / "no_type_lookup.xml"),
@@ -79,7 +79,7 @@ def test_nodes_with_either_build_talk(ros_environment, shapes, sides, tmp_path, 
     peer, far = (PROGRAMS / "peer.py", "messages"), ("--ros-args", "--remap", f"__ns:={FAR}")
     sides.append(Side((*peer, "one", "two", file), environment, f"{PROGRAMS}:{site(prefix)}"))
     sides.append(Side((*peer, "two", "one", file, *far), environment, str(PROGRAMS)))
-    sides.append(Side((PROGRAMS / "native_bridge.py", FAR, file), environment, str(PROGRAMS)))
+    sides.append(Side((PROGRAMS / "native_bridge.py", file), environment, str(PROGRAMS)))
     assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
     assert [side.finish() for side in reversed(sides)] == [[], [], []]
     assert Path(site(prefix) / "diagnostic_msgs" / "idlc.lock").is_file()

@@ -10,13 +10,11 @@ import sys
 import pytest
 
 from tests.support.installed import SHARE, interfaces, interfaces_in, names_in
-from tests.support.native import install, model_of
+from tests.support.native import FAR, both_ways, install, model_of
 from tests.support.paths import PROGRAMS
 from tests.support.sides import OURS, PACKAGES, STANDARD, Side
 from tests.support.tools import run
 
-#: The namespace of the second side.
-FAR = "/far"
 #: What services and actions tell of themselves: end of the topic, of the type, and how.
 EVENTS = ("_service_event", "Event", "kept")
 FEEDBACK = ("_action/feedback", "FeedbackMessage", "passing")
@@ -70,10 +68,8 @@ def remapped(*rules):
 
 def exchange(talk, names, near, far):
     """Let what a side publishes reach the other, which is in another namespace."""
-    there = [(name, f"/one/{name}", f"{FAR}/one/{name}", "kept") for name in names]
-    back = [(name, f"{FAR}/two/{name}", f"/two/{name}", "kept") for name in names]
     words = remapped(f"__ns:={FAR}")
-    talk(names, [*there, *back], ("messages", near), ("messages", far, *words))
+    talk(names, both_ways(names), ("messages", near), ("messages", far, *words))
 
 
 def test_every_message_between_idlc_and_rosidl(talk):

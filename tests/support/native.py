@@ -13,6 +13,8 @@ from idlc.native.library import MACHINES, libraries
 from tests.support.paths import PROGRAMS
 from tests.support.tools import run, tool
 
+#: The namespace of the second side of a bridge.
+FAR = "/far"
 INDEX = "share/ament_index/resource_index/packages"
 
 
@@ -45,3 +47,9 @@ def install(model, prefix, machine="x86_64", layout=LAYOUTS["jazzy"]):
         paths.append(Path(prefix, "lib", name))
         paths[-1].write_bytes(content)
     return paths
+
+
+def both_ways(names):
+    """Return the topics that native_bridge.py is to carry between peer.py on both sides."""
+    there = [(name, f"/one/{name}", f"{FAR}/one/{name}", "kept") for name in names]
+    return [*there, *((name, f"{FAR}/two/{name}", f"/two/{name}", "kept") for name in names)]
