@@ -129,6 +129,7 @@ BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING)
 NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING)
 UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING)
 STALE_OUTPUT = Code("IDL460", "stale-generated-code", WARNING)
+NO_LIBRARY = Code("IDL461", "no-library-installed", WARNING)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
@@ -154,6 +155,8 @@ HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
 OPTIONAL_ADDED = Code("IDL519", "optional-added", ERROR)
+SEVERAL_VERSIONS = Code("IDL530", "several-versions", ERROR)
+SEVERAL_TYPES = Code("IDL531", "several-types", ERROR)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
@@ -181,6 +184,9 @@ UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 NO_TYPE_HASHES = Code("IDL623", "no-type-hashes", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
+UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
+NO_RCLPY = Code("IDL640", "no-rclpy", ERROR)
+EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)
@@ -203,6 +209,8 @@ USAGE: frozenset[str] = frozenset(
         NO_TYPE_HASHES,
         NO_REVISION,
         DUPLICATE_PACKAGE,
+        NO_RCLPY,
+        EMPTY_GRAPH,
     )
 )
 

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 from idlc.disk import environment
 from idlc.disk.enclosing_package import declared_version
+from idlc.model import distro
 
 #: What is taken where nothing of ROS 2 is installed.
-DEFAULT = "jazzy"
+DEFAULT = distro.DEFAULT.name
 #: The distribution of each release of rosidl, which is in every installation of ROS 2.
 _BY_VERSION = {
     "3.1": "humble",

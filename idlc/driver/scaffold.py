@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
@@ -54,13 +54,19 @@ class Result(NamedTuple):
 
 
 def package(
-    wanted: package_files.Package, folder: str, settings: Settings, report: Report
+    wanted: package_files.Package,
+    folder: str,
+    settings: Settings,
+    report: Report,
+    starters: Mapping[str, str] | None = None,
 ) -> Result | None:
-    """Write a new package below `folder`."""
+    """Write a new package below `folder`, with interfaces if it has none yet."""
     name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
     project = Project(name, report, force=settings.force)
     with stage("scaffold", wanted.name):
         files = package_files.files(wanted)
+    if not any(project.names(kind) for kind in ir.KINDS):
+        files |= starters or {}
     # what later commands add to stays as it is
     growing = (*_GROWING, f"launch/{wanted.name}_launch.py")
     new = {
@@ -114,7 +120,8 @@ def interface(
         kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
         parts = [*support_packages(), *sorted(kinds)]
         packages = [own, *(f"{own}.{part}" for part in parts)]
-        edits.append(("setup.py", data_files.add_packages(setup, packages)))
+        wired = data_files.add_libraries(setup)
+        edits.append(("setup.py", data_files.add_packages(wired, packages)))
     edited = accepted(project, edits, report)
     if edited is None:
         return None

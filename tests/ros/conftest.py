@@ -7,12 +7,15 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 
 import pytest
-from installed import SHARE, generate, interfaces, interfaces_in, names_in
-from sides import OURS
+
+from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS
 
 HERE = Path(__file__).parent
 
@@ -23,8 +26,8 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.ros)
 
 
-@pytest.fixture(scope="session")
-def ros_environment() -> Iterator[dict[str, str]]:
+@contextmanager
+def _domain_of_its_own() -> Iterator[dict[str, str]]:
     """Yield an environment in which DDS stays on this machine and meets no other run.
 
     A domain is held by a port, as the tests of scaffolded packages do it.
@@ -39,12 +42,50 @@ def ros_environment() -> Iterator[dict[str, str]]:
         }
 
 
+@pytest.fixture(scope="session")
+def ros_environment() -> Iterator[dict[str, str]]:
+    """Yield the environment that tests share."""
+    with _domain_of_its_own() as environment:
+        yield environment
+
+
+@pytest.fixture
+def lonely_environment() -> Iterator[dict[str, str]]:
+    """Yield an environment for one test, which sees no nodes of others, dead ones included."""
+    with _domain_of_its_own() as environment:
+        yield environment
+
+
 def _bound(held: socket.socket, domain: int) -> bool:
     try:
         held.bind(("127.0.0.1", 22119 + domain))
     except OSError:
         return False
     return True
+
+
+@pytest.fixture
+def program(ros_environment):
+    """Start a file of programs/, with idlc's classes on PYTHONPATH; it ends with the test."""
+    processes = []
+
+    def start(name: str, *words: object, path: Path) -> subprocess.Popen:
+        process = subprocess.Popen(
+            [sys.executable, str(PROGRAMS / name), *map(str, words)],
+            env={**ros_environment, "PYTHONPATH": str(path)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
 
 
 @pytest.fixture(scope="session")
@@ -58,7 +99,7 @@ def path_of(tmp_path_factory):
         return str(folder / package)
 
     def path(*packages: str) -> str:
-        return ":".join([str(HERE), *map(classes, packages)])
+        return ":".join([str(PROGRAMS), *map(classes, packages)])
 
     return path
 
@@ -69,7 +110,7 @@ def shapes(path_of, ros_environment):
     own_names = names_in(OURS, interfaces_in(OURS.values()))
     names = [*names_in(interfaces(), interfaces()), *own_names]
     done = subprocess.run(
-        [sys.executable, str(HERE / "shapes.py"), *names],
+        [sys.executable, str(PROGRAMS / "shapes.py"), *names],
         env={**ros_environment, "PYTHONPATH": path_of(*OURS)},
         capture_output=True,
         text=True,

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-import language_book
 from rosidl_adapter import convert_to_idl
-from test_verdict_live import ask_rosidl
+
+from tests.ros.test_verdict_live import ask_rosidl
+from tests.support import language_book
 
 BOOK = language_book.BOOK.read_text(encoding="utf-8")
 

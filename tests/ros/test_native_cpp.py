@@ -2,18 +2,16 @@
 
 import signal
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-from installed import HERE, SHARE, interfaces_in, names_in
-from native import install, model_of
-from tools import MACHINES, emulator, run, tool
 
 from idlc.native.library import OWN
+from tests.support.installed import SHARE, interfaces_in, names_in
+from tests.support.native import built, install, model_of
+from tests.support.paths import EVERY_KIND, EXAMPLE
+from tests.support.tools import MACHINES, emulator, run, tool
 
-EXAMPLE = HERE.parents[1] / "examples" / "my_robot_controller"
-FOLDERS = (EXAMPLE, HERE / "every_kind", SHARE / "sensor_msgs", SHARE / "action_msgs")
+FOLDERS = (EXAMPLE, EVERY_KIND, SHARE / "sensor_msgs", SHARE / "action_msgs")
 #: How the program is started: on 64 KiB pages too, and where code checks where it is jumped to.
 WAYS = {"x86_64": [[]], "aarch64": [[], ["-p", "65536"], ["-cpu", "max"]]}
 
@@ -46,17 +44,12 @@ def prefixes(models, tmp_path_factory):
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a function that builds the program for a machine, with ROS 2's own headers."""
-    include = Path(sys.prefix, "include")
-    folders = [include, *(path for path in include.glob("r*") if path.name != "rcl")]
-    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in folders)]
-    built = {}
+    found = {}
 
     def build(machine):
-        if machine not in built:
-            built[machine] = tmp_path_factory.mktemp(machine) / "ask"
-            source = HERE / "native_ask.cpp"
-            run(tool("g++", machine), *options, source, "-o", built[machine], "-ldl")
-        return built[machine]
+        if machine not in found:
+            found[machine] = built(tmp_path_factory.mktemp(machine), machine)
+        return found[machine]
 
     return build
 

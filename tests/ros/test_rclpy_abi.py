@@ -7,8 +7,10 @@ import subprocess
 import sys
 
 import pytest
-from installed import HERE, SHARE, generate
-from tools import run, tool
+
+from tests.support.installed import SHARE, generate
+from tests.support.paths import PROGRAMS
+from tests.support.tools import run, tool
 
 #: What a version's headers have that Humble's have not, and what it is called there.
 VERSIONS = {
@@ -31,7 +33,7 @@ def compiled(folder, version):
     words = [f"-D{one}" for one in VERSIONS[version]]
     soname = "-Wl,-soname,librcl_interfaces__rosidl_typesupport_introspection_c.so"
     command = (tool("gcc"), "-Wall", "-Werror", "-shared", "-fPIC", soname, *words)
-    run(*command, HERE / "abi.c", "-o", library)
+    run(*command, PROGRAMS / "abi.c", "-o", library)
     return library
 
 
@@ -47,7 +49,7 @@ def package(tmp_path_factory):
 def ask(package, ros_environment):
     def answer(*words):
         done = subprocess.run(
-            [sys.executable, str(HERE / "abi_side.py"), *map(str, words)],
+            [sys.executable, str(PROGRAMS / "abi_side.py"), *map(str, words)],
             env={**ros_environment, "PYTHONPATH": str(package)},
             capture_output=True,
             text=True,

@@ -8,13 +8,13 @@ import json
 import sys
 
 import pytest
-from installed import HERE, SHARE, interfaces, interfaces_in, names_in
-from native import install, model_of
-from sides import OURS, PACKAGES, STANDARD, Side
-from tools import run
 
-#: The namespace of the second side.
-FAR = "/far"
+from tests.support.installed import SHARE, interfaces, interfaces_in, names_in
+from tests.support.native import FAR, both_ways, install, model_of
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS, PACKAGES, STANDARD, Side
+from tests.support.tools import run
+
 #: What services and actions tell of themselves: end of the topic, of the type, and how.
 EVENTS = ("_service_event", "Event", "kept")
 FEEDBACK = ("_action/feedback", "FeedbackMessage", "passing")
@@ -39,7 +39,7 @@ def environment(ros_environment, prefix):
 def talk(environment, tmp_path, path_of, shapes):
     """Let two sides talk over a bridge; fail on any complaint."""
     sides = []
-    environment["FASTDDS_DEFAULT_PROFILES_FILE"] = str(HERE / "no_type_lookup.xml")
+    environment["FASTDDS_DEFAULT_PROFILES_FILE"] = str(PROGRAMS / "no_type_lookup.xml")
 
     def start(packages, *command):
         sides.append(Side(command, environment, path_of(*packages)))
@@ -50,8 +50,8 @@ def talk(environment, tmp_path, path_of, shapes):
         known = {"names": names, "shapes": shapes[0], "topics": topics}
         file.write_text(json.dumps(known), encoding="utf-8")
         for (step, packages, *words), me, other in ((one, "one", "two"), (two, "two", "one")):
-            start(packages, HERE / "peer.py", step, me, other, file, *words)
-        start((), HERE / "native_bridge.py", file)
+            start(packages, PROGRAMS / "peer.py", step, me, other, file, *words)
+        start((), PROGRAMS / "native_bridge.py", file)
         assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
         assert [side.finish() for side in reversed(sides)] == [[], [], []]
 
@@ -68,10 +68,8 @@ def remapped(*rules):
 
 def exchange(talk, names, near, far):
     """Let what a side publishes reach the other, which is in another namespace."""
-    there = [(name, f"/one/{name}", f"{FAR}/one/{name}", "kept") for name in names]
-    back = [(name, f"{FAR}/two/{name}", f"/two/{name}", "kept") for name in names]
     words = remapped(f"__ns:={FAR}")
-    talk(names, [*there, *back], ("messages", near), ("messages", far, *words))
+    talk(names, both_ways(names), ("messages", near), ("messages", far, *words))
 
 
 def test_every_message_between_idlc_and_rosidl(talk):
@@ -115,4 +113,4 @@ def test_events_and_feedback_of_own_packages(talk):
 def test_a_hundred_creations(environment, path_of):
     """The library is opened in each way, closed, and opened again; Fast DDS is as it comes."""
     environment["PYTHONPATH"] = path_of("my_robot_controller")
-    assert run(sys.executable, HERE / "native_cycles.py", env=environment) == "cycles 100\n"
+    assert run(sys.executable, PROGRAMS / "native_cycles.py", env=environment) == "cycles 100\n"
