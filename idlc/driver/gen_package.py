@@ -100,11 +100,5 @@ def _check_syntax(plan: Plan, target: Target) -> None:
 
 def _imports(model: Model) -> tuple[str, ...]:
     """Return the modules of other packages that the package's own files refer to."""
-    targets = {
-        element.target
-        for own in model.own
-        for part in derive.sections(own)
-        for field in part.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
+    targets = {target for own in model.own for target in derive.references(own)}
     return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))

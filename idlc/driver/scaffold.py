@@ -132,13 +132,7 @@ def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:
 
 def _reached_only(model: Model) -> set[str]:
     """Return the packages that others depend on, but not the package itself."""
-    direct = {
-        element.target.package
-        for one in model.own
-        for message in derive.sections(one)
-        for field in message.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
+    direct = {target.package for one in model.own for target in derive.references(one)}
     implied = {p for one in model.own for p in derive.IMPLICIT_PACKAGES[one.name.kind]}
     return {name.package for name in model.interfaces} - direct - implied
 

@@ -120,6 +120,11 @@ def sections(interface: ir.Interface) -> tuple[ir.Message, ...]:
             return (interface.goal, interface.result, interface.feedback)
 
 
+def references(interface: ir.Interface) -> set[ir.TypeName]:
+    """Return the structures that an interface's file names as types of fields."""
+    return {target for section in sections(interface) for target in section.references}
+
+
 def pseudo_structures(interface: ir.Interface) -> tuple[ir.Message, ...]:
     """Return the structures that exist only in type descriptions: services and actions as such."""
     found = [

@@ -175,6 +175,12 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
         """The fields as hashed and sent: the dummy member where there are none (spec 5, 8.6)."""
         return self.fields or (Field(name=DUMMY_FIELD, type=Primitive("uint8")),)
 
+    @property
+    def references(self) -> tuple[TypeName, ...]:
+        """The structures that the fields' types name, once for each field, in order."""
+        elements = (element_of(field.type) for field in self.fields)
+        return tuple(element.target for element in elements if isinstance(element, Ref))
+
 
 class Service(msgspec.Struct, frozen=True, kw_only=True):
     """A .srv file, or one of the two services of an action."""

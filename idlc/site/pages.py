@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics.visible import printable
@@ -65,18 +65,10 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     )
 
 
-def _targets(interface: ir.Interface) -> Iterator[ir.TypeName]:
-    for part in derive.sections(interface):
-        for field in part.fields:
-            element = ir.element_of(field.type)
-            if isinstance(element, ir.Ref):
-                yield element.target
-
-
 def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
     found: dict[ir.TypeName, set[ir.TypeName]] = {}
     for interface in interfaces:
-        for target in _targets(interface):
+        for target in derive.references(interface):
             found.setdefault(target, set()).add(interface.name)
     return found
 
@@ -92,7 +84,7 @@ def _page(interface: ir.Interface, model: Model, users: set[ir.TypeName], pages:
     for title, section in zip(titles, derive.sections(interface), strict=True):
         parts.append(f"<h2>{title}</h2>\n" if title else "")
         parts.append(_section(section, _prefix(interface, section), pages))
-    drawn = picture(own, users, set(_targets(interface)), pages)
+    drawn = picture(own, users, derive.references(interface), pages)
     parts.append(f"<h2>Used by and using</h2>\n{drawn}" if drawn else "")
     if users:
         listed = ", ".join(link(user, str(user), pages) for user in sorted(users))
