@@ -7,6 +7,7 @@ own and a trailing comma, which formatters keep.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
@@ -90,16 +91,16 @@ def _broken(group: Group, indent: int, before: str = "", after: str = "") -> lis
     return result
 
 
-def all_of(conditions: list[str], indent: int) -> list[str]:
+def all_of(conditions: Sequence[str], indent: int) -> list[str]:
     """Return lines that return whether all conditions are true."""
     margin = " " * indent
-    text = " and ".join(conditions) or "True"
-    if len(margin) + len(text) + 7 <= WIDTH:
-        return [f"{margin}return {text}"]
+    one = f"{margin}return {' and '.join(conditions)}"
+    if len(one) <= WIDTH:
+        return [one]
     return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
 
 
-def _spread(conditions: list[str], word: str, indent: int) -> list[str]:
+def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
     one = f"{margin}{f' {word} '.join(conditions)}"
@@ -108,19 +109,15 @@ def _spread(conditions: list[str], word: str, indent: int) -> list[str]:
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
 
 
-def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
-    """Return the head of an `if`: one of the conditions, and the call `rest`."""
+def one_or_all(first: str, rest: tuple[str, ...], indent: int, before: str) -> list[str]:
+    """Return the lines of `before`, and whether `first` is true or all of the rest are."""
     margin = " " * indent
-    if len(conditions) == 1:
-        return lines(rest, indent, f"if {conditions[0]} and ", ":")
-    either = " or ".join(conditions)
-    before = f"if ({either}) and "
-    if len(margin) + len(before) + len(rest.before) < WIDTH:
-        result = lines(rest, indent, before, ":")
-        items = ", ".join(map(flat, rest.items))
-        return result if len(result) == 1 else [result[0], f"{margin}    {items}", result[-1]]
-    end = f"{margin}) and {flat(rest)}:"
-    return [f"{margin}if (", *_spread(conditions, "or", indent + 4), end]
+    if len(rest) < 2:
+        return any_of([first, *rest], indent, before, "")
+    one = f"{margin}{before}{first} or ({' and '.join(rest)})"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}{before}{first} or (", *_spread(rest, "and", indent + 4), f"{margin})"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:

@@ -5,6 +5,7 @@ Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made h
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -55,12 +56,13 @@ def runtime_files() -> tuple[RenderedFile, ...]:
     )
 
 
-def module_file(
+def module_files(
     interface: ir.Interface, model: link.Model, modules: pynames.Modules
-) -> RenderedFile:
-    """Return the module of one interface."""
-    page = view.module(interface, model.messages, modules)
-    return RenderedFile(page.path, _template("message/module.py.jinja").render(module=page))
+) -> Iterator[RenderedFile]:
+    """Yield the modules of one interface."""
+    for module in view.modules(interface, model.messages, modules):
+        template = _template(f"message/{module.template}.py.jinja")
+        yield RenderedFile(module.path, template.render(module=module))
 
 
 def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
@@ -69,7 +71,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
     The model must be without errors: no `Unknown` type, nothing that is not found.
     """
     modules = pynames.modules(interface.name for interface in model.own)
-    files = [module_file(interface, model, modules) for interface in model.own]
+    files = [file for own in model.own for file in module_files(own, model, modules)]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = listing.package(model, kind, modules)
         text = _template("message/package_init.py.jinja").render(package=page)

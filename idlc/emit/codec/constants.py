@@ -120,7 +120,7 @@ class Tables:
         return self._array("array", "array_reader", step, "reading")
 
     def _array(self, stem: str, function: str, step: wire_plan.Block, *more: str) -> str:
-        dtype = numpy_name(step.primitive)
+        dtype = pynames.numpy(step.primitive)
         expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
         return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
 
@@ -171,8 +171,3 @@ class Tables:
     def small(self) -> str:
         """Return the name of the size up to which no view is worth its cost."""
         return self.define("small", "small", "reading.small")
-
-
-def numpy_name(primitive: str) -> str:
-    """Return the dtype of a numeric primitive."""
-    return {"char": "uint8"}.get(primitive, primitive)

@@ -14,7 +14,6 @@ from collections.abc import Callable
 from idlc.emit.codec import wire_plan
 from idlc.emit.codec.constants import Tables
 from idlc.emit.codec.cursor import Cursor
-from idlc.emit.codec.encode import block_code
 from idlc.emit.codec.statements import Block, Line, Statement
 from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
 from idlc.model import ir
@@ -137,9 +136,8 @@ class _Decoder:
         match step:
             case wire_plan.Number(place, letter, size):
                 run.add(letter, size, size, place.text)
-            case wire_plan.Block(place, primitive, count):
-                token = f"{count}{block_code(primitive)}"
-                run.add(token, step.unit, step.size, place.local)
+            case wire_plan.Block(place):
+                run.add(step.token, step.unit, step.size, place.local)
                 reader = self.tables.block_reader(step)
                 run.after.append(Line(call(reader, place.local), place.text))
             case _:

@@ -15,7 +15,6 @@ from idlc.emit.codec import statements, wire_plan
 from idlc.emit.codec.constants import Tables
 from idlc.emit.codec.position import Position, aligned_to_8
 from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
-from idlc.model import ir
 
 NONE: frozenset[str] = frozenset()
 _POSITIONS = re.compile(r"\b(?:at|low)\b")
@@ -107,9 +106,9 @@ class _Encoder:
                 self.field("?", 1, 1, f"{truths}[{place.text}]")
             case wire_plan.Number(place, letter, size):
                 self.field(letter, size, size, place.text)
-            case wire_plan.Block(place, primitive, count):
+            case wire_plan.Block(place):
                 value = call(self.tables.block_writer(step), place.text)
-                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
+                self.field(step.token, step.unit, step.size, value)
             case _:
                 self.field("x", 1, 1)
 
@@ -393,11 +392,6 @@ def without_parentheses(value: str) -> str:
         if depth == 0 and place < len(value) - 1:
             return value
     return value[1:-1] if value.startswith("(") else value
-
-
-def block_code(primitive: str) -> str:
-    """Return the character for a fixed-size array in a layout."""
-    return "B" if primitive in wire_plan.LIST_PRIMITIVES else ir.PRIMITIVES[primitive].code
 
 
 def power_of_two(*sizes: int) -> int:

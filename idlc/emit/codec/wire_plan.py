@@ -57,6 +57,12 @@ class Block(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
+    def token(self) -> str:
+        """The array in the layout of a Struct, where it is a number of bytes or numbers."""
+        lists = self.primitive in LIST_PRIMITIVES
+        return f"{self.count}{'B' if lists else ir.PRIMITIVES[self.primitive].code}"
+
+    @property
     def size(self) -> int:
         """Bytes of all."""
         return self.unit * self.count
