@@ -9,11 +9,13 @@ afterwards, by the runtime.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from idlc.emit.codec import wire_plan
+from idlc.emit.codec.alignment import multiple_of
 from idlc.emit.codec.constants import Tables
-from idlc.emit.codec.cursor import Cursor
+from idlc.emit.codec.cursor import START, Cursor
 from idlc.emit.codec.statements import Block, Line, Statement
 from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
 from idlc.model import ir
@@ -78,9 +80,9 @@ class _Run:
     def skipped(self, cursor: Cursor) -> Cursor:
         """Return the position after the values, of which the first is at `cursor`."""
         for align, size in self.sizes:
-            if align > cursor.modulus:
-                cursor = cursor.known(align, 4)
-            cursor = cursor.skip(cursor.padding(align) + size)
+            if not cursor.known.knows(align):
+                cursor = cursor.where(multiple_of(align))
+            cursor = cursor.skip(cursor.known.padding(align) + size)
         return cursor
 
     def assignment(self, value: Group) -> Line:
@@ -96,7 +98,7 @@ class _Decoder:
         self.makers = makers
         self.source = source
         self.body: list[Statement] = []
-        self.here = Cursor()
+        self.here = START
         self.run = _Run()
         self.limited = False
         self.looping = False
@@ -161,8 +163,8 @@ class _Decoder:
         if self.worded and fields == "I":
             self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
             self.here = run.skipped(self.here)
-        elif widest <= self.here.modulus:
-            reader = self.tables.reader(fields, self.here.residue)
+        elif self.here.known.knows(widest):
+            reader = self.tables.reader(fields, self.here.known.residue)
             self.body.append(run.assignment(call(reader, "data", here)))
             self.here = run.skipped(self.here)
         else:
@@ -178,22 +180,30 @@ class _Decoder:
 
     def align(self, align: int) -> None:
         """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.here.modulus >= align:
-            self.here = self.here.skip(self.here.padding(align))
+        if self.here.known.knows(align):
+            self.here = self.here.skip(self.here.known.padding(align))
         elif align == 8:
             self.line(f"({self.here.text(3)} & -8) + 4", "at")
-            self.here = Cursor("at", 0, 8, 4)
+            self.here = Cursor("at", 0, multiple_of(8))
         else:
             lead = 4 if self.worded and align == 4 else 0  # what comes after the size
             self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
-            self.here = Cursor("at", -lead, align, 4 % align)
+            self.here = Cursor("at", -lead, multiple_of(align))
 
-    def settle(self, target: Cursor) -> None:
-        """Bring the position into the variable of `target`."""
-        value = self.here.text(-target.offset)
-        if value != target.base:
-            self.line(value, target.base)
-        self.here = self.here.at(target.base, target.offset)
+    def settle(self, base: str, offset: int = 0) -> None:
+        """Bring the position into a variable, as `base + offset`."""
+        value = self.here.text(-offset)
+        if value != base:
+            self.line(value, base)
+        self.here = self.here.at(base, offset)
+
+    @contextmanager
+    def within(self, head: str) -> Iterator[None]:
+        """Make what is emitted meanwhile the body of a compound statement."""
+        outside, self.body = self.body, []
+        yield
+        outside.append(Block(head, tuple(self.body)))
+        self.body = outside
 
     # Values of variable size.
 
@@ -212,7 +222,7 @@ class _Decoder:
     def start(self) -> str:
         """Return the position as an expression that stays true when `end` changes."""
         if self.here.base == "end":
-            self.settle(Cursor("at", 0))
+            self.settle("at")
         return self.here.text()
 
     def text(self) -> Node:
@@ -231,7 +241,7 @@ class _Decoder:
             start = self.start()
         self.line(f"{self.here.text(-1)} + {size}", "end")
         self.body.append(Block("if data[end]:", UNENDED))
-        self.here = Cursor("end", 1, 1, 0)
+        self.here = Cursor("end", 1, multiple_of(1))
         if self.worded:
             return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.text(), f"data{slice_of(start)}")
@@ -247,15 +257,14 @@ class _Decoder:
 
         It is shorter if the buffer is, which whatever is read next notices.
         """
-        if not self.here.aligned(align):
-            self.settle(Cursor("at", 0))
+        if not self.here.known.is_at(align):
+            self.settle("at")
             self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
-            self.here = self.here.known(4, 0)
+            self.here = self.here.where(multiple_of(4))
         start = self.start()
         self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
         self.unchecked = True
-        modulus = min(self.here.modulus, size & -size)
-        self.here = self.here.at("end").known(modulus, self.here.residue)
+        self.here = Cursor("end", 0, self.here.known.modulo(size & -size))
         return f"{source}{slice_of(start)}"
 
     def finish(self) -> None:
@@ -297,7 +306,7 @@ class _Decoder:
         reader = self.tables.texts_reader(step)
         texts = call(reader, "data", self.here.text(), count)
         self.line(texts, tuple_of(step.place.text, "end"))
-        self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
+        self.here = Cursor("end", 0, multiple_of(4 if step.wide else 1))
 
     def items(self, step: wire_plan.Items) -> None:
         """Read an array or sequence of structures."""
@@ -363,26 +372,26 @@ class _Decoder:
 
         Between two rounds the position is in `at`, or in `end` if the body ends with a string.
         """
-        outside, entry = self.body, self.here
+        entry, first = self.here, self.here.at("at")
         unchecked = self.unchecked
-        first = entry.at("at")
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
-            self.body, self.here = [], first
-            emit()
-            again = first.meet(self.here)
-            if first.base == "at" and self.here.base == "end":
-                again = again.at("end", self.here.offset)
+            with self.within(head):
+                self.here = first
+                emit()
+                again = first.where(first.known.meet(self.here.known))
+                if first.base == "at" and self.here.base == "end":
+                    again = again.at("end", self.here.offset)
+                self.settle(again.base, again.offset)
+            loop = self.body.pop()
             if again == first:
                 break
             first = again
             self.tables.reset(mark)
         self.looping = looping
-        self.settle(first)
-        loop = Block(head, tuple(self.body))
-        self.body, self.here = outside, entry
-        self.settle(first)
+        self.here = entry
+        self.settle(first.base, first.offset)
         self.body.append(loop)
         self.here = first
         self.unchecked |= unchecked

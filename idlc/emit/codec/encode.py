@@ -10,8 +10,11 @@ remainder in `low`) only where somebody reads it.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from idlc.emit.codec import statements, wire_plan
+from idlc.emit.codec.alignment import Alignment, multiple_of
 from idlc.emit.codec.constants import Tables
 from idlc.emit.codec.position import Position, aligned_to_8
 from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
@@ -24,8 +27,7 @@ class Frame:
     """Fixed-size values that follow each other, with at most one text: one Struct."""
 
     def __init__(self, start: Position) -> None:
-        self.modulus = start.modulus
-        self.residue = start.residue
+        self.start = start.known
         self.fields: list[str] = []
         self.values: list[Node] = []
         self.text_size = ""
@@ -33,14 +35,14 @@ class Frame:
 
     def phase(self) -> str:
         """Return the subscript that picks a Struct by the position, empty if one is enough."""
-        if self.modulus >= self.widest:
+        if self.start.knows(self.widest):
             return ""
         return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
 
 
 def encode(steps: tuple[wire_plan.Step, ...], tables: Tables, indent: int) -> list[str]:
     """Return the lines that write a message; what they use is defined in `tables`."""
-    encoder = _Encoder(tables, Position())
+    encoder = _Encoder(tables, Position(Alignment()))
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
     for step in steps:
         encoder.step(step)
@@ -92,6 +94,14 @@ class _Encoder:
         """Emit an assignment."""
         self.body.append(statements.Line(value, target))
 
+    @contextmanager
+    def within(self, head: str) -> Iterator[None]:
+        """Make what is emitted meanwhile the body of a compound statement."""
+        outside, self.body = self.body, []
+        yield
+        outside.append(statements.Block(head, tuple(self.body)))
+        self.body = outside
+
     def put(self, part: Node, reads: str = "") -> None:
         """Emit a part of the message."""
         self.body.append(statements.Put(part, positions(reads)))
@@ -140,11 +150,11 @@ class _Encoder:
         """Write the frame; with the padding for a following `align` where that is known."""
         frame = self.frame
         if frame.fields:
-            if max(frame.modulus, frame.widest) < align:
+            if max(frame.start.modulus, frame.widest) < align:
                 align = 1
             frame.widest = max(frame.widest, align)
             phase = frame.phase()
-            start = None if phase else frame.residue
+            start = None if phase else frame.start.residue
             writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
             key = f"[{frame.text_size}]" if frame.text_size else ""
             method = ".pack" if phase and not key else ""
@@ -160,9 +170,9 @@ class _Encoder:
         here.before.clear()
         if not here.constant:
             self.note("at", here.text)
-            if not here.known(4):
+            if not here.known.knows(4):
                 self.note("low", here.low)
-            self.here = Position.variable(here.modulus, here.residue)
+            self.here = Position.variable(here.known)
         self.frame = Frame(self.here)
 
     def note(self, target: str, value: str) -> None:
@@ -246,10 +256,10 @@ class _Encoder:
     def pad(self, align: int, unless_empty: str = "") -> None:
         """Emit padding as a part of its own."""
         here = self.here
-        if here.aligned(align):
+        if here.known.is_at(align):
             return
         phase = "[at & 7]" if align == 8 else "[low & 3]"
-        index = f"[{here.residue}]" if here.known(align) else phase
+        index = f"[{here.known.residue}]" if here.known.knows(align) else phase
         part = f"{self.tables.pad(align)}{index}"
         self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
         if not unless_empty:
@@ -306,7 +316,7 @@ class _Encoder:
         """Emit structures of constant size: one Struct, one join."""
         local = step.place.local
         self.flush(1 if step.size is None else repeat.align)
-        inner = _Encoder(self.tables, Position(8, 4))
+        inner = _Encoder(self.tables, Position(Alignment(8, 4)))
         for part in inlined(step):
             inner.fixed(part)
         writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
@@ -323,7 +333,7 @@ class _Encoder:
         size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
         size += f" - {gap}" if gap else ""
         modulus = power_of_two(repeat.size, repeat.stride)
-        if not unless or (self.here.aligned(repeat.align) and not gap):
+        if not unless or (self.here.known.is_at(repeat.align) and not gap):
             self.pad(repeat.align)
             self.put(part)
             self.here.skip(size, modulus)
@@ -334,13 +344,11 @@ class _Encoder:
             self.note("low", self.here.low)
             self.pad(repeat.align, unless)
             self.put(part)
-            outside, self.body = self.body, []
-            start = aligned_to_8("at") if repeat.align == 8 else "at"
-            self.note("at", f"{start} + {size}")
-            self.note("low", size)
-            outside.append(statements.Block(f"if {unless}:", tuple(self.body)))
-            self.body = outside
-            self.here = Position.variable(min(modulus, 4), 0)
+            with self.within(f"if {unless}:"):
+                start = aligned_to_8("at") if repeat.align == 8 else "at"
+                self.note("at", f"{start} + {size}")
+                self.note("low", size)
+            self.here = Position.variable(multiple_of(4).modulo(modulus))
         self.settle()
 
     def loop(self, step: wire_plan.Items) -> None:
@@ -349,34 +357,30 @@ class _Encoder:
         entry = self.here
         if entry.constant:
             self.note("at", entry.text)
-        if entry.known(4):
+        if entry.known.knows(4):
             self.note("low", entry.low)
-        outside = self.body
-        head = entry.meet(entry)
+        head = entry.known
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
-            self.body = []
-            self.here = Position.variable(head.modulus, head.residue)
-            self.frame = Frame(self.here)
-            for part in step.body:
-                self.step(part)
-            self.flush(1)
-            end = self.here
-            if end.modulus >= 4 > head.modulus:
-                self.note("low", end.low)
-            met = head.meet(end)
-            if met.modulus == head.modulus:
+            with self.within(f"for {step.item} in {step.place.local}:"):
+                self.here = Position.variable(head)
+                self.frame = Frame(self.here)
+                for part in step.body:
+                    self.step(part)
+                self.flush(1)
+                end = self.here
+                if end.known.knows(4) and not head.knows(4):
+                    self.note("low", end.low)
+            met = head.meet(end.known)
+            if met == head:
                 break
             head = met
             self.tables.reset(mark)
-        outside.append(
-            statements.Block(f"for {step.item} in {step.place.local}:", tuple(self.body))
-        )
+            self.body.pop()
         self.looping = looping
-        self.body = outside
-        self.here = head
-        self.frame = Frame(head)
+        self.here = Position.variable(head)
+        self.frame = Frame(self.here)
 
 
 def positions(expression: str) -> frozenset[str]:
