@@ -36,14 +36,15 @@ class Group(msgspec.Struct, frozen=True):
 
 
 class Comprehension(msgspec.Struct, frozen=True):
-    """A list comprehension: what is made of each element, and each `for`."""
+    """A list comprehension: what is made of each element; each `for`'s targets and iterable."""
 
     element: Node
-    loops: tuple[str, ...]
+    loops: tuple[tuple[str, Node], ...]
 
     def flat(self) -> str:
         """Return the comprehension on one line."""
-        return f"[{flat(self.element)} {' '.join(self.loops)}]"
+        loops = (f"for {targets} in {flat(values)}" for targets, values in self.loops)
+        return f"[{flat(self.element)} {' '.join(loops)}]"
 
 
 Node: TypeAlias = str | Group | Comprehension
@@ -76,7 +77,8 @@ def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[st
         body = [f"{margin}    {node.flat()[1:-1]}"]
         if len(body[0]) > WIDTH:
             body = lines(node.element, indent + 4)
-            body += [f"{margin}    {loop}" for loop in node.loops]
+            for targets, values in node.loops:
+                body += lines(values, indent + 4, f"for {targets} in ")
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
     return _broken(node, indent, before, f"{node.after}{after}")
 

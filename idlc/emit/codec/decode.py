@@ -327,7 +327,7 @@ class _Decoder:
             self.short_if(f"{self.here.text()} + {wanted} > limit")
         else:
             self.short_if(f"{self.here.text(least * step.size)} > limit")
-        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
+        empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded

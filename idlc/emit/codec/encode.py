@@ -280,9 +280,9 @@ class _Encoder:
         lines = [statements.Line(one.text, one.local) for one in places]
         lines.append(statements.Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
-        given = tuple_of(*(one.text for one in places)).flat()
+        given = tuple_of(*(one.text for one in places))
         each = self.tables.local("each")
-        texts = Comprehension(each, (loop, f"for {each} in {given}"))
+        texts = Comprehension(each, ((step.item, local), (each, given)))
         unsized = call(self.tables.function("unsized", "unsized"), texts)
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
@@ -323,8 +323,8 @@ class _Encoder:
         row = Group(writer, tuple(inner.frame.values))
         block = self.tables.local(f"{local}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
-        loop = f"for {step.item} in {local}"
-        self.line(Group(f'b"{gap}".join', (Comprehension(row, (loop,)),)), block)
+        blocks = Comprehension(row, ((step.item, local),))
+        self.line(Group(f'b"{gap}".join', (blocks,)), block)
         self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
 
     def elements(self, part: str, count: str, repeat: wire_plan.Fixed, *, unless: str) -> None:

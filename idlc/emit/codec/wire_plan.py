@@ -93,6 +93,11 @@ class Numbers(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
+    def numpy(self) -> str:
+        """What numpy calls an element."""
+        return pynames.numpy(self.primitive)
+
+    @property
     def code(self) -> str:
         """The array type code."""
         return ir.PRIMITIVES[self.primitive].code
@@ -190,7 +195,7 @@ def _step(type_: ir.FieldType, place: Place, messages: Messages, names: pynames.
             if isinstance(element, ir.String):
                 return Texts(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
-                item = names.new("item")
+                item = names.new(f"{place.local}_item")
                 body = _steps(messages[element.target], messages, names, item, (item,))
                 return Items(place, element.target, item, tuple(body), length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")

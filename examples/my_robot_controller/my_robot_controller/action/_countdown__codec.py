@@ -17,17 +17,17 @@ def countdown_goal_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Countdown_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
+    write_head = _idlc.layout(order, "4si").pack
     new_countdown_goal = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
+    read_values = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._target_count)]
+        parts = [write_head(encapsulation, message._target_count)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_goal()
-        (message._target_count,) = read_1(data, 4)
+        (message._target_count,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -41,17 +41,19 @@ def countdown_result_codec(
     """Return what writes and reads Countdown_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4si?").pack
+    write_head = _idlc.layout(order, "4si?").pack
     new_countdown_result = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "i?", start=4).unpack_from
+    read_values = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._final_count, truths[message._success])]
+        parts = [
+            write_head(encapsulation, message._final_count, truths[message._success]),
+        ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_result()
-        message._final_count, message._success = read_1(data, 4)
+        message._final_count, message._success = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -64,17 +66,17 @@ def countdown_feedback_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Countdown_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
+    write_head = _idlc.layout(order, "4si").pack
     new_countdown_feedback = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
+    read_values = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._current_count)]
+        parts = [write_head(encapsulation, message._current_count)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_feedback()
-        (message._current_count,) = read_1(data, 4)
+        (message._current_count,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -25,19 +25,23 @@ def countdown_send_goal_request_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.layout(order, "4s16Bi").pack
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.layout(order, "4s16Bi").pack
     new_countdown_send_goal_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         goal = message._goal
         parts = [
-            write_1(encapsulation, bytes_uint8_16(goal_id._uuid), goal._target_count),
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+                goal._target_count,
+            ),
         ]
         return join(parts)
 
@@ -47,8 +51,8 @@ def countdown_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_countdown_goal()
         message._goal = goal
-        uuid, goal._target_count = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        uuid, goal._target_count = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -65,15 +69,15 @@ def countdown_send_goal_response_codec(
 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4s?iI").pack
+    write_head = _idlc.layout(order, "4s?iI").pack
     new_countdown_send_goal_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_1 = _idlc.layout(order, "?iI", start=4).unpack_from
+    read_values = _idlc.layout(order, "?iI", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         stamp = message._stamp
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 truths[message._accepted],
                 stamp._sec,
@@ -86,7 +90,7 @@ def countdown_send_goal_response_codec(
         message = new_countdown_send_goal_response()
         stamp = new_time()
         message._stamp = stamp
-        message._accepted, stamp._sec, stamp._nanosec = read_1(data, 4)
+        message._accepted, stamp._sec, stamp._nanosec = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -111,13 +115,13 @@ def countdown_send_goal_event_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.layout(order, "16Bi").pack
-    write_3 = _idlc.layout(order, "I").pack
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_values = _idlc.layout(order, "16Bi").pack
+    write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_4 = _idlc.layout(order, "?iI").pack
+    write_values_2 = _idlc.layout(order, "?iI").pack
     new_countdown_send_goal_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -125,11 +129,11 @@ def countdown_send_goal_event_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     new_countdown_send_goal_response = _idlc.maker(Countdown_SendGoal_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_2 = _idlc.layout(order, "16Bi").unpack_from
-    read_3 = _idlc.layout(order, "I").unpack_from
-    read_4 = _idlc.layout(order, "?iI").unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_values_2 = _idlc.layout(order, "16Bi").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
+    read_values_3 = _idlc.layout(order, "?iI").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -138,32 +142,32 @@ def countdown_send_goal_event_codec(
         if len(request) > 1:
             raise ValueError("too many elements")
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
         ]
         put = parts.append
-        for item in request:
-            goal_id = item._goal_id
-            goal = item._goal
-            put(write_2(bytes_uint8_16(goal_id._uuid), goal._target_count))
+        for request_item in request:
+            goal_id = request_item._goal_id
+            goal = request_item._goal
+            put(write_values(bytes_of_uint8_16(goal_id._uuid), goal._target_count))
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        put(write_3(len(response)))
-        for item_2 in response:
-            item_2_stamp = item_2._stamp
+        put(write_count(len(response)))
+        for response_item in response:
+            response_item_stamp = response_item._stamp
             put(
-                write_4(
-                    truths[item_2._accepted],
-                    item_2_stamp._sec,
-                    item_2_stamp._nanosec,
+                write_values_2(
+                    truths[response_item._accepted],
+                    response_item_stamp._sec,
+                    response_item_stamp._nanosec,
                 ),
             )
         return join(parts)
@@ -182,8 +186,8 @@ def countdown_send_goal_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
@@ -191,15 +195,15 @@ def countdown_send_goal_event_codec(
         request = [new_countdown_send_goal_request() for _ in range(count)]
         message._request = request
         at = 48
-        for item in request:
+        for request_item in request:
             goal_id = new_uuid()
-            item._goal_id = goal_id
+            request_item._goal_id = goal_id
             goal = new_countdown_goal()
-            item._goal = goal
-            uuid, goal._target_count = read_2(data, at)
-            goal_id._uuid = array_uint8_16(uuid)
+            request_item._goal = goal
+            uuid, goal._target_count = read_values_2(data, at)
+            goal_id._uuid = array_of_uint8_16(uuid)
             at = at + 20
-        (count,) = read_3(data, at)
+        (count,) = read_count(data, at)
         if count > 1:
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
@@ -207,14 +211,14 @@ def countdown_send_goal_event_codec(
         response = [new_countdown_send_goal_response() for _ in range(count)]
         message._response = response
         at = at + 4
-        for item_2 in response:
-            item_2_stamp = new_time()
-            item_2._stamp = item_2_stamp
+        for response_item in response:
+            response_item_stamp = new_time()
+            response_item._stamp = response_item_stamp
             (
-                item_2._accepted,
-                item_2_stamp._sec,
-                item_2_stamp._nanosec,
-            ) = read_4(data, at)
+                response_item._accepted,
+                response_item_stamp._sec,
+                response_item_stamp._nanosec,
+            ) = read_values_3(data, at)
             at = at + 12
         return message
 
@@ -233,24 +237,24 @@ def countdown_get_result_request_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.layout(order, "4s16B").pack
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.layout(order, "4s16B").pack
     new_countdown_get_result_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16B", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
-        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        parts = [write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid))]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_countdown_get_result_request()
         goal_id = new_uuid()
         message._goal_id = goal_id
-        (uuid,) = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        (uuid,) = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -266,15 +270,15 @@ def countdown_get_result_response_codec(
 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4sbi?").pack
+    write_head = _idlc.layout(order, "4sbi?").pack
     new_countdown_get_result_response = _idlc.maker(kind)
     new_countdown_result = _idlc.maker(Countdown_Result)
-    read_1 = _idlc.layout(order, "bi?", start=4).unpack_from
+    read_values = _idlc.layout(order, "bi?", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         result = message._result
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 message._status,
                 result._final_count,
@@ -287,7 +291,7 @@ def countdown_get_result_response_codec(
         message = new_countdown_get_result_response()
         result = new_countdown_result()
         message._result = result
-        message._status, result._final_count, result._success = read_1(data, 4)
+        message._status, result._final_count, result._success = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -312,13 +316,13 @@ def countdown_get_result_event_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.layout(order, "16B", start=4).pack
-    write_3 = _idlc.layout(order, "I").pack
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_values = _idlc.layout(order, "16B", start=4).pack
+    write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_4 = _idlc.phases(order, "bi?")
+    write_values_at = _idlc.phases(order, "bi?")
     new_countdown_get_result_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -326,11 +330,10 @@ def countdown_get_result_event_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_get_result_response = _idlc.maker(Countdown_GetResult_Response)
     new_countdown_result = _idlc.maker(Countdown_Result)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "16B", start=4).iter_unpack
-    read_2 = _idlc.layout(order, "I").unpack_from
-    read_3 = _idlc.phases(order, "bi?")
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_rows = _idlc.layout(order, "16B", start=4).iter_unpack
+    read_count = _idlc.layout(order, "I").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -339,31 +342,34 @@ def countdown_get_result_event_codec(
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join(
-            [write_2(bytes_uint8_16(item._goal_id._uuid)) for item in request],
+            [
+                write_values(bytes_of_uint8_16(request_item._goal_id._uuid))
+                for request_item in request
+            ],
         )
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         low = 0
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
             request_block,
-            write_3(len(response)),
+            write_count(len(response)),
         ]
         put = parts.append
-        for item_2 in response:
-            result = item_2._result
+        for response_item in response:
+            result = response_item._result
             put(
-                write_4[low & 3].pack(
-                    item_2._status,
+                write_values_at[low & 3].pack(
+                    response_item._status,
                     result._final_count,
                     truths[result._success],
                 ),
@@ -385,21 +391,21 @@ def countdown_get_result_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
-        for item_values in rows_1(data[48:end]):
-            item = new_countdown_get_result_request()
-            request.append(item)
+        for request_item_values in read_rows(data[48:end]):
+            request_item = new_countdown_get_result_request()
+            request.append(request_item)
             goal_id = new_uuid()
-            item._goal_id = goal_id
-            (uuid,) = item_values
-            goal_id._uuid = array_uint8_16(uuid)
-        (count,) = read_2(data, end)
+            request_item._goal_id = goal_id
+            (uuid,) = request_item_values
+            goal_id._uuid = array_of_uint8_16(uuid)
+        (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
         if end + 4 + 6 * count > limit:
@@ -407,12 +413,12 @@ def countdown_get_result_event_codec(
         response = [new_countdown_get_result_response() for _ in range(count)]
         message._response = response
         at = end + 4
-        for item_2 in response:
+        for response_item in response:
             result = new_countdown_result()
-            item_2._result = result
-            struct = read_3[at & 7]
+            response_item._result = result
+            struct = write_values_at[at & 7]
             (
-                item_2._status,
+                response_item._status,
                 result._final_count,
                 result._success,
             ) = struct.unpack_from(data, at)
@@ -435,21 +441,21 @@ def countdown_feedback_message_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.layout(order, "4s16Bi").pack
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.layout(order, "4s16Bi").pack
     new_countdown_feedback_message = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     new_countdown_feedback = _idlc.maker(Countdown_Feedback)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16Bi", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
         feedback = message._feedback
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
-                bytes_uint8_16(goal_id._uuid),
+                bytes_of_uint8_16(goal_id._uuid),
                 feedback._current_count,
             ),
         ]
@@ -461,8 +467,8 @@ def countdown_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_countdown_feedback()
         message._feedback = feedback
-        uuid, feedback._current_count = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        uuid, feedback._current_count = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         return message
 
     return _idlc.Codec(encode, decode)

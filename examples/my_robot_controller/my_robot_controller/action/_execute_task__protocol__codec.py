@@ -25,13 +25,13 @@ def execute_task_send_goal_request_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.Texts(order, "4s16BI*")
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.Texts(order, "4s16BI*")
     new_execute_task_send_goal_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
@@ -40,9 +40,9 @@ def execute_task_send_goal_request_codec(
         task_name = goal._task_name.encode()
         task_name_size = len(task_name)
         parts = [
-            write_1[task_name_size](
+            write_head[task_name_size](
                 encapsulation,
-                bytes_uint8_16(goal_id._uuid),
+                bytes_of_uint8_16(goal_id._uuid),
                 task_name_size + 1,
                 task_name,
             ),
@@ -55,8 +55,8 @@ def execute_task_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_execute_task_goal()
         message._goal = goal
-        uuid, size = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        uuid, size = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
@@ -77,15 +77,15 @@ def execute_task_send_goal_response_codec(
 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4s?iI").pack
+    write_head = _idlc.layout(order, "4s?iI").pack
     new_execute_task_send_goal_response = _idlc.maker(kind)
     new_time = _idlc.maker(Time)
-    read_1 = _idlc.layout(order, "?iI", start=4).unpack_from
+    read_values = _idlc.layout(order, "?iI", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         stamp = message._stamp
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 truths[message._accepted],
                 stamp._sec,
@@ -98,7 +98,7 @@ def execute_task_send_goal_response_codec(
         message = new_execute_task_send_goal_response()
         stamp = new_time()
         message._stamp = stamp
-        message._accepted, stamp._sec, stamp._nanosec = read_1(data, 4)
+        message._accepted, stamp._sec, stamp._nanosec = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -123,13 +123,13 @@ def execute_task_send_goal_event_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.text_phases(order, "16BI*")
-    write_3 = _idlc.phases(order, "I")
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_text_at = _idlc.text_phases(order, "16BI*")
+    write_count_at = _idlc.phases(order, "I")
     truths = _idlc.TRUTHS
-    write_4 = _idlc.layout(order, "?iI").pack
+    write_values = _idlc.layout(order, "?iI").pack
     new_execute_task_send_goal_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -137,12 +137,12 @@ def execute_task_send_goal_event_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     new_execute_task_send_goal_response = _idlc.maker(ExecuteTask_SendGoal_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_2 = _idlc.phases(order, "16BI")
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_values_at = _idlc.phases(order, "16BI")
     text = reading.text
-    read_3 = _idlc.layout(order, "I").unpack_from
-    read_4 = _idlc.layout(order, "?iI").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
+    read_values_2 = _idlc.layout(order, "?iI").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -152,25 +152,25 @@ def execute_task_send_goal_event_codec(
             raise ValueError("too many elements")
         low = 0
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
         ]
         put = parts.append
-        for item in request:
-            goal_id = item._goal_id
-            goal = item._goal
+        for request_item in request:
+            goal_id = request_item._goal_id
+            goal = request_item._goal
             task_name = goal._task_name.encode()
             task_name_size = len(task_name)
             put(
-                write_2[low & 3][task_name_size](
-                    bytes_uint8_16(goal_id._uuid),
+                write_text_at[low & 3][task_name_size](
+                    bytes_of_uint8_16(goal_id._uuid),
                     task_name_size + 1,
                     task_name,
                 ),
@@ -179,14 +179,14 @@ def execute_task_send_goal_event_codec(
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        put(write_3[low & 3].pack(len(response)))
-        for item_2 in response:
-            item_2_stamp = item_2._stamp
+        put(write_count_at[low & 3].pack(len(response)))
+        for response_item in response:
+            response_item_stamp = response_item._stamp
             put(
-                write_4(
-                    truths[item_2._accepted],
-                    item_2_stamp._sec,
-                    item_2_stamp._nanosec,
+                write_values(
+                    truths[response_item._accepted],
+                    response_item_stamp._sec,
+                    response_item_stamp._nanosec,
                 ),
             )
         return join(parts)
@@ -205,8 +205,8 @@ def execute_task_send_goal_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 20 * count > limit:
@@ -214,21 +214,21 @@ def execute_task_send_goal_event_codec(
         request = [new_execute_task_send_goal_request() for _ in range(count)]
         message._request = request
         end = 47
-        for item in request:
+        for request_item in request:
             goal_id = new_uuid()
-            item._goal_id = goal_id
+            request_item._goal_id = goal_id
             goal = new_execute_task_goal()
-            item._goal = goal
-            struct = read_2[end + 1 & 7]
+            request_item._goal = goal
+            struct = read_values_at[end + 1 & 7]
             uuid, size = struct.unpack_from(data, end + 1)
             at = end + 1 + struct.size
-            goal_id._uuid = array_uint8_16(uuid)
+            goal_id._uuid = array_of_uint8_16(uuid)
             end = at - 1 + size
             if data[end]:
                 raise ValueError("text without end")
             goal._task_name = text(data[at:end])
         at = end + 4 & -4
-        (count,) = read_3(data, at)
+        (count,) = read_count(data, at)
         if count > 1:
             raise ValueError("too many elements")
         if at + 4 + 9 * count > limit:
@@ -236,14 +236,14 @@ def execute_task_send_goal_event_codec(
         response = [new_execute_task_send_goal_response() for _ in range(count)]
         message._response = response
         at = at + 4
-        for item_2 in response:
-            item_2_stamp = new_time()
-            item_2._stamp = item_2_stamp
+        for response_item in response:
+            response_item_stamp = new_time()
+            response_item._stamp = response_item_stamp
             (
-                item_2._accepted,
-                item_2_stamp._sec,
-                item_2_stamp._nanosec,
-            ) = read_4(data, at)
+                response_item._accepted,
+                response_item_stamp._sec,
+                response_item_stamp._nanosec,
+            ) = read_values_2(data, at)
             at = at + 12
         return message
 
@@ -262,24 +262,24 @@ def execute_task_get_result_request_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.layout(order, "4s16B").pack
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.layout(order, "4s16B").pack
     new_execute_task_get_result_request = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16B", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16B", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         goal_id = message._goal_id
-        parts = [write_1(encapsulation, bytes_uint8_16(goal_id._uuid))]
+        parts = [write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid))]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_get_result_request()
         goal_id = new_uuid()
         message._goal_id = goal_id
-        (uuid,) = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        (uuid,) = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -295,21 +295,21 @@ def execute_task_get_result_response_codec(
 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4sb?").pack
+    write_head = _idlc.layout(order, "4sb?").pack
     new_execute_task_get_result_response = _idlc.maker(kind)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
-    read_1 = _idlc.layout(order, "b?", start=4).unpack_from
+    read_values = _idlc.layout(order, "b?", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         result = message._result
-        parts = [write_1(encapsulation, message._status, truths[result._success])]
+        parts = [write_head(encapsulation, message._status, truths[result._success])]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_get_result_response()
         result = new_execute_task_result()
         message._result = result
-        message._status, result._success = read_1(data, 4)
+        message._status, result._success = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -334,13 +334,13 @@ def execute_task_get_result_event_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.layout(order, "16B", start=4).pack
-    write_3 = _idlc.layout(order, "I").pack
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_values = _idlc.layout(order, "16B", start=4).pack
+    write_count = _idlc.layout(order, "I").pack
     truths = _idlc.TRUTHS
-    write_4 = _idlc.layout(order, "b?", start=4).pack
+    write_values_2 = _idlc.layout(order, "b?", start=4).pack
     new_execute_task_get_result_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
@@ -348,11 +348,11 @@ def execute_task_get_result_event_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_get_result_response = _idlc.maker(ExecuteTask_GetResult_Response)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "16B", start=4).iter_unpack
-    read_2 = _idlc.layout(order, "I").unpack_from
-    rows_2 = _idlc.layout(order, "b?", start=4).iter_unpack
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_rows = _idlc.layout(order, "16B", start=4).iter_unpack
+    read_count = _idlc.layout(order, "I").unpack_from
+    read_rows_2 = _idlc.layout(order, "b?", start=4).iter_unpack
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -361,29 +361,35 @@ def execute_task_get_result_event_codec(
         if len(request) > 1:
             raise ValueError("too many elements")
         request_block = b"".join(
-            [write_2(bytes_uint8_16(item._goal_id._uuid)) for item in request],
+            [
+                write_values(bytes_of_uint8_16(request_item._goal_id._uuid))
+                for request_item in request
+            ],
         )
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
         response_block = b"".join(
             [
-                write_4(item_2._status, truths[item_2._result._success])
-                for item_2 in response
+                write_values_2(
+                    response_item._status,
+                    truths[response_item._result._success],
+                )
+                for response_item in response
             ],
         )
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
             request_block,
-            write_3(len(response)),
+            write_count(len(response)),
             response_block,
         ]
         return join(parts)
@@ -402,33 +408,33 @@ def execute_task_get_result_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + 16 * count
-        for item_values in rows_1(data[48:end]):
-            item = new_execute_task_get_result_request()
-            request.append(item)
+        for request_item_values in read_rows(data[48:end]):
+            request_item = new_execute_task_get_result_request()
+            request.append(request_item)
             goal_id = new_uuid()
-            item._goal_id = goal_id
-            (uuid,) = item_values
-            goal_id._uuid = array_uint8_16(uuid)
-        (count,) = read_2(data, end)
+            request_item._goal_id = goal_id
+            (uuid,) = request_item_values
+            goal_id._uuid = array_of_uint8_16(uuid)
+        (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
         response: list[_idlc.Any] = []
         message._response = response
         at = end + 4
         end = at + 2 * count
-        for item_2_values in rows_2(data[at:end]):
-            item_2 = new_execute_task_get_result_response()
-            response.append(item_2)
+        for response_item_values in read_rows_2(data[at:end]):
+            response_item = new_execute_task_get_result_response()
+            response.append(response_item)
             result = new_execute_task_result()
-            item_2._result = result
-            item_2._status, result._success = item_2_values
+            response_item._result = result
+            response_item._status, result._success = response_item_values
         if end > limit:
             raise ValueError("too short")
         return message
@@ -449,13 +455,13 @@ def execute_task_feedback_message_codec(
         from unique_identifier_msgs.msg import UUID
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
-    write_1 = _idlc.Texts(order, "4s16BI*")
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    write_head = _idlc.Texts(order, "4s16BI*")
     new_execute_task_feedback_message = _idlc.maker(kind)
     new_uuid = _idlc.maker(UUID)
     new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "16BI", start=4).unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
@@ -464,9 +470,9 @@ def execute_task_feedback_message_codec(
         current_status = feedback._current_status.encode()
         current_status_size = len(current_status)
         parts = [
-            write_1[current_status_size](
+            write_head[current_status_size](
                 encapsulation,
-                bytes_uint8_16(goal_id._uuid),
+                bytes_of_uint8_16(goal_id._uuid),
                 current_status_size + 1,
                 current_status,
             ),
@@ -479,8 +485,8 @@ def execute_task_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_execute_task_feedback()
         message._feedback = feedback
-        uuid, size = read_1(data, 4)
-        goal_id._uuid = array_uint8_16(uuid)
+        uuid, size = read_values(data, 4)
+        goal_id._uuid = array_of_uint8_16(uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")

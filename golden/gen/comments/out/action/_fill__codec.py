@@ -17,17 +17,17 @@ def fill_goal_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Fill_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sf").pack
+    write_head = _idlc.layout(order, "4sf").pack
     new_fill_goal = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "f", start=4).unpack_from
+    read_values = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._level)]
+        parts = [write_head(encapsulation, message._level)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_goal()
-        (message._level,) = read_1(data, 4)
+        (message._level,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -40,17 +40,17 @@ def fill_result_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Fill_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sf").pack
+    write_head = _idlc.layout(order, "4sf").pack
     new_fill_result = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "f", start=4).unpack_from
+    read_values = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._reached)]
+        parts = [write_head(encapsulation, message._reached)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_result()
-        (message._reached,) = read_1(data, 4)
+        (message._reached,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -63,17 +63,17 @@ def fill_feedback_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Fill_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sf").pack
+    write_head = _idlc.layout(order, "4sf").pack
     new_fill_feedback = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "f", start=4).unpack_from
+    read_values = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._level)]
+        parts = [write_head(encapsulation, message._level)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_fill_feedback()
-        (message._level,) = read_1(data, 4)
+        (message._level,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

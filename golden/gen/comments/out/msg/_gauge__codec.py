@@ -19,21 +19,21 @@ def gauge_codec(
     from .._idlc import arrays as _arrays
 
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sfBI*", align=4)
+    write_head = _idlc.Texts(order, "4sfBI*", align=4)
     write_notes = _idlc.text_block(order, bound=3)
-    buffer_h = _idlc.sequence_writer(order, "h")
+    array_of_int16 = _idlc.sequence_writer(order, "h")
     array = _idlc.array_of(order)
-    write_2 = _idlc.phases(order, "I")
-    bytes_float64_9 = _arrays.array_writer(order, "float64", 9)
-    write_3 = _idlc.phases(order, "9dc")
+    write_count_at = _idlc.phases(order, "I")
+    bytes_of_float64_9 = _arrays.array_writer(order, "float64", 9)
+    write_values_at = _idlc.phases(order, "9dc")
     new_gauge = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "fBI", start=4).unpack_from
+    read_values = _idlc.layout(order, "fBI", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     read_notes = _idlc.texts_reader(order, text)
-    numbers_h = _idlc.sequence_reader(order, "h", reading)
-    array_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
-    read_3 = _idlc.layout(order, "9dc", start=4).unpack_from
+    read_int16 = _idlc.sequence_reader(order, "h", reading)
+    array_of_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
+    read_values_2 = _idlc.layout(order, "9dc", start=4).unpack_from
     small = reading.small
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
@@ -45,12 +45,12 @@ def gauge_codec(
         low = len(notes)
         samples = message._samples
         if type(samples) is not array:
-            samples = buffer_h(samples)
+            samples = array_of_int16(samples)
         samples_count = len(samples)
         at = (at + 3 & -4) + 4
         at = at + 2 * samples_count
         parts = [
-            write_1[label_size](
+            write_head[label_size](
                 encapsulation,
                 message._rate,
                 message._level,
@@ -58,9 +58,12 @@ def gauge_codec(
                 label,
             ),
             notes,
-            write_2[low & 3].pack(samples_count),
+            write_count_at[low & 3].pack(samples_count),
             samples,
-            write_3[at & 7].pack(bytes_float64_9(message._covariance), message._flags),
+            write_values_at[at & 7].pack(
+                bytes_of_float64_9(message._covariance),
+                message._flags,
+            ),
         ]
         raw = join(parts)
         if len(samples) != samples_count:
@@ -71,23 +74,23 @@ def gauge_codec(
         limit = len(data)
         view = data if limit < small else memoryview(data)
         message = new_gauge()
-        message._rate, message._level, size = read_1(data, 4)
+        message._rate, message._level, size = read_values(data, 4)
         end = 15 + size
         if data[end]:
             raise ValueError("text without end")
         message._label = text(data[16:end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         if count > 3:
             raise ValueError("too many elements")
         message._notes, end = read_notes(data, at + 4, count)
         at = end + 3 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         end = at + 4 + 2 * count
-        message._samples = numbers_h(view[at + 4 : end])
+        message._samples = read_int16(view[at + 4 : end])
         at = (end + 3 & -8) + 4
-        covariance, message._flags = read_3(data, at)
-        message._covariance = array_float64_9(covariance)
+        covariance, message._flags = read_values_2(data, at)
+        message._covariance = array_of_float64_9(covariance)
         return message
 
     return _idlc.Codec(encode, decode, bulk=True)

@@ -17,20 +17,20 @@ def reset_request_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Reset_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*")
+    write_head = _idlc.Texts(order, "4sI*")
     new_reset_request = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         reason = message._reason.encode()
         reason_size = len(reason)
-        parts = [write_1[reason_size](encapsulation, reason_size + 1, reason)]
+        parts = [write_head[reason_size](encapsulation, reason_size + 1, reason)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_reset_request()
-        (size,) = read_1(data, 4)
+        (size,) = read_count(data, 4)
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")
@@ -48,17 +48,17 @@ def reset_response_codec(
     """Return what writes and reads Reset_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4s?").pack
+    write_head = _idlc.layout(order, "4s?").pack
     new_reset_response = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "?", start=4).unpack_from
+    read_values = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, truths[message._ok])]
+        parts = [write_head(encapsulation, truths[message._ok])]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_reset_response()
-        (message._ok,) = read_1(data, 4)
+        (message._ok,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

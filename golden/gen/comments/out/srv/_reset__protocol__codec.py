@@ -26,23 +26,23 @@ def reset_event_codec(
         from service_msgs.msg import ServiceEventInfo
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.text_phases(order, "I*")
-    write_3 = _idlc.phases(order, "I")
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_text_at = _idlc.text_phases(order, "I*")
+    write_count_at = _idlc.phases(order, "I")
     truths = _idlc.TRUTHS
-    write_4 = _idlc.layout(order, "?", start=4).pack
+    write_values = _idlc.layout(order, "?", start=4).pack
     new_reset_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_reset_request = _idlc.maker(Reset_Request)
     new_reset_response = _idlc.maker(Reset_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    read_2 = _idlc.layout(order, "I").unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    rows_1 = _idlc.layout(order, "?", start=4).iter_unpack
+    read_rows = _idlc.layout(order, "?", start=4).iter_unpack
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -52,27 +52,29 @@ def reset_event_codec(
             raise ValueError("too many elements")
         low = 0
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
         ]
         put = parts.append
-        for item in request:
-            reason = item._reason.encode()
+        for request_item in request:
+            reason = request_item._reason.encode()
             reason_size = len(reason)
-            put(write_2[low & 3][reason_size](reason_size + 1, reason))
+            put(write_text_at[low & 3][reason_size](reason_size + 1, reason))
             low = reason_size + 1
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join([write_4(truths[item_2._ok]) for item_2 in response])
-        put(write_3[low & 3].pack(len(response)))
+        response_block = b"".join(
+            [write_values(truths[response_item._ok]) for response_item in response],
+        )
+        put(write_count_at[low & 3].pack(len(response)))
         put(response_block)
         return join(parts)
 
@@ -90,8 +92,8 @@ def reset_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         if 48 + 4 * count > limit:
@@ -99,24 +101,24 @@ def reset_event_codec(
         request = [new_reset_request() for _ in range(count)]
         message._request = request
         end = 47
-        for item in request:
+        for request_item in request:
             at = end + 4 & -4
-            (size,) = read_2(data, at)
+            (size,) = read_count(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
-            item._reason = text(data[at + 4 : end])
+            request_item._reason = text(data[at + 4 : end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         if count > 1:
             raise ValueError("too many elements")
         response: list[_idlc.Any] = []
         message._response = response
         end = at + 4 + count
-        for item_2_values in rows_1(data[at + 4 : end]):
-            item_2 = new_reset_response()
-            response.append(item_2)
-            (item_2._ok,) = item_2_values
+        for response_item_values in read_rows(data[at + 4 : end]):
+            response_item = new_reset_response()
+            response.append(response_item)
+            (response_item._ok,) = response_item_values
         if end > limit:
             raise ValueError("too short")
         return message

@@ -29,52 +29,50 @@ def everything_codec(
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
     wide_text = _idlc.wide_text(order)
-    write_1 = _idlc.Texts(order, "4s?BdI*I")
+    write_head = _idlc.Texts(order, "4s?BdI*I")
     listed = _idlc.listed
-    write_2 = _idlc.layout(order, "I").pack
-    write_3 = _idlc.text_phases(order, "BdI*I")
-    bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
-    write_4 = _idlc.layout(order, "IH3B", start=4).pack
+    write_count = _idlc.layout(order, "I").pack
+    write_text_at = _idlc.text_phases(order, "BdI*I")
+    bytes_of_uint8_3 = _arrays.array_writer(order, "uint8", 3)
+    write_values = _idlc.layout(order, "IH3B", start=4).pack
     pad4 = _idlc.PAD4
-    write_5 = _idlc.phases(order, "xI")
-    write_6 = _idlc.layout(order, "x", start=4).pack
-    buffer_d = _idlc.sequence_writer(order, "d")
+    write_values_at = _idlc.phases(order, "xI")
+    write_values_2 = _idlc.layout(order, "x", start=4).pack
+    array_of_float64 = _idlc.sequence_writer(order, "d")
     array = _idlc.array_of(order)
-    write_7 = _idlc.phases(order, "I")
+    write_count_at = _idlc.phases(order, "I")
     pad8 = _idlc.PAD8
-    buffer_h = _idlc.sequence_writer(order, "h")
+    array_of_int16 = _idlc.sequence_writer(order, "h")
     flags_2 = _idlc.flags
     octets_2 = _idlc.octets_writer(2)
-    write_8 = _idlc.layout(order, "2B").pack
+    write_values_3 = _idlc.layout(order, "2B").pack
     write_texts = _idlc.text_block(order)
     write_wides = _idlc.wide_block(order, size=2)
-    write_9 = _idlc.layout(order, "iI", start=4).pack
-    bytes_float32_4 = _arrays.array_writer(order, "float32", 4)
-    write_10 = _idlc.phases(order, "4fq")
+    write_values_4 = _idlc.layout(order, "iI", start=4).pack
+    bytes_of_float32_4 = _arrays.array_writer(order, "float32", 4)
+    write_values_at_2 = _idlc.phases(order, "4fq")
     new_everything = _idlc.maker(kind)
     new_inner = _idlc.maker(Inner)
     new_row = _idlc.maker(Row)
     new_nothing = _idlc.maker(Nothing)
     new_time = _idlc.maker(Time)
-    read_1 = _idlc.layout(order, "?BdI", start=4).unpack_from
+    read_values = _idlc.layout(order, "?BdI", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
-    read_3 = _idlc.phases(order, "BdI")
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_4 = _idlc.layout(order, "IH3B").unpack_from
-    read_5 = _idlc.phases(order, "xI")
-    rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
-    numbers_d = _idlc.sequence_reader(order, "d", reading)
-    numbers_h = _idlc.sequence_reader(order, "h", reading)
+    read_values_at = _idlc.phases(order, "BdI")
+    array_of_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
+    read_values_2 = _idlc.layout(order, "IH3B").unpack_from
+    read_rows = _idlc.layout(order, "x", start=4).iter_unpack
+    read_float64 = _idlc.sequence_reader(order, "d", reading)
+    read_int16 = _idlc.sequence_reader(order, "h", reading)
     read_flags = _idlc.read_flags
     read_octets = _idlc.read_octets
-    read_6 = _idlc.phases(order, "2BI")
+    read_values_at_2 = _idlc.phases(order, "2BI")
     read_texts = _idlc.texts_reader(order, text)
     read_wides = _idlc.wide_texts_reader(order)
-    rows_2 = _idlc.layout(order, "iI", start=4).iter_unpack
-    array_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
-    read_7 = _idlc.phases(order, "4fq")
+    read_rows_2 = _idlc.layout(order, "iI", start=4).iter_unpack
+    array_of_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
     small = reading.small
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
@@ -87,7 +85,7 @@ def everything_codec(
         inners = listed(message._inners)
         at = at + 4
         parts = [
-            write_1[c_size](
+            write_head[c_size](
                 encapsulation,
                 truths[message._flag],
                 inner._a,
@@ -97,33 +95,33 @@ def everything_codec(
                 len(d) // 4,
             ),
             d,
-            write_2(len(inners)),
+            write_count(len(inners)),
         ]
         put = parts.append
-        for item in inners:
-            item_c = item._c.encode()
-            item_c_size = len(item_c)
-            item_d = wide_text(item._d)
+        for inners_item in inners:
+            inners_item_c = inners_item._c.encode()
+            inners_item_c_size = len(inners_item_c)
+            inners_item_d = wide_text(inners_item._d)
             put(
-                write_3[at & 7][item_c_size](
-                    item._a,
-                    item._b,
-                    item_c_size + 1,
-                    item_c,
-                    len(item_d) // 4,
+                write_text_at[at & 7][inners_item_c_size](
+                    inners_item._a,
+                    inners_item._b,
+                    inners_item_c_size + 1,
+                    inners_item_c,
+                    len(inners_item_d) // 4,
                 ),
             )
-            at = ((at + 4 & -8) + item_c_size + 20 & -4) + 4
-            put(item_d)
-            at = at + len(item_d)
+            at = ((at + 4 & -8) + inners_item_c_size + 20 & -4) + 4
+            put(inners_item_d)
+            at = at + len(inners_item_d)
         rows = listed(message._rows)
         if len(rows) > 4:
             raise ValueError("too many elements")
         at = at + 4
         rows_block = b"\x00\x00\x00".join(
             [
-                write_4(item_2._a, item_2._b, bytes_uint8_3(item_2._c))
-                for item_2 in rows
+                write_values(rows_item._a, rows_item._b, bytes_of_uint8_3(rows_item._c))
+                for rows_item in rows
             ],
         )
         low = 0
@@ -135,36 +133,36 @@ def everything_codec(
             raise ValueError("wrong number of elements")
         pair_block = b"\x00\x00\x00".join(
             [
-                write_4(item_3._a, item_3._b, bytes_uint8_3(item_3._c))
-                for item_3 in pair
+                write_values(pair_item._a, pair_item._b, bytes_of_uint8_3(pair_item._c))
+                for pair_item in pair
             ],
         )
         at = (at + 3 & -4) + 12 * len(pair) - 3
-        put(write_2(len(rows)))
+        put(write_count(len(rows)))
         put(rows_block)
         put(pad4[low & 3])
         put(pair_block)
         low = 12 * len(pair) - 3
         nothings = listed(message._nothings)
         at = (at + 4 & -4) + 4
-        nothings_block = b"".join([write_6() for item_4 in nothings])
+        nothings_block = b"".join([write_values_2() for nothings_item in nothings])
         at = at + len(nothings)
-        put(write_5[low & 3].pack(len(nothings)))
+        put(write_values_at[low & 3].pack(len(nothings)))
         put(nothings_block)
         low = len(nothings)
         doubles = message._doubles
         if type(doubles) is not array:
-            doubles = buffer_d(doubles)
+            doubles = array_of_float64(doubles)
         doubles_count = len(doubles)
         at = (at + 3 & -4) + 4
-        put(write_7[low & 3].pack(doubles_count))
+        put(write_count_at[low & 3].pack(doubles_count))
         put(pad8[at & 7] if doubles_count else b"")
         put(doubles)
         if doubles_count:
             at = (at + 3 & -8) + 4 + 8 * doubles_count
         shorts = message._shorts
         if type(shorts) is not array:
-            shorts = buffer_h(shorts)
+            shorts = array_of_int16(shorts)
         shorts_count = len(shorts)
         if shorts_count > 3:
             raise ValueError("too many elements")
@@ -174,16 +172,16 @@ def everything_codec(
         flags = flags_2(message._flags)
         at = (at + 3 & -4) + 4
         at = at + len(flags)
-        put(write_2(shorts_count))
+        put(write_count(shorts_count))
         put(shorts)
-        put(write_7[low & 3].pack(len(flags)))
+        put(write_count_at[low & 3].pack(len(flags)))
         put(flags)
         low = len(flags)
         at = at + 2
         low = low + 2
         texts = write_texts(message._texts)
         at = (at + 3 & -4) + len(texts)
-        put(write_8(octets_2(message._octets)))
+        put(write_values_3(octets_2(message._octets)))
         put(pad4[low & 3])
         put(texts)
         low = len(texts)
@@ -192,14 +190,22 @@ def everything_codec(
         stamps = listed(message._stamps)
         at = at + 4
         stamps_block = b"".join(
-            [write_9(item_5._sec, item_5._nanosec) for item_5 in stamps],
+            [
+                write_values_4(stamps_item._sec, stamps_item._nanosec)
+                for stamps_item in stamps
+            ],
         )
         at = at + 8 * len(stamps)
         put(pad4[low & 3])
         put(wides)
-        put(write_2(len(stamps)))
+        put(write_count(len(stamps)))
         put(stamps_block)
-        put(write_10[at & 7].pack(bytes_float32_4(message._weights), message._last))
+        put(
+            write_values_at_2[at & 7].pack(
+                bytes_of_float32_4(message._weights),
+                message._last,
+            ),
+        )
         raw = join(parts)
         if len(doubles) != doubles_count or len(shorts) != shorts_count:
             return encode(message, join)
@@ -211,34 +217,34 @@ def everything_codec(
         message = new_everything()
         inner = new_inner()
         message._inner = inner
-        message._flag, inner._a, inner._b, size = read_1(data, 4)
+        message._flag, inner._a, inner._b, size = read_values(data, 4)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
         inner._c = text(data[24:end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         end = at + 4 + 4 * count
         inner._d = read_wide_text(data[at + 4 : end])
-        (count,) = read_2(data, end)
+        (count,) = read_count(data, end)
         if end + 4 + 17 * count > limit:
             raise ValueError("too short")
         inners = [new_inner() for _ in range(count)]
         message._inners = inners
         end = end + 4
-        for item in inners:
-            struct = read_3[end & 7]
-            item._a, item._b, size = struct.unpack_from(data, end)
+        for inners_item in inners:
+            struct = read_values_at[end & 7]
+            inners_item._a, inners_item._b, size = struct.unpack_from(data, end)
             at = end + struct.size
             end = at - 1 + size
             if data[end]:
                 raise ValueError("text without end")
-            item._c = text(data[at:end])
+            inners_item._c = text(data[at:end])
             at = end + 4 & -4
-            (count,) = read_2(data, at)
+            (count,) = read_count(data, at)
             end = at + 4 + 4 * count
-            item._d = read_wide_text(data[at + 4 : end])
-        (count,) = read_2(data, end)
+            inners_item._d = read_wide_text(data[at + 4 : end])
+        (count,) = read_count(data, end)
         if count > 4:
             raise ValueError("too many elements")
         if end + 4 + 9 * count > limit:
@@ -246,66 +252,66 @@ def everything_codec(
         rows = [new_row() for _ in range(count)]
         message._rows = rows
         at = end + 4
-        for item_2 in rows:
+        for rows_item in rows:
             at = at + 3 & -4
-            item_2._a, item_2._b, item_2_c = read_4(data, at)
-            item_2._c = array_uint8_3(item_2_c)
+            rows_item._a, rows_item._b, rows_item_c = read_values_2(data, at)
+            rows_item._c = array_of_uint8_3(rows_item_c)
             at = at + 9
         if at + 18 > limit:
             raise ValueError("too short")
         pair = [new_row() for _ in range(2)]
         message._pair = pair
-        for item_3 in pair:
+        for pair_item in pair:
             at = at + 3 & -4
-            item_3._a, item_3._b, item_3_c = read_4(data, at)
-            item_3._c = array_uint8_3(item_3_c)
+            pair_item._a, pair_item._b, pair_item_c = read_values_2(data, at)
+            pair_item._c = array_of_uint8_3(pair_item_c)
             at = at + 9
         nothing = new_nothing()
         message._nothing = nothing
-        struct = read_5[at & 7]
+        struct = write_values_at[at & 7]
         (count,) = struct.unpack_from(data, at)
         at = at + struct.size
         nothings: list[_idlc.Any] = []
         message._nothings = nothings
         end = at + count
-        for _ in rows_1(view[at:end]):
-            item_4 = new_nothing()
-            nothings.append(item_4)
+        for _ in read_rows(view[at:end]):
+            nothings_item = new_nothing()
+            nothings.append(nothings_item)
         at = end + 3 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         at = at + 4
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        message._doubles = numbers_d(view[at:end])
-        (count,) = read_2(data, end)
+        message._doubles = read_float64(view[at:end])
+        (count,) = read_count(data, end)
         if count > 3:
             raise ValueError("too many elements")
         at = end + 4
         end = at + 2 * count
-        message._shorts = numbers_h(view[at:end])
+        message._shorts = read_int16(view[at:end])
         at = end + 3 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         end = at + 4 + count
         message._flags = read_flags(view[at + 4 : end])
-        struct = read_6[end & 7]
+        struct = read_values_at_2[end & 7]
         octets, count = struct.unpack_from(data, end)
         at = end + struct.size
         message._octets = read_octets(octets)
         message._texts, end = read_texts(data, at, count)
         at = end + 3 & -4
         message._wides, end = read_wides(data, at, 2)
-        (count,) = read_2(data, end)
+        (count,) = read_count(data, end)
         stamps: list[_idlc.Any] = []
         message._stamps = stamps
         at = end + 4
         end = at + 8 * count
-        for item_5_values in rows_2(view[at:end]):
-            item_5 = new_time()
-            stamps.append(item_5)
-            item_5._sec, item_5._nanosec = item_5_values
-        weights, message._last = read_7[end & 7].unpack_from(data, end)
-        message._weights = array_float32_4(weights)
+        for stamps_item_values in read_rows_2(view[at:end]):
+            stamps_item = new_time()
+            stamps.append(stamps_item)
+            stamps_item._sec, stamps_item._nanosec = stamps_item_values
+        weights, message._last = write_values_at_2[end & 7].unpack_from(data, end)
+        message._weights = array_of_float32_4(weights)
         return message
 
     return _idlc.Codec(encode, decode, bulk=True)

@@ -18,11 +18,11 @@ def inner_codec(
     """Return what writes and reads Inner in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     wide_text = _idlc.wide_text(order)
-    write_1 = _idlc.Texts(order, "4sBdI*I")
+    write_head = _idlc.Texts(order, "4sBdI*I")
     new_inner = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "BdI", start=4).unpack_from
+    read_values = _idlc.layout(order, "BdI", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     read_wide_text = _idlc.read_wide_text(order)
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
@@ -30,7 +30,7 @@ def inner_codec(
         c_size = len(c)
         d = wide_text(message._d)
         parts = [
-            write_1[c_size](
+            write_head[c_size](
                 encapsulation,
                 message._a,
                 message._b,
@@ -45,13 +45,13 @@ def inner_codec(
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
         message = new_inner()
-        message._a, message._b, size = read_1(data, 4)
+        message._a, message._b, size = read_values(data, 4)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
         message._c = text(data[24:end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         end = at + 4 + 4 * count
         message._d = read_wide_text(data[at + 4 : end])
         if end > limit:

@@ -17,12 +17,12 @@ def pair_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Pair in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*", align=4)
-    write_2 = _idlc.Texts(order, "I*")
+    write_head = _idlc.Texts(order, "4sI*", align=4)
+    write_text = _idlc.Texts(order, "I*")
     new_pair = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count_2 = _idlc.layout(order, "I").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         key = message._key.encode()
@@ -30,20 +30,20 @@ def pair_codec(
         value = message._value.encode()
         value_size = len(value)
         parts = [
-            write_1[key_size](encapsulation, key_size + 1, key),
-            write_2[value_size](value_size + 1, value),
+            write_head[key_size](encapsulation, key_size + 1, key),
+            write_text[value_size](value_size + 1, value),
         ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_pair()
-        (size,) = read_1(data, 4)
+        (size,) = read_count(data, 4)
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")
         message._key = text(data[8:end])
         at = end + 4 & -4
-        (size,) = read_2(data, at)
+        (size,) = read_count_2(data, at)
         end = at + 3 + size
         if data[end]:
             raise ValueError("text without end")

@@ -19,22 +19,27 @@ def row_codec(
     from .._idlc import arrays as _arrays
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
-    write_1 = _idlc.layout(order, "4sIH3B").pack
+    bytes_of_uint8_3 = _arrays.array_writer(order, "uint8", 3)
+    write_head = _idlc.layout(order, "4sIH3B").pack
     new_row = _idlc.maker(kind)
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_1 = _idlc.layout(order, "IH3B", start=4).unpack_from
+    array_of_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
+    read_values = _idlc.layout(order, "IH3B", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         parts = [
-            write_1(encapsulation, message._a, message._b, bytes_uint8_3(message._c)),
+            write_head(
+                encapsulation,
+                message._a,
+                message._b,
+                bytes_of_uint8_3(message._c),
+            ),
         ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_row()
-        message._a, message._b, c = read_1(data, 4)
-        message._c = array_uint8_3(c)
+        message._a, message._b, c = read_values(data, 4)
+        message._c = array_of_uint8_3(c)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -23,32 +23,32 @@ def texts_codec(
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
-    write_1 = _idlc.layout(order, "4sI", align=4).pack
+    write_head = _idlc.layout(order, "4sI", align=4).pack
     write_rows = _idlc.rows_writer(order)
     listed = _idlc.listed
-    write_2 = _idlc.phases(order, "I")
-    write_3 = _idlc.text_phases(order, "I*", align=4)
-    write_4 = _idlc.Texts(order, "I*")
-    write_5 = _idlc.Texts(order, "BI*I", align=4)
-    write_6 = _idlc.phases(order, "d")
+    write_count_at = _idlc.phases(order, "I")
+    write_text_at = _idlc.text_phases(order, "I*", align=4)
+    write_text = _idlc.Texts(order, "I*")
+    write_text_2 = _idlc.Texts(order, "BI*I", align=4)
+    write_values_at = _idlc.phases(order, "d")
     new_texts = _idlc.maker(kind)
     new_pair = _idlc.maker(Pair)
     new_titled = _idlc.maker(Titled)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     strings = _idlc.strings_reader(order, reading.text)
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count_2 = _idlc.layout(order, "I").unpack_from
     text = reading.text
-    read_3 = _idlc.layout(order, "BI").unpack_from
-    read_4 = _idlc.layout(order, "d", start=4).unpack_from
+    read_values = _idlc.layout(order, "BI").unpack_from
+    read_values_2 = _idlc.layout(order, "d", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         pairs = message._pairs
         pairs_rows: list[str] = []
         if len(pairs):
             try:
-                for item in pairs:
-                    key = item._key
-                    value = item._value
+                for pairs_item in pairs:
+                    key = pairs_item._key
+                    value = pairs_item._value
                     pairs_rows += (
                         sized[len(key)],
                         key,
@@ -59,7 +59,11 @@ def texts_codec(
                     )
             except IndexError:
                 pairs_rows = unsized(
-                    [each for item in pairs for each in (item._key, item._value)],
+                    [
+                        each
+                        for pairs_item in pairs
+                        for each in (pairs_item._key, pairs_item._value)
+                    ],
                 )
         pairs_block = write_rows(pairs_rows)
         at = len(pairs_block) + 8
@@ -69,93 +73,106 @@ def texts_codec(
             raise ValueError("too many elements")
         at = (at + 3 & -4) + 4
         parts = [
-            write_1(encapsulation, len(pairs_rows) // 6),
+            write_head(encapsulation, len(pairs_rows) // 6),
             pairs_block,
-            write_2[low & 3].pack(len(few)),
+            write_count_at[low & 3].pack(len(few)),
         ]
         put = parts.append
         low = 0
-        for item_2 in few:
-            item_2_key = item_2._key.encode()
-            item_2_key_size = len(item_2_key)
-            put(write_3[low & 3][item_2_key_size](item_2_key_size + 1, item_2_key))
-            at = (at + 3 & -4) + item_2_key_size + 8 & -4
-            item_2_value = item_2._value.encode()
-            item_2_value_size = len(item_2_value)
-            put(write_4[item_2_value_size](item_2_value_size + 1, item_2_value))
-            at = at + item_2_value_size + 5
-            low = item_2_value_size + 1
+        for few_item in few:
+            few_item_key = few_item._key.encode()
+            few_item_key_size = len(few_item_key)
+            put(
+                write_text_at[low & 3][few_item_key_size](
+                    few_item_key_size + 1,
+                    few_item_key,
+                ),
+            )
+            at = (at + 3 & -4) + few_item_key_size + 8 & -4
+            few_item_value = few_item._value.encode()
+            few_item_value_size = len(few_item_value)
+            put(
+                write_text[few_item_value_size](
+                    few_item_value_size + 1,
+                    few_item_value,
+                ),
+            )
+            at = at + few_item_value_size + 5
+            low = few_item_value_size + 1
         titled = listed(message._titled)
         at = (at + 3 & -4) + 4
-        put(write_2[low & 3].pack(len(titled)))
-        for item_3 in titled:
-            title = item_3._title.encode()
+        put(write_count_at[low & 3].pack(len(titled)))
+        for titled_item in titled:
+            title = titled_item._title.encode()
             title_size = len(title)
-            item_3_pairs = item_3._pairs
-            item_3_pairs_rows: list[str] = []
-            if len(item_3_pairs):
+            titled_item_pairs = titled_item._pairs
+            titled_item_pairs_rows: list[str] = []
+            if len(titled_item_pairs):
                 try:
-                    for item_4 in item_3_pairs:
-                        item_4_key = item_4._key
-                        item_4_value = item_4._value
-                        item_3_pairs_rows += (
-                            sized[len(item_4_key)],
-                            item_4_key,
-                            ended[len(item_4_key)],
-                            sized[len(item_4_value)],
-                            item_4_value,
-                            ended[len(item_4_value)],
+                    for titled_item_pairs_item in titled_item_pairs:
+                        titled_item_pairs_item_key = titled_item_pairs_item._key
+                        titled_item_pairs_item_value = titled_item_pairs_item._value
+                        titled_item_pairs_rows += (
+                            sized[len(titled_item_pairs_item_key)],
+                            titled_item_pairs_item_key,
+                            ended[len(titled_item_pairs_item_key)],
+                            sized[len(titled_item_pairs_item_value)],
+                            titled_item_pairs_item_value,
+                            ended[len(titled_item_pairs_item_value)],
                         )
                 except IndexError:
-                    item_3_pairs_rows = unsized(
+                    titled_item_pairs_rows = unsized(
                         [
                             each_2
-                            for item_4 in item_3_pairs
-                            for each_2 in (item_4._key, item_4._value)
+                            for titled_item_pairs_item in titled_item_pairs
+                            for each_2 in (
+                                titled_item_pairs_item._key,
+                                titled_item_pairs_item._value,
+                            )
                         ],
                     )
             put(
-                write_5[title_size](
-                    item_3._level,
+                write_text_2[title_size](
+                    titled_item._level,
                     title_size + 1,
                     title,
-                    len(item_3_pairs_rows) // 6,
+                    len(titled_item_pairs_rows) // 6,
                 ),
             )
             at = (at + title_size + 12 & -4) + 4
-            item_3_pairs_block = write_rows(item_3_pairs_rows)
-            put(item_3_pairs_block)
-            at = at + len(item_3_pairs_block)
-            put(write_6[at & 7].pack(item_3._number))
+            titled_item_pairs_block = write_rows(titled_item_pairs_rows)
+            put(titled_item_pairs_block)
+            at = at + len(titled_item_pairs_block)
+            put(write_values_at[at & 7].pack(titled_item._number))
             at = (at + 3 & -8) + 12
         last = message._last.encode()
         last_size = len(last)
-        put(write_4[last_size](last_size + 1, last))
+        put(write_text[last_size](last_size + 1, last))
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
         message = new_texts()
-        (count,) = read_1(data, 4)
+        (count,) = read_count(data, 4)
         if 8 + 8 * count > limit:
             raise ValueError("too short")
         pairs = [new_pair() for _ in range(count)]
         message._pairs = pairs
         words, chars, to_str = strings(data, 8)
         end = 7
-        for item in pairs:
+        for pairs_item in pairs:
             at = end + 8 & -4
             end = at - 1 + words[at >> 2]
             if data[end]:
                 raise ValueError("text without end")
-            item._key = to_str(chars[at:end])
+            pairs_item._key = to_str(chars[at:end])
             at = end + 8 & -4
             end = at - 1 + words[at >> 2]
             if data[end]:
                 raise ValueError("text without end")
-            item._value = to_str(chars[at:end])
+            pairs_item._value = to_str(chars[at:end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count_2(data, at)
         if count > 2:
             raise ValueError("too many elements")
         if at + 4 + 8 * count > limit:
@@ -163,56 +180,56 @@ def texts_codec(
         few = [new_pair() for _ in range(count)]
         message._few = few
         end = at + 3
-        for item_2 in few:
+        for few_item in few:
             at = end + 4 & -4
-            (size,) = read_2(data, at)
+            (size,) = read_count_2(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
-            item_2._key = text(data[at + 4 : end])
+            few_item._key = text(data[at + 4 : end])
             at = end + 4 & -4
-            (size,) = read_2(data, at)
+            (size,) = read_count_2(data, at)
             end = at + 3 + size
             if data[end]:
                 raise ValueError("text without end")
-            item_2._value = text(data[at + 4 : end])
+            few_item._value = text(data[at + 4 : end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count_2(data, at)
         if at + 4 + 17 * count > limit:
             raise ValueError("too short")
         titled = [new_titled() for _ in range(count)]
         message._titled = titled
         at = at + 4
-        for item_3 in titled:
-            item_3._level, size = read_3(data, at)
+        for titled_item in titled:
+            titled_item._level, size = read_values(data, at)
             end = at + 7 + size
             if data[end]:
                 raise ValueError("text without end")
-            item_3._title = text(data[at + 8 : end])
+            titled_item._title = text(data[at + 8 : end])
             at = end + 4 & -4
-            (count,) = read_2(data, at)
+            (count,) = read_count_2(data, at)
             if at + 4 + 8 * count > limit:
                 raise ValueError("too short")
-            item_3_pairs = [new_pair() for _ in range(count)]
-            item_3._pairs = item_3_pairs
+            titled_item_pairs = [new_pair() for _ in range(count)]
+            titled_item._pairs = titled_item_pairs
             end = at + 3
-            for item_4 in item_3_pairs:
+            for titled_item_pairs_item in titled_item_pairs:
                 at = end + 4 & -4
-                (size,) = read_2(data, at)
+                (size,) = read_count_2(data, at)
                 end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._key = text(data[at + 4 : end])
+                titled_item_pairs_item._key = text(data[at + 4 : end])
                 at = end + 4 & -4
-                (size,) = read_2(data, at)
+                (size,) = read_count_2(data, at)
                 end = at + 3 + size
                 if data[end]:
                     raise ValueError("text without end")
-                item_4._value = text(data[at + 4 : end])
+                titled_item_pairs_item._value = text(data[at + 4 : end])
             at = (end + 4 & -8) + 4
-            (item_3._number,) = read_4(data, at)
+            (titled_item._number,) = read_values_2(data, at)
             at = at + 8
-        (size,) = read_2(data, at)
+        (size,) = read_count_2(data, at)
         end = at + 3 + size
         if data[end]:
             raise ValueError("text without end")

@@ -22,16 +22,16 @@ def titled_codec(
     sized = _idlc.sizes(order)
     ended = _idlc.ENDS
     unsized = _idlc.unsized
-    write_1 = _idlc.Texts(order, "4sBI*I", align=4)
+    write_head = _idlc.Texts(order, "4sBI*I", align=4)
     write_rows = _idlc.rows_writer(order)
-    write_2 = _idlc.phases(order, "d")
+    write_values_at = _idlc.phases(order, "d")
     new_titled = _idlc.maker(kind)
     new_pair = _idlc.maker(Pair)
-    read_1 = _idlc.layout(order, "BI", start=4).unpack_from
+    read_values = _idlc.layout(order, "BI", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     strings = _idlc.strings_reader(order, reading.text)
-    read_3 = _idlc.layout(order, "d", start=4).unpack_from
+    read_values_2 = _idlc.layout(order, "d", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         title = message._title.encode()
@@ -40,9 +40,9 @@ def titled_codec(
         pairs_rows: list[str] = []
         if len(pairs):
             try:
-                for item in pairs:
-                    key = item._key
-                    value = item._value
+                for pairs_item in pairs:
+                    key = pairs_item._key
+                    value = pairs_item._value
                     pairs_rows += (
                         sized[len(key)],
                         key,
@@ -53,13 +53,17 @@ def titled_codec(
                     )
             except IndexError:
                 pairs_rows = unsized(
-                    [each for item in pairs for each in (item._key, item._value)],
+                    [
+                        each
+                        for pairs_item in pairs
+                        for each in (pairs_item._key, pairs_item._value)
+                    ],
                 )
         at = (title_size + 16 & -4) + 4
         pairs_block = write_rows(pairs_rows)
         at = at + len(pairs_block)
         parts = [
-            write_1[title_size](
+            write_head[title_size](
                 encapsulation,
                 message._level,
                 title_size + 1,
@@ -67,39 +71,39 @@ def titled_codec(
                 len(pairs_rows) // 6,
             ),
             pairs_block,
-            write_2[at & 7].pack(message._number),
+            write_values_at[at & 7].pack(message._number),
         ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         limit = len(data)
         message = new_titled()
-        message._level, size = read_1(data, 4)
+        message._level, size = read_values(data, 4)
         end = 11 + size
         if data[end]:
             raise ValueError("text without end")
         message._title = text(data[12:end])
         at = end + 4 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         if at + 4 + 8 * count > limit:
             raise ValueError("too short")
         pairs = [new_pair() for _ in range(count)]
         message._pairs = pairs
         words, chars, to_str = strings(data, at + 4)
         end = at + 3
-        for item in pairs:
+        for pairs_item in pairs:
             at = end + 8 & -4
             end = at - 1 + words[at >> 2]
             if data[end]:
                 raise ValueError("text without end")
-            item._key = to_str(chars[at:end])
+            pairs_item._key = to_str(chars[at:end])
             at = end + 8 & -4
             end = at - 1 + words[at >> 2]
             if data[end]:
                 raise ValueError("text without end")
-            item._value = to_str(chars[at:end])
+            pairs_item._value = to_str(chars[at:end])
         at = (end + 4 & -8) + 4
-        (message._number,) = read_3(data, at)
+        (message._number,) = read_values_2(data, at)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -22,19 +22,19 @@ def any_codec(
         from geometry_msgs.msg import Point, Pose, Quaternion
 
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sddddddd").pack
+    write_head = _idlc.layout(order, "4sddddddd").pack
     new_any = _idlc.maker(kind)
     new_pose = _idlc.maker(Pose)
     new_point = _idlc.maker(Point)
     new_quaternion = _idlc.maker(Quaternion)
-    read_1 = _idlc.layout(order, "ddddddd", start=4).unpack_from
+    read_values = _idlc.layout(order, "ddddddd", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         pose = message._pose
         position = pose._position
         orientation = pose._orientation
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 position._x,
                 position._y,
@@ -63,7 +63,7 @@ def any_codec(
             orientation._y,
             orientation._z,
             orientation._w,
-        ) = read_1(data, 4)
+        ) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -17,17 +17,17 @@ def foo_bar_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads FooBar in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
+    write_head = _idlc.layout(order, "4si").pack
     new_foo_bar = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
+    read_values = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._a)]
+        parts = [write_head(encapsulation, message._a)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_foo_bar()
-        (message._a,) = read_1(data, 4)
+        (message._a,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

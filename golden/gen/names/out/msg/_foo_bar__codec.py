@@ -19,21 +19,21 @@ def foo_bar_codec(
     from ._foo_bar_2 import FooBar
 
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
+    write_head = _idlc.layout(order, "4si").pack
     new_foo_bar = _idlc.maker(kind)
     new_foo_bar_2 = _idlc.maker(FooBar)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
+    read_values = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         inner = message._inner
-        parts = [write_1(encapsulation, inner._a)]
+        parts = [write_head(encapsulation, inner._a)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_foo_bar()
         inner = new_foo_bar_2()
         message._inner = inner
-        (inner._a,) = read_1(data, 4)
+        (inner._a,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

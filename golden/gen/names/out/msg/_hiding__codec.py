@@ -20,18 +20,18 @@ def hiding_codec(
     from ._point import Point
 
     encapsulation = _idlc.HEADERS[order]
-    buffer_f = _idlc.sequence_writer(order, "f")
+    array_of_float32 = _idlc.sequence_writer(order, "f")
     array = _idlc.array_of(order)
-    write_1 = _idlc.layout(order, "4sddBI").pack
-    bytes_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_2 = _idlc.layout(order, "3i", align=4).pack
+    write_head = _idlc.layout(order, "4sddBI").pack
+    bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
+    write_values = _idlc.layout(order, "3i", align=4).pack
     write_to_dict = _idlc.text_block(order)
     new_hiding = _idlc.maker(kind)
     new_point = _idlc.maker(Point)
-    read_1 = _idlc.layout(order, "ddBI", start=4).unpack_from
-    numbers_f = _idlc.sequence_reader(order, "f", reading)
-    array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_2 = _idlc.layout(order, "3iI").unpack_from
+    read_values = _idlc.layout(order, "ddBI", start=4).unpack_from
+    read_float32 = _idlc.sequence_reader(order, "f", reading)
+    array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
+    read_values_2 = _idlc.layout(order, "3iI").unpack_from
     text = reading.text
     read_to_dict = _idlc.texts_reader(order, text)
     small = reading.small
@@ -40,11 +40,11 @@ def hiding_codec(
         validate = message._validate
         deserialize = message._deserialize
         if type(deserialize) is not array:
-            deserialize = buffer_f(deserialize)
+            deserialize = array_of_float32(deserialize)
         deserialize_count = len(deserialize)
         to_dict = write_to_dict(message._to_dict)
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 validate._x,
                 validate._y,
@@ -52,7 +52,7 @@ def hiding_codec(
                 deserialize_count,
             ),
             deserialize,
-            write_2(bytes_int32_3(message._from_dict)),
+            write_values(bytes_of_int32_3(message._from_dict)),
             to_dict,
         ]
         raw = join(parts)
@@ -66,11 +66,11 @@ def hiding_codec(
         message = new_hiding()
         validate = new_point()
         message._validate = validate
-        validate._x, validate._y, message._serialize, count = read_1(data, 4)
+        validate._x, validate._y, message._serialize, count = read_values(data, 4)
         end = 28 + 4 * count
-        message._deserialize = numbers_f(view[28:end])
-        from_dict, count = read_2(data, end)
-        message._from_dict = array_int32_3(from_dict)
+        message._deserialize = read_float32(view[28:end])
+        from_dict, count = read_values_2(data, end)
+        message._from_dict = array_of_int32_3(from_dict)
         message._to_dict, end = read_to_dict(data, end + 16, count)
         return message
 

@@ -21,24 +21,24 @@ def odd_codec(
 
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.Texts(order, "4siiiiiI*c?f", align=4)
+    write_head = _idlc.Texts(order, "4siiiiiI*c?f", align=4)
     write_str_2 = _idlc.text_block(order)
     listed = _idlc.listed
-    write_2 = _idlc.phases(order, "iiiI")
-    write_3 = _idlc.layout(order, "dd", start=4).pack
+    write_values_at = _idlc.phases(order, "iiiI")
+    write_values = _idlc.layout(order, "dd", start=4).pack
     pad8 = _idlc.PAD8
-    bytes_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_4 = _idlc.phases(order, "dd3i")
+    bytes_of_int32_3 = _arrays.array_writer(order, "int32", 3)
+    write_values_at_2 = _idlc.phases(order, "dd3i")
     new_odd = _idlc.maker(kind)
     new_point = _idlc.maker(Point)
-    read_1 = _idlc.layout(order, "iiiiiI", start=4).unpack_from
+    read_values = _idlc.layout(order, "iiiiiI", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.phases(order, "c?fI")
+    read_values_at = _idlc.phases(order, "c?fI")
     read_str_2 = _idlc.texts_reader(order, text)
-    read_3 = _idlc.layout(order, "iiiI").unpack_from
-    rows_1 = _idlc.layout(order, "dd", start=4).iter_unpack
-    array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_4 = _idlc.layout(order, "dd3i", start=4).unpack_from
+    read_values_2 = _idlc.layout(order, "iiiI").unpack_from
+    read_rows = _idlc.layout(order, "dd", start=4).iter_unpack
+    array_of_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
+    read_values_3 = _idlc.layout(order, "dd3i", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         list_2 = message._list.encode()
@@ -49,9 +49,11 @@ def odd_codec(
         low = len(str_2)
         item = listed(message._item)
         at = (at + 3 & -4) + 16
-        item_block = b"".join([write_3(item_2._x, item_2._y) for item_2 in item])
+        item_block = b"".join(
+            [write_values(item_item._x, item_item._y) for item_item in item],
+        )
         parts = [
-            write_1[list_2_size](
+            write_head[list_2_size](
                 encapsulation,
                 message._class,
                 message._serialize,
@@ -65,7 +67,7 @@ def odd_codec(
                 message._float,
             ),
             str_2,
-            write_2[low & 3].pack(
+            write_values_at[low & 3].pack(
                 message._message,
                 message._data,
                 message._at,
@@ -78,7 +80,13 @@ def odd_codec(
         if item:
             at = (at + 3 & -8) + 4 + 16 * len(item)
         array = message._array
-        put(write_4[at & 7].pack(array._x, array._y, bytes_int32_3(message._order)))
+        put(
+            write_values_at_2[at & 7].pack(
+                array._x,
+                array._y,
+                bytes_of_int32_3(message._order),
+            ),
+        )
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
@@ -90,12 +98,12 @@ def odd_codec(
             message._fields_and_field_types_,
             message._int,
             size,
-        ) = read_1(data, 4)
+        ) = read_values(data, 4)
         end = 27 + size
         if data[end]:
             raise ValueError("text without end")
         message._list = text(data[28:end])
-        struct = read_2[end + 1 & 7]
+        struct = read_values_at[end + 1 & 7]
         (
             message._bytes,
             message._bool,
@@ -105,22 +113,22 @@ def odd_codec(
         at = end + 1 + struct.size
         message._str, end = read_str_2(data, at, count)
         at = end + 3 & -4
-        message._message, message._data, message._at, count = read_3(data, at)
+        message._message, message._data, message._at, count = read_values_2(data, at)
         item: list[_idlc.Any] = []
         message._item = item
         at = at + 16
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        for item_2_values in rows_1(data[at:end]):
-            item_2 = new_point()
-            item.append(item_2)
-            item_2._x, item_2._y = item_2_values
+        for item_item_values in read_rows(data[at:end]):
+            item_item = new_point()
+            item.append(item_item)
+            item_item._x, item_item._y = item_item_values
         array = new_point()
         message._array = array
         at = (end + 3 & -8) + 4
-        array._x, array._y, order_2 = read_4(data, at)
-        message._order = array_int32_3(order_2)
+        array._x, array._y, order_2 = read_values_3(data, at)
+        message._order = array_of_int32_3(order_2)
         return message
 
     return _idlc.Codec(encode, decode)

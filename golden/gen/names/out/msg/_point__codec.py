@@ -17,17 +17,17 @@ def point_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads Point in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sdd").pack
+    write_head = _idlc.layout(order, "4sdd").pack
     new_point = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "dd", start=4).unpack_from
+    read_values = _idlc.layout(order, "dd", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._x, message._y)]
+        parts = [write_head(encapsulation, message._x, message._y)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_point()
-        message._x, message._y = read_1(data, 4)
+        message._x, message._y = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -27,8 +27,8 @@ def text_codec(
 
     encapsulation = _idlc.HEADERS[order]
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sdddddI").pack
-    write_2 = _idlc.layout(order, "ddddddd", start=4).pack
+    write_head = _idlc.layout(order, "4sdddddI").pack
+    write_values = _idlc.layout(order, "ddddddd", start=4).pack
     pad8 = _idlc.PAD8
     new_text = _idlc.maker(kind)
     new_point = _idlc.maker(geometry_msgs_Point)
@@ -36,8 +36,8 @@ def text_codec(
     new_any = _idlc.maker(Any)
     new_pose = _idlc.maker(Pose)
     new_quaternion = _idlc.maker(Quaternion)
-    read_1 = _idlc.layout(order, "dddddI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "ddddddd", start=4).iter_unpack
+    read_values = _idlc.layout(order, "dddddI", start=4).unpack_from
+    read_rows = _idlc.layout(order, "ddddddd", start=4).iter_unpack
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         other = message._other
@@ -47,20 +47,20 @@ def text_codec(
             raise ValueError("too many elements")
         any_2_block = b"".join(
             [
-                write_2(
-                    item._pose._position._x,
-                    item._pose._position._y,
-                    item._pose._position._z,
-                    item._pose._orientation._x,
-                    item._pose._orientation._y,
-                    item._pose._orientation._z,
-                    item._pose._orientation._w,
+                write_values(
+                    any_2_item._pose._position._x,
+                    any_2_item._pose._position._y,
+                    any_2_item._pose._position._z,
+                    any_2_item._pose._orientation._x,
+                    any_2_item._pose._orientation._y,
+                    any_2_item._pose._orientation._z,
+                    any_2_item._pose._orientation._w,
                 )
-                for item in any_2
+                for any_2_item in any_2
             ],
         )
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 other._x,
                 other._y,
@@ -81,7 +81,7 @@ def text_codec(
         message._other = other
         own = new_point_2()
         message._own = own
-        other._x, other._y, other._z, own._x, own._y, count = read_1(data, 4)
+        other._x, other._y, other._z, own._x, own._y, count = read_values(data, 4)
         if count > 2:
             raise ValueError("too many elements")
         any_2: list[_idlc.Any] = []
@@ -90,11 +90,11 @@ def text_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 56 * count
-        for item_values in rows_1(data[at:end]):
-            item = new_any()
-            any_2.append(item)
+        for any_2_item_values in read_rows(data[at:end]):
+            any_2_item = new_any()
+            any_2.append(any_2_item)
             pose = new_pose()
-            item._pose = pose
+            any_2_item._pose = pose
             position = new_point()
             pose._position = position
             orientation = new_quaternion()
@@ -107,7 +107,7 @@ def text_codec(
                 orientation._y,
                 orientation._z,
                 orientation._w,
-            ) = item_values
+            ) = any_2_item_values
         if end > limit:
             raise ValueError("too short")
         return message

@@ -17,17 +17,17 @@ def none_request_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads None_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sx").pack
+    write_head = _idlc.layout(order, "4sx").pack
     new_none_request = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "x", start=4).unpack_from
+    read_values = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation)]
+        parts = [write_head(encapsulation)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_none_request()
-        read_1(data, 4)
+        read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -40,17 +40,17 @@ def none_response_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads None_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sx").pack
+    write_head = _idlc.layout(order, "4sx").pack
     new_none_response = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "x", start=4).unpack_from
+    read_values = _idlc.layout(order, "x", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation)]
+        parts = [write_head(encapsulation)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_none_response()
-        read_1(data, 4)
+        read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -26,20 +26,20 @@ def none_event_codec(
         from service_msgs.msg import ServiceEventInfo
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.layout(order, "x", start=4).pack
-    write_3 = _idlc.phases(order, "I")
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_values = _idlc.layout(order, "x", start=4).pack
+    write_count_at = _idlc.phases(order, "I")
     new_none_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_none_request = _idlc.maker(None_Request)
     new_none_response = _idlc.maker(None_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
-    read_2 = _idlc.layout(order, "I").unpack_from
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_rows = _idlc.layout(order, "x", start=4).iter_unpack
+    read_count = _idlc.layout(order, "I").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -47,24 +47,24 @@ def none_event_codec(
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join([write_2() for item in request])
+        request_block = b"".join([write_values() for request_item in request])
         low = len(request)
         response = listed(message._response)
         if len(response) > 1:
             raise ValueError("too many elements")
-        response_block = b"".join([write_2() for item_2 in response])
+        response_block = b"".join([write_values() for response_item in response])
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
             request_block,
-            write_3[low & 3].pack(len(response)),
+            write_count_at[low & 3].pack(len(response)),
             response_block,
         ]
         return join(parts)
@@ -83,26 +83,26 @@ def none_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[_idlc.Any] = []
         message._request = request
         end = 48 + count
-        for _ in rows_1(data[48:end]):
-            item = new_none_request()
-            request.append(item)
+        for _ in read_rows(data[48:end]):
+            request_item = new_none_request()
+            request.append(request_item)
         at = end + 3 & -4
-        (count,) = read_2(data, at)
+        (count,) = read_count(data, at)
         if count > 1:
             raise ValueError("too many elements")
         response: list[_idlc.Any] = []
         message._response = response
         end = at + 4 + count
-        for _ in rows_1(data[at + 4 : end]):
-            item_2 = new_none_response()
-            response.append(item_2)
+        for _ in read_rows(data[at + 4 : end]):
+            response_item = new_none_response()
+            response.append(response_item)
         if end > limit:
             raise ValueError("too short")
         return message

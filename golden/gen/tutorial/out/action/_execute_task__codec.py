@@ -17,20 +17,22 @@ def execute_task_goal_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Goal in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*")
+    write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_goal = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
-        parts = [write_1[task_name_size](encapsulation, task_name_size + 1, task_name)]
+        parts = [
+            write_head[task_name_size](encapsulation, task_name_size + 1, task_name),
+        ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_goal()
-        (size,) = read_1(data, 4)
+        (size,) = read_count(data, 4)
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")
@@ -48,17 +50,17 @@ def execute_task_result_codec(
     """Return what writes and reads ExecuteTask_Result in one byte order."""
     encapsulation = _idlc.HEADERS[order]
     truths = _idlc.TRUTHS
-    write_1 = _idlc.layout(order, "4s?").pack
+    write_head = _idlc.layout(order, "4s?").pack
     new_execute_task_result = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "?", start=4).unpack_from
+    read_values = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, truths[message._success])]
+        parts = [write_head(encapsulation, truths[message._success])]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_result()
-        (message._success,) = read_1(data, 4)
+        (message._success,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -71,16 +73,16 @@ def execute_task_feedback_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads ExecuteTask_Feedback in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*")
+    write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_feedback = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         current_status = message._current_status.encode()
         current_status_size = len(current_status)
         parts = [
-            write_1[current_status_size](
+            write_head[current_status_size](
                 encapsulation,
                 current_status_size + 1,
                 current_status,
@@ -90,7 +92,7 @@ def execute_task_feedback_codec(
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_execute_task_feedback()
-        (size,) = read_1(data, 4)
+        (size,) = read_count(data, 4)
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")

@@ -17,12 +17,12 @@ def robot_command_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads RobotCommand in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*ff", align=4)
-    write_2 = _idlc.Texts(order, "I*")
+    write_head = _idlc.Texts(order, "4sI*ff", align=4)
+    write_text = _idlc.Texts(order, "I*")
     new_robot_command = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I", start=4).unpack_from
     text = reading.text
-    read_2 = _idlc.layout(order, "ffI").unpack_from
+    read_values = _idlc.layout(order, "ffI").unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         command_type = message._command_type.encode()
@@ -30,26 +30,30 @@ def robot_command_codec(
         frame_id = message._frame_id.encode()
         frame_id_size = len(frame_id)
         parts = [
-            write_1[command_type_size](
+            write_head[command_type_size](
                 encapsulation,
                 command_type_size + 1,
                 command_type,
                 message._linear_velocity_x,
                 message._angular_velocity_z,
             ),
-            write_2[frame_id_size](frame_id_size + 1, frame_id),
+            write_text[frame_id_size](frame_id_size + 1, frame_id),
         ]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_robot_command()
-        (size,) = read_1(data, 4)
+        (size,) = read_count(data, 4)
         end = 7 + size
         if data[end]:
             raise ValueError("text without end")
         message._command_type = text(data[8:end])
         at = end + 4 & -4
-        message._linear_velocity_x, message._angular_velocity_z, size = read_2(data, at)
+        (
+            message._linear_velocity_x,
+            message._angular_velocity_z,
+            size,
+        ) = read_values(data, at)
         end = at + 11 + size
         if data[end]:
             raise ValueError("text without end")

@@ -17,17 +17,17 @@ def add_two_ints_request_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Request in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sqq").pack
+    write_head = _idlc.layout(order, "4sqq").pack
     new_add_two_ints_request = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "qq", start=4).unpack_from
+    read_values = _idlc.layout(order, "qq", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._a, message._b)]
+        parts = [write_head(encapsulation, message._a, message._b)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_add_two_ints_request()
-        message._a, message._b = read_1(data, 4)
+        message._a, message._b = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -40,17 +40,17 @@ def add_two_ints_response_codec(
 ) -> _idlc.Codec:
     """Return what writes and reads AddTwoInts_Response in one byte order."""
     encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sq").pack
+    write_head = _idlc.layout(order, "4sq").pack
     new_add_two_ints_response = _idlc.maker(kind)
-    read_1 = _idlc.layout(order, "q", start=4).unpack_from
+    read_values = _idlc.layout(order, "q", start=4).unpack_from
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._sum)]
+        parts = [write_head(encapsulation, message._sum)]
         return join(parts)
 
     def decode(data: _idlc.Any) -> _idlc.Any:
         message = new_add_two_ints_response()
-        (message._sum,) = read_1(data, 4)
+        (message._sum,) = read_values(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)

@@ -26,23 +26,23 @@ def add_two_ints_event_codec(
         from service_msgs.msg import ServiceEventInfo
 
     encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_16 = _arrays.array_writer(order, "uint8", 16)
+    bytes_of_uint8_16 = _arrays.array_writer(order, "uint8", 16)
     listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sBiI16BqI").pack
-    write_2 = _idlc.layout(order, "qq", start=4).pack
+    write_head = _idlc.layout(order, "4sBiI16BqI").pack
+    write_values = _idlc.layout(order, "qq", start=4).pack
     pad8 = _idlc.PAD8
-    write_3 = _idlc.layout(order, "I").pack
-    write_4 = _idlc.layout(order, "q", start=4).pack
+    write_count = _idlc.layout(order, "I").pack
+    write_values_2 = _idlc.layout(order, "q", start=4).pack
     new_add_two_ints_event = _idlc.maker(kind)
     new_service_event_info = _idlc.maker(ServiceEventInfo)
     new_time = _idlc.maker(Time)
     new_add_two_ints_request = _idlc.maker(AddTwoInts_Request)
     new_add_two_ints_response = _idlc.maker(AddTwoInts_Response)
-    array_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_1 = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "qq", start=4).iter_unpack
-    read_2 = _idlc.layout(order, "I").unpack_from
-    rows_2 = _idlc.layout(order, "q", start=4).iter_unpack
+    array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
+    read_values = _idlc.layout(order, "BiI16BqI", start=4).unpack_from
+    read_rows = _idlc.layout(order, "qq", start=4).iter_unpack
+    read_count = _idlc.layout(order, "I").unpack_from
+    read_rows_2 = _idlc.layout(order, "q", start=4).iter_unpack
 
     def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
         info = message._info
@@ -50,7 +50,12 @@ def add_two_ints_event_codec(
         request = listed(message._request)
         if len(request) > 1:
             raise ValueError("too many elements")
-        request_block = b"".join([write_2(item._a, item._b) for item in request])
+        request_block = b"".join(
+            [
+                write_values(request_item._a, request_item._b)
+                for request_item in request
+            ],
+        )
         at = 48
         if request:
             at = (at + 3 & -8) + 4 + 16 * len(request)
@@ -58,20 +63,22 @@ def add_two_ints_event_codec(
         if len(response) > 1:
             raise ValueError("too many elements")
         at = at + 4
-        response_block = b"".join([write_4(item_2._sum) for item_2 in response])
+        response_block = b"".join(
+            [write_values_2(response_item._sum) for response_item in response],
+        )
         parts = [
-            write_1(
+            write_head(
                 encapsulation,
                 info._event_type,
                 stamp._sec,
                 stamp._nanosec,
-                bytes_uint8_16(info._client_gid),
+                bytes_of_uint8_16(info._client_gid),
                 info._sequence_number,
                 len(request),
             ),
             pad8[0] if request else b"",
             request_block,
-            write_3(len(response)),
+            write_count(len(response)),
             pad8[at & 7] if response else b"",
             response_block,
         ]
@@ -91,8 +98,8 @@ def add_two_ints_event_codec(
             client_gid,
             info._sequence_number,
             count,
-        ) = read_1(data, 4)
-        info._client_gid = array_uint8_16(client_gid)
+        ) = read_values(data, 4)
+        info._client_gid = array_of_uint8_16(client_gid)
         if count > 1:
             raise ValueError("too many elements")
         request: list[_idlc.Any] = []
@@ -101,11 +108,11 @@ def add_two_ints_event_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 16 * count
-        for item_values in rows_1(data[at:end]):
-            item = new_add_two_ints_request()
-            request.append(item)
-            item._a, item._b = item_values
-        (count,) = read_2(data, end)
+        for request_item_values in read_rows(data[at:end]):
+            request_item = new_add_two_ints_request()
+            request.append(request_item)
+            request_item._a, request_item._b = request_item_values
+        (count,) = read_count(data, end)
         if count > 1:
             raise ValueError("too many elements")
         response: list[_idlc.Any] = []
@@ -114,10 +121,10 @@ def add_two_ints_event_codec(
         if count:
             at = (at + 3 & -8) + 4
         end = at + 8 * count
-        for item_2_values in rows_2(data[at:end]):
-            item_2 = new_add_two_ints_response()
-            response.append(item_2)
-            (item_2._sum,) = item_2_values
+        for response_item_values in read_rows_2(data[at:end]):
+            response_item = new_add_two_ints_response()
+            response.append(response_item)
+            (response_item._sum,) = response_item_values
         if end > limit:
             raise ValueError("too short")
         return message
