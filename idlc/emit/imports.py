@@ -1,11 +1,11 @@
-"""Import statements, sorted and broken as linters and formatters want them."""
+"""Import statements, sorted as linters want them."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection
 
-from idlc.emit.python_lines import WIDTH
+from idlc.emit import python_lines
 
 
 def natural(name: str) -> list[tuple[int, str]]:
@@ -19,17 +19,9 @@ def _order(name: str) -> tuple[bool, list[tuple[int, str]]]:
     return not is_constant, natural(name)
 
 
-def import_from(module: str, names: Collection[str], indent: int = 0) -> list[str]:
+def statements(module: str, names: Collection[str], indent: int = 0) -> list[str]:
     """Return the lines that import names from a module; `X as Y` has a statement of its own."""
     statements = [(name,) for name in names if " as " in name]
     plain = sorted((name for name in names if " as " not in name), key=_order)
-    margin, head = " " * indent, f"from {module} import "
-    result = []
-    for one in sorted([*statements, *([tuple(plain)] if plain else [])]):
-        line = f"{margin}{head}{', '.join(one)}"
-        if len(line) <= WIDTH or " as " in line:
-            result.append(line)
-        else:
-            items = [f"{margin}    {name}," for name in one]
-            result += [f"{margin}{head}(", *items, f"{margin})"]
-    return result
+    ordered = sorted([*statements, *([tuple(plain)] if plain else [])])
+    return [line for one in ordered for line in python_lines.import_from(module, one, indent)]

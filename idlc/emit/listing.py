@@ -6,8 +6,7 @@ from collections import defaultdict
 
 import msgspec
 
-from idlc.emit import pynames
-from idlc.emit.imports import import_from, natural
+from idlc.emit import imports, pynames
 from idlc.emit.references import Homes
 from idlc.model import derive, ir, link
 
@@ -57,8 +56,8 @@ def package(model: link.Model, kind: ir.Kind, modules: pynames.Modules) -> Packa
         title=f"{TITLES[kind]} of {model.package}, imported when they are asked for.",
         imports=tuple(
             line
-            for module in sorted(by_module, key=natural)
-            for line in import_from(f".{module}", by_module[module], 4)
+            for module in sorted(by_module, key=imports.natural)
+            for line in imports.statements(f".{module}", by_module[module], 4)
         ),
-        names=tuple(NameView(name, found[name]) for name in sorted(found, key=natural)),
+        names=tuple(NameView(name, found[name]) for name in sorted(found, key=imports.natural)),
     )

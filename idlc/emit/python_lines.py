@@ -12,6 +12,7 @@ from typing import TypeAlias
 
 import msgspec
 
+#: Columns in generated packages; who writes other files gives another width.
 WIDTH = 88
 
 
@@ -65,32 +66,45 @@ def flat(node: Node) -> str:
     return node if isinstance(node, str) else node.flat()
 
 
-def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
+def lines(node: Node, indent: int, before: str = "", after: str = "", width: int = 0) -> list[str]:
     """Return `before`, the node and `after` as lines, indented by `indent` columns."""
     margin = " " * indent
+    width = width or WIDTH
     if isinstance(node, str):
         return [f"{margin}{before}{node}{after}"]
     one = f"{margin}{before}{node.flat()}{after}"
-    if len(one) <= WIDTH:
+    if len(one) <= width:
         return [one]
     if isinstance(node, Comprehension):
         body = [f"{margin}    {node.flat()[1:-1]}"]
-        if len(body[0]) > WIDTH:
-            body = lines(node.element, indent + 4)
+        if len(body[0]) > width:
+            body = lines(node.element, indent + 4, width=width)
             for targets, values in node.loops:
-                body += lines(values, indent + 4, f"for {targets} in ")
+                body += lines(values, indent + 4, f"for {targets} in ", width=width)
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
-    return _broken(node, indent, before, f"{node.after}{after}")
+    return _broken(node, indent, before, f"{node.after}{after}", width)
 
 
-def _broken(group: Group, indent: int, before: str = "", after: str = "") -> list[str]:
+def _broken(
+    group: Group, indent: int, before: str = "", after: str = "", width: int = 0
+) -> list[str]:
     """Return a group with each item on a line of its own; a comma follows each."""
     margin = " " * indent
     result = [f"{margin}{before}{group.before}{group.brackets[0]}"]
     for item in group.items:
-        result += lines(item, indent + 4, "", ",")
+        result += lines(item, indent + 4, "", ",", width)
     result.append(f"{margin}{group.brackets[1]}{after}")
     return result
+
+
+def import_from(module: str, names: Sequence[str], indent: int = 0, width: int = 0) -> list[str]:
+    """Return the lines of an import statement."""
+    margin = " " * indent
+    one = f"{margin}from {module} import {', '.join(names)}"
+    if len(one) <= (width or WIDTH) or " as " in one:
+        return [one]
+    items = [f"{margin}    {name}," for name in names]
+    return [f"{margin}from {module} import (", *items, f"{margin})"]
 
 
 def all_of(conditions: Sequence[str], indent: int) -> list[str]:

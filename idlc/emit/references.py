@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from idlc.emit import pynames
 from idlc.emit.codec import wire_plan
-from idlc.emit.imports import import_from
+from idlc.emit.imports import statements
 from idlc.model import derive, ir
 
 
@@ -104,12 +104,12 @@ class References:
             [
                 line
                 for (_, module), names in sorted(inside.items())
-                for line in import_from(module, names, indent)
+                for line in statements(module, names, indent)
             ],
             [
                 line
                 for module, names in sorted(outside.items())
-                for line in import_from(module, names, indent + 4)
+                for line in statements(module, names, indent + 4)
             ],
         )
 
