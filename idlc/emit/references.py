@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 from collections import defaultdict
 from collections.abc import Iterable
 
@@ -31,8 +32,8 @@ class Homes:
 class References:
     """The names of all classes that a module mentions.
 
-    `own` are the structures that it defines. `direct` are those that their fields name and that
-    are imported with the module. `implied` are other packages' types of fields that ROS 2 adds,
+    `own` are the structures that it defines, `others` those of other packages that their fields
+    name. `direct` are imported with the module; `implied` are others of fields that ROS 2 adds,
     imported when they are used, so that each part of a protocol needs only what it holds.
     """
 
@@ -48,8 +49,8 @@ class References:
         self.kind = interface.name.kind
         self.own = {message.name for message in structures}
         named = {name for message in structures for name in message.references} - self.own
-        others = {name for name in named if name.package != self.package}
-        self.implied = others if self.own & homes.derived else set()
+        self.others = {name for name in named if name.package != self.package}
+        self.implied = self.others if self.own & homes.derived else set()
         self.direct = named - self.implied
         groups = {interface.name, *(service.name for service in derive.services(interface))}
         self._names = self._named(self.own | groups, _closure(self.own, messages))
@@ -57,15 +58,18 @@ class References:
     def _named(
         self, own: set[ir.TypeName], others: set[ir.TypeName]
     ) -> dict[ir.TypeName, pynames.ClassName]:
-        """Return each structure's class; those that the module defines keep their plain name."""
+        """Return each structure's class; those that the module defines keep their plain name.
+
+        Others get another one if something else has it: an exception of Python, for example.
+        """
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
         for name in own | others:
             by_class[pynames.class_(name)].append(name)
         return {
             name: pynames.class_(name)
-            if name in own or len(same) == 1
+            if name in own or (len(same) == 1 and not hasattr(builtins, class_))
             else pynames.qualified_class(name)
-            for same in by_class.values()
+            for class_, same in by_class.items()
             for name in same
         }
 

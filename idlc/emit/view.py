@@ -7,6 +7,7 @@ names through `pynames`.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import msgspec
 
@@ -19,10 +20,9 @@ from idlc.model import derive, ir
 
 
 class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
-    """A module of classes or of codecs; `imports` are the lines after those that all have.
+    """A module of classes or of codecs; `imports` are lines.
 
-    `protocol` is the module of what ROS 2 adds to the services and the action. `implements` is
-    the action of which the module is that.
+    `protocol` is the module of what ROS 2 adds to the service or action.
     """
 
     template: str
@@ -45,80 +45,69 @@ PRAGMAS = (
 HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
 
 
+class _Part(NamedTuple):
+    """What one module of classes defines of an interface."""
+
+    interface: ir.Interface
+    structures: tuple[ir.Message, ...]
+    references: References
+    module: pynames.ModuleName
+    is_added: bool
+
+
 def modules(
     interface: ir.Interface, messages: wire_plan.Messages, names: pynames.Modules
 ) -> Iterator[ModuleView]:
     """Yield the views of an interface's modules; `names` has the modules of all its package."""
+    homes = Homes(interface, names)
     written = derive.sections(interface)
     added = derive.messages(interface)[len(written) :]
-    homes = Homes(interface, names)
-    for structures in (written, added):
+    for structures, module in ((written, homes.classes), (added, homes.protocol)):
         if structures:
             references = References(interface, structures, messages, homes)
-            is_added = structures is added
-            yield _classes(interface, structures, references, homes, is_added=is_added)
-            yield _codecs(interface, structures, references, messages, homes, is_added=is_added)
+            part = _Part(interface, structures, references, module, structures is added)
+            yield _classes(part, homes)
+            yield _codecs(part, messages)
 
 
-def _classes(
-    interface: ir.Interface,
-    structures: tuple[ir.Message, ...],
-    references: References,
-    homes: Homes,
-    *,
-    is_added: bool,
-) -> ModuleView:
+def _classes(part: _Part, homes: Homes) -> ModuleView:
+    interface, references = part.interface, part.references
     name = interface.name
     purposes = documentation.purposes(interface)
-    action = classes.action(interface) if isinstance(interface, ir.Action) else None
-    has_services = is_added == isinstance(interface, ir.Action)
-    title = f"What ROS 2 adds to {name}." if is_added else f"The classes of {name}."
+    is_action = isinstance(interface, ir.Action)
     return ModuleView(
-        template="protocol" if is_added else name.kind,
-        path=f"{name.kind}/{homes.protocol if is_added else homes.classes}.py",
+        template="protocol" if part.is_added else name.kind,
+        path=f"{name.kind}/{part.module}.py",
         origin=f"{name}.{name.kind}",
         pragmas=(
-            *(PRAGMAS if _has_others(references, references.direct | references.implied) else ()),
-            *(HIDING_PRAGMAS if any(map(_hides_methods, structures)) else ()),
+            *(PRAGMAS if references.others else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
         ),
-        title=title,
-        imports=tuple(_imports(references, structures)),
-        messages=tuple(classes.message(one, references, purposes) for one in structures),
-        services=classes.services(interface, purposes) if has_services else (),
-        action=action,
+        title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
+        imports=tuple(_imports(references, part.structures)),
+        messages=tuple(classes.message(one, references, purposes) for one in part.structures),
+        # a service's own class is its author's; those of an action's services are not
+        services=classes.services(interface, purposes) if part.is_added == is_action else (),
+        action=classes.action(interface) if isinstance(interface, ir.Action) else None,
         protocol=homes.protocol,
     )
 
 
-def _codecs(
-    interface: ir.Interface,
-    structures: tuple[ir.Message, ...],
-    references: References,
-    messages: wire_plan.Messages,
-    homes: Homes,
-    *,
-    is_added: bool,
-) -> ModuleView:
-    name = interface.name
-    module = pynames.codec_module(homes.protocol if is_added else homes.classes)
-    codecs = tuple(codec(structure, references, messages) for structure in structures)
-    what = f"what ROS 2 adds to {name}" if is_added else str(name)
+def _codecs(part: _Part, messages: wire_plan.Messages) -> ModuleView:
+    name = part.interface.name
+    codecs = tuple(codec(one, part.references, messages) for one in part.structures)
     return ModuleView(
         template="codec",
-        path=f"{name.kind}/{module}.py",
+        path=f"{name.kind}/{pynames.codec_module(part.module)}.py",
         origin=f"{name}.{name.kind}",
         pragmas=PRAGMAS if any(one.outside for one in codecs) else (),
-        title=f"The codecs of {what}.",
+        title=f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}.",
         codecs=codecs,
     )
 
 
 def _hides_methods(structure: ir.Message) -> bool:
     return any(pynames.hides_method(field.name) for field in structure.fields)
-
-
-def _has_others(references: References, types: set[ir.TypeName]) -> bool:
-    return any(name.package != references.package for name in types)
 
 
 def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
