@@ -17,7 +17,8 @@ from idlc.model import derive, ir
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     """A message class.
 
-    `receiver` and `options` are what its methods call `self` and further keywords. `guard` is
+    `receiver`, `options`, `boolean` and `not_implemented` are what its methods call `self`, further
+    keywords and what Python has by these names, which names of the interface may hide. `guard` is
     the statement that says whether the constructor was given something unusual.
     """
 
@@ -31,6 +32,7 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     options: str
     guard: str
     boolean: str
+    not_implemented: str
 
 
 class GroupView(msgspec.Struct, frozen=True):
@@ -62,6 +64,7 @@ def message(structure: ir.Message, references: References, purposes: Purposes) -
         options=naming.options,
         guard="\n".join(one_or_all(naming.options, doubt, 8, "_unusual = ")).lstrip(),
         boolean=f"{naming.builtins}bool",
+        not_implemented=naming.not_implemented,
     )
 
 

@@ -40,6 +40,7 @@ class Naming(msgspec.Struct, frozen=True):
     receiver: str
     options: str
     builtins: str
+    not_implemented: str
     has_type: bool
 
     @classmethod
@@ -50,6 +51,11 @@ class Naming(msgspec.Struct, frozen=True):
             receiver="_self" if "self" in names else "self",
             options="_options" if "options" in names else "options",
             builtins="_builtins." if shadows(structure) else "",
+            not_implemented=(
+                "_builtins.NotImplemented"
+                if _hides_not_implemented(structure)
+                else "NotImplemented"  # as type checkers know it
+            ),
             has_type="type" in names,
         )
 
@@ -59,8 +65,13 @@ class Naming(msgspec.Struct, frozen=True):
 
 
 def shadows(structure: ir.Message) -> bool:
-    """Whether a field has the name of a type that annotations need."""
-    return any(pynames.field(field.name) in BUILTINS for field in structure.fields)
+    """Whether the class needs a builtin whose name a field has, or the interface."""
+    hidden = any(pynames.field(field.name) in BUILTINS for field in structure.fields)
+    return hidden or _hides_not_implemented(structure)
+
+
+def _hides_not_implemented(structure: ir.Message) -> bool:
+    return structure.name.name.partition("_")[0] == "NotImplemented"
 
 
 def support(type_: ir.FieldType) -> str:
