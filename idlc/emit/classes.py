@@ -9,7 +9,7 @@ import msgspec
 from idlc.emit import documentation, fields, literals, pynames
 from idlc.emit.equality import Equality, equality
 from idlc.emit.fields import FieldView, Naming
-from idlc.emit.python_lines import assign, lines, one_or_all, tuple_of
+from idlc.emit.python_lines import assign, if_one_or_all, lines, tuple_of
 from idlc.emit.references import References
 from idlc.model import derive, ir
 
@@ -19,7 +19,7 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
 
     `receiver`, `options`, `boolean` and `not_implemented` are what its methods call `self`, further
     keywords and what Python has by these names, which names of the interface may hide. `guard` is
-    the statement that says whether the constructor was given something unusual.
+    the head of the `if` for a constructor that was given something unusual.
     """
 
     name: str
@@ -62,7 +62,7 @@ def message(structure: ir.Message, references: References, purposes: Purposes) -
         equality=equality(structure, naming.receiver, references),
         receiver=naming.receiver,
         options=naming.options,
-        guard="\n".join(one_or_all(naming.options, doubt, 8, "_unusual = ")).lstrip(),
+        guard="\n".join(if_one_or_all(naming.options, doubt, 8)).lstrip(),
         boolean=f"{naming.builtins}bool",
         not_implemented=naming.not_implemented,
     )

@@ -35,13 +35,12 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Naming(msgspec.Struct, frozen=True):
-    """How a class names what its fields could hide: `self`, `type` and the builtin types."""
+    """How a class names what its fields could hide: `self` and what is builtin."""
 
     receiver: str
     options: str
     builtins: str
     not_implemented: str
-    has_type: bool
 
     @classmethod
     def of(cls, structure: ir.Message) -> Naming:
@@ -56,12 +55,7 @@ class Naming(msgspec.Struct, frozen=True):
                 if _hides_not_implemented(structure)
                 else "NotImplemented"  # as type checkers know it
             ),
-            has_type="type" in names,
         )
-
-    def type_of(self, name: str) -> str:
-        """Return the expression for the type of an argument."""
-        return f"{name}.__class__" if self.has_type else f"type({name})"
 
 
 def shadows(structure: ir.Message) -> bool:
@@ -143,7 +137,7 @@ class _Shape(NamedTuple):
 
 def _shape(field: ir.Field, references: References, naming: Naming) -> _Shape:
     name = pynames.field(field.name)
-    kind = naming.type_of(name)
+    kind = f"{name}.__class__"  # faster than a call, and no field can hide it
     if isinstance(field.type, (ir.Primitive, ir.String)):
         annotation = naming.builtins + _element(field.type, references)
         parameter = f"{annotation} = {_scalar_default(field)}"

@@ -125,15 +125,15 @@ def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
 
 
-def one_or_all(first: str, rest: tuple[str, ...], indent: int, before: str) -> list[str]:
-    """Return the lines of `before`, and whether `first` is true or all of the rest are."""
+def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
+    """Return the head of an `if` of one condition, or else all of the others."""
     margin = " " * indent
     if len(rest) < 2:
-        return any_of([first, *rest], indent, before, "")
-    one = f"{margin}{before}{first} or ({' and '.join(rest)})"
+        return any_of([first, *rest], indent, "if ", ":")
+    one = f"{margin}if {first} or ({' and '.join(rest)}):"
     if len(one) <= WIDTH:
         return [one]
-    return [f"{margin}{before}{first} or (", *_spread(rest, "and", indent + 4), f"{margin})"]
+    return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:

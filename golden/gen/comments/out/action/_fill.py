@@ -32,9 +32,10 @@ class Fill_Goal(_idlc.Message):
         level: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(level) is not float
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or level.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._level = level
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -65,9 +66,10 @@ class Fill_Result(_idlc.Message):
         reached: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(reached) is not float
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or reached.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._reached = reached
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -98,9 +100,10 @@ class Fill_Feedback(_idlc.Message):
         level: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(level) is not float
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or level.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._level = level
 
     def __eq__(self, other: _idlc.Any) -> bool:

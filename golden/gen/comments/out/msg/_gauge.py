@@ -81,9 +81,10 @@ class Gauge(_idlc.Message):
         flags: bytes = b"\x07",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(rate) is not float
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or rate.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._rate = rate
         self._level = level
         self._label = label

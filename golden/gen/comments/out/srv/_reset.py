@@ -32,9 +32,10 @@ class Reset_Request(_idlc.Message):
         reason: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(reason) is not str
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or reason.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._reason = reason
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -65,9 +66,10 @@ class Reset_Response(_idlc.Message):
         ok: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(ok) is not bool
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or ok.__class__ is not bool:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._ok = ok
 
     def __eq__(self, other: _idlc.Any) -> bool:

@@ -47,9 +47,10 @@ class Reset_Event(_idlc.Message):
         response: list[Reset_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or info is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or info is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response

@@ -118,9 +118,10 @@ class Everything(_idlc.Message):
         last: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(flag) is not bool
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or flag.__class__ is not bool:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._flag = flag
         self._inner = Inner() if inner is None else inner
         self._inners = [] if inners is None else inners

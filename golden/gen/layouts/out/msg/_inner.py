@@ -42,9 +42,10 @@ class Inner(_idlc.Message):
         d: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(a) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
         self._b = b
         self._c = c

@@ -19,9 +19,10 @@ class Nothing(_idlc.Message):
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Nothing):

@@ -34,9 +34,10 @@ class Pair(_idlc.Message):
         value: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(key) is not str
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or key.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._key = key
         self._value = value
 

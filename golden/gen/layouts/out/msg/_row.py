@@ -39,9 +39,10 @@ class Row(_idlc.Message):
         c: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(a) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
         self._b = b
         if c is None:

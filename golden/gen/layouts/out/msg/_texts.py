@@ -44,9 +44,10 @@ class Texts(_idlc.Message):
         last: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or (pairs is not None and type(pairs) is not list)
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or (pairs is not None and pairs.__class__ is not list):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._pairs = [] if pairs is None else pairs
         self._few = [] if few is None else few
         self._titled = [] if titled is None else titled

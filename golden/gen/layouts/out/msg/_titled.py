@@ -43,9 +43,10 @@ class Titled(_idlc.Message):
         number: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(level) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or level.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._level = level
         self._title = title
         self._pairs = [] if pairs is None else pairs

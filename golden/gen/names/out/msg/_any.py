@@ -35,9 +35,10 @@ class Any(_idlc.Message):
         pose: Pose | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or (pose is not None and type(pose) is not Pose)
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or (pose is not None and pose.__class__ is not Pose):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._pose = Pose() if pose is None else pose
 
     def __eq__(self, other: _idlc.Any) -> bool:

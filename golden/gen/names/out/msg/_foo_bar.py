@@ -31,9 +31,10 @@ class FOOBar(_idlc.Message):
         inner: FooBar | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or (inner is not None and type(inner) is not FooBar)
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or (inner is not None and inner.__class__ is not FooBar):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._inner = FooBar() if inner is None else inner
 
     def __eq__(self, other: _idlc.Any) -> bool:

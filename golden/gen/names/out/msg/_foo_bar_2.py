@@ -30,9 +30,10 @@ class FooBar(_idlc.Message):
         a: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(a) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
 
     def __eq__(self, other: _idlc.Any) -> bool:

@@ -57,9 +57,10 @@ class Hiding(_idlc.Message):
         to_dict: list[str] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or (validate is not None and type(validate) is not Point)
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or (validate is not None and validate.__class__ is not Point):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._validate = Point() if validate is None else validate
         self._serialize = serialize
         if deserialize is None:

@@ -120,9 +120,10 @@ class Odd(_idlc.Message):
         order: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(class_) is not _builtins.int
-        if _unusual and _idlc.construct(_self, options, locals()):
-            return
+        if options or class_.__class__ is not _builtins.int:
+            _given = locals()
+            if _idlc.construct(_self, options, _given):
+                return
         _self._class = class_
         _self._serialize = serialize
         _self._self = self

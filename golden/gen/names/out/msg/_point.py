@@ -34,9 +34,10 @@ class Point(_idlc.Message):
         y: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(x) is not float
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or x.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._x = x
         self._y = y
 

@@ -45,11 +45,12 @@ class Text(_idlc.Message):
         any: list[Any] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or (
-            other is not None and type(other) is not geometry_msgs_Point
-        )
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or (
+            other is not None and other.__class__ is not geometry_msgs_Point
+        ):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._other = geometry_msgs_Point() if other is None else other
         self._own = names_msgs_Point() if own is None else own
         self._any = [] if any is None else any

@@ -21,9 +21,10 @@ class None_Request(_idlc.Message):
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Request):
@@ -42,9 +43,10 @@ class None_Response(_idlc.Message):
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Response):

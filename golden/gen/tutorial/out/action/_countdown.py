@@ -32,9 +32,10 @@ class Countdown_Goal(_idlc.Message):
         target_count: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(target_count) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or target_count.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._target_count = target_count
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -69,9 +70,10 @@ class Countdown_Result(_idlc.Message):
         success: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(final_count) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or final_count.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._final_count = final_count
         self._success = success
 
@@ -105,9 +107,10 @@ class Countdown_Feedback(_idlc.Message):
         current_count: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(current_count) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or current_count.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._current_count = current_count
 
     def __eq__(self, other: _idlc.Any) -> bool:

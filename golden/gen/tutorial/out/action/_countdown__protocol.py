@@ -47,9 +47,10 @@ class Countdown_SendGoal_Request(_idlc.Message):
         goal: Countdown_Goal | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or goal_id is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or goal_id is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         if goal_id is None:
             self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
@@ -90,9 +91,10 @@ class Countdown_SendGoal_Response(_idlc.Message):
         stamp: _builtin_interfaces_msg.Time | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(accepted) is not bool
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or accepted.__class__ is not bool:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._accepted = accepted
         self._stamp = _builtin_interfaces_msg.Time() if stamp is None else stamp
 
@@ -134,9 +136,10 @@ class Countdown_SendGoal_Event(_idlc.Message):
         response: list[Countdown_SendGoal_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or info is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or info is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
@@ -171,9 +174,10 @@ class Countdown_GetResult_Request(_idlc.Message):
         goal_id: _unique_identifier_msgs_msg.UUID | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or goal_id is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or goal_id is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         if goal_id is None:
             self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:
@@ -211,9 +215,10 @@ class Countdown_GetResult_Response(_idlc.Message):
         result: Countdown_Result | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(status) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or status.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._status = status
         self._result = Countdown_Result() if result is None else result
 
@@ -255,9 +260,10 @@ class Countdown_GetResult_Event(_idlc.Message):
         response: list[Countdown_GetResult_Response] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or info is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or info is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._info = _service_msgs_msg.ServiceEventInfo() if info is None else info
         self._request = [] if request is None else request
         self._response = [] if response is None else response
@@ -296,9 +302,10 @@ class Countdown_FeedbackMessage(_idlc.Message):
         feedback: Countdown_Feedback | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or goal_id is not None
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or goal_id is not None:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         if goal_id is None:
             self._goal_id = _unique_identifier_msgs_msg.UUID()
         else:

@@ -32,9 +32,10 @@ class ExecuteTask_Goal(_idlc.Message):
         task_name: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(task_name) is not str
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or task_name.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._task_name = task_name
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -65,9 +66,10 @@ class ExecuteTask_Result(_idlc.Message):
         success: bool = False,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(success) is not bool
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or success.__class__ is not bool:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._success = success
 
     def __eq__(self, other: _idlc.Any) -> bool:
@@ -98,9 +100,10 @@ class ExecuteTask_Feedback(_idlc.Message):
         current_status: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(current_status) is not str
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or current_status.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._current_status = current_status
 
     def __eq__(self, other: _idlc.Any) -> bool:

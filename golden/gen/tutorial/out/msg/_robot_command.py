@@ -54,9 +54,10 @@ class RobotCommand(_idlc.Message):
         frame_id: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(command_type) is not str
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or command_type.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._command_type = command_type
         self._linear_velocity_x = linear_velocity_x
         self._angular_velocity_z = angular_velocity_z

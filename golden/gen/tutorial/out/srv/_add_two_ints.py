@@ -36,9 +36,10 @@ class AddTwoInts_Request(_idlc.Message):
         b: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(a) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
         self._b = b
 
@@ -70,9 +71,10 @@ class AddTwoInts_Response(_idlc.Message):
         sum: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        _unusual = options or type(sum) is not int
-        if _unusual and _idlc.construct(self, options, locals()):
-            return
+        if options or sum.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._sum = sum
 
     def __eq__(self, other: _idlc.Any) -> bool:
