@@ -9,20 +9,18 @@ afterwards, by the runtime.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 from idlc.emit.codec import wire_plan
 from idlc.emit.codec.alignment import multiple_of
 from idlc.emit.codec.constants import Tables
-from idlc.emit.codec.cursor import START, Cursor
+from idlc.emit.codec.cursor import Cursor
+from idlc.emit.codec.runs import Run, Running, slice_of
 from idlc.emit.codec.statements import Block, Line, Statement
-from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
+from idlc.emit.python_lines import Comprehension, Node, call, tuple_of
 from idlc.model import ir
 
-TOO_SHORT = (Line('raise ValueError("too short")'),)
 UNENDED = (Line('raise ValueError("text without end")'),)
-TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
 def is_bulk(steps: tuple[wire_plan.Step, ...]) -> bool:
@@ -61,49 +59,13 @@ def decode(
     return (*first, *decoder.body, Line("return message"))
 
 
-class _Run:
-    """Fixed-size values that are read together."""
-
-    def __init__(self) -> None:
-        self.fields: list[str] = []
-        self.targets: list[str] = []
-        self.sizes: list[tuple[int, int]] = []
-        self.after: list[Statement] = []
-
-    def add(self, token: str, align: int, size: int, target: str = "") -> None:
-        """Add a value of `size` bytes, stored in `target`."""
-        self.fields.append(token)
-        self.sizes.append((align, size))
-        if target:
-            self.targets.append(target)
-
-    def skipped(self, cursor: Cursor) -> Cursor:
-        """Return the position after the values, of which the first is at `cursor`."""
-        for align, size in self.sizes:
-            if not cursor.known.knows(align):
-                cursor = cursor.where(multiple_of(align))
-            cursor = cursor.skip(cursor.known.padding(align) + size)
-        return cursor
-
-    def assignment(self, value: Group) -> Line:
-        """Return the statement that reads the values."""
-        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
-
-
-class _Decoder:
-    """The statements so far, the values to be read together, and the position before them."""
+class _Decoder(Running):
+    """Emits a message's steps; `makers` name the functions that make empty objects."""
 
     def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], source: str) -> None:
-        self.tables = tables
+        super().__init__(tables, source)
         self.makers = makers
-        self.source = source
-        self.body: list[Statement] = []
-        self.here = START
-        self.run = _Run()
-        self.limited = False
         self.looping = False
-        self.unchecked = False
-        self.worded = False
 
     def step(self, step: wire_plan.Step) -> None:
         """Emit one step."""
@@ -127,13 +89,9 @@ class _Decoder:
             case wire_plan.Items():
                 self.items(step)
 
-    def line(self, value: Node, target: Node = "") -> None:
-        """Emit a statement."""
-        self.body.append(Line(value, target))
-
     # Values of fixed size.
 
-    def fixed(self, step: wire_plan.Step, run: _Run) -> None:
+    def fixed(self, step: wire_plan.Step, run: Run) -> None:
         """Add a value to a run."""
         match step:
             case wire_plan.Number(place, letter, size):
@@ -149,81 +107,7 @@ class _Decoder:
         """Return the statements that make a nested object."""
         return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
 
-    def flush(self, *, last: bool = False) -> None:
-        """Read the run; the position after it is of no interest if it is the `last`."""
-        run, self.run = self.run, _Run()
-        if not run.fields:
-            return
-        self.unchecked = False
-        widest = max(align for align, _ in run.sizes)
-        if run.sizes[0][0] == widest:
-            self.align(widest)
-        fields = "".join(run.fields)
-        here = self.here.text()
-        if self.worded and fields == "I":
-            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
-            self.here = run.skipped(self.here)
-        elif self.here.known.knows(widest):
-            reader = self.tables.reader(fields, self.here.known.residue)
-            self.body.append(run.assignment(call(reader, "data", here)))
-            self.here = run.skipped(self.here)
-        else:
-            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
-            struct = table if last else "struct"
-            if not last:
-                self.line(table, struct)
-            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
-            if not last:
-                self.line(f"{here} + struct.size", "at")
-                self.here = run.skipped(self.here).at("at")
-        self.body += run.after
-
-    def align(self, align: int) -> None:
-        """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.here.known.knows(align):
-            self.here = self.here.skip(self.here.known.padding(align))
-        elif align == 8:
-            self.line(f"({self.here.text(3)} & -8) + 4", "at")
-            self.here = Cursor("at", 0, multiple_of(8))
-        else:
-            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
-            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
-            self.here = Cursor("at", -lead, multiple_of(align))
-
-    def settle(self, base: str, offset: int = 0) -> None:
-        """Bring the position into a variable, as `base + offset`."""
-        value = self.here.text(-offset)
-        if value != base:
-            self.line(value, base)
-        self.here = self.here.at(base, offset)
-
-    @contextmanager
-    def within(self, head: str) -> Iterator[None]:
-        """Make what is emitted meanwhile the body of a compound statement."""
-        outside, self.body = self.body, []
-        yield
-        outside.append(Block(head, tuple(self.body)))
-        self.body = outside
-
     # Values of variable size.
-
-    def number(self, target: str) -> None:
-        """Read a count or size into a variable, together with the numbers before it."""
-        self.run.add("I", 4, 4, target)
-        self.flush()
-
-    def count(self, bound: int | None) -> str:
-        """Read the count of a sequence and check its upper limit."""
-        self.number("count")
-        if bound is not None:
-            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
-        return "count"
-
-    def start(self) -> str:
-        """Return the position as an expression that stays true when `end` changes."""
-        if self.here.base == "end":
-            self.settle("at")
-        return self.here.text()
 
     def text(self) -> Node:
         """Read the size of a string; return the expression that reads the string.
@@ -251,31 +135,6 @@ class _Decoder:
         self.number("count")
         raw = self.buffer("count", 4, 4, "data")
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
-
-    def buffer(self, count: str, align: int, size: int, source: str) -> str:
-        """Return the slice of `count` elements, and go behind it.
-
-        It is shorter if the buffer is, which whatever is read next notices.
-        """
-        if not self.here.known.is_at(align):
-            self.settle("at")
-            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
-            self.here = self.here.where(multiple_of(4))
-        start = self.start()
-        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
-        self.unchecked = True
-        self.here = Cursor("end", 0, self.here.known.modulo(size & -size))
-        return f"{source}{slice_of(start)}"
-
-    def finish(self) -> None:
-        """Emit the check that nothing after the last buffer makes."""
-        if self.unchecked:
-            self.short_if(f"{self.here.text()} > limit")
-
-    def short_if(self, condition: str) -> None:
-        """Emit a check that the buffer is long enough."""
-        self.limited = True
-        self.body.append(Block(f"if {condition}:", TOO_SHORT))
 
     def numbers(self, step: wire_plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
@@ -347,7 +206,7 @@ class _Decoder:
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
-        run = _Run()
+        run = Run()
         entered: list[Statement] = []
         for part in step.body:
             if isinstance(part, wire_plan.Enter):
@@ -395,10 +254,3 @@ class _Decoder:
         self.body.append(loop)
         self.here = first
         self.unchecked |= unchecked
-
-
-def slice_of(start: str, end: str = "end") -> str:
-    """Return the slice from one expression to another."""
-    if " " in start + end:
-        return f"[{start} : {end}]"
-    return f"[{start}:{end}]"
