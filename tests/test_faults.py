@@ -113,7 +113,7 @@ def test_every_write_from_some_point_on_fails(number, before, machine, versions)
         assert_new(machine, versions)
 
 
-@pytest.mark.parametrize("size", [0, 1000, 20_000])
+@pytest.mark.parametrize("size", [0, 1000, 5_000])
 def test_a_disk_that_takes_only_part_of_a_file(size, before, machine, versions):
     words, start = before
     machine.reset(start)
