@@ -273,5 +273,5 @@ def test_checking_a_file_imports_little(tmp_path):
     needless |= {"numpy", "pkgutil", "rich", "shutil", "subprocess", "tempfile", "tomllib"}
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
-    assert "idlc.checks.package_rules" in own
+    assert "idlc.checks.package.manifest" in own
     assert len(own) <= 76, "what a run without problems does not need can wait"

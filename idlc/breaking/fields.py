@@ -191,7 +191,7 @@ def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     if native(old.type) == native(new.type):
         levels -= {"source"}
     return Change(
-        codes.FIELD_BOUND if only_bounds else codes.FIELD_TYPE,
+        codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED,
         sides.subject(new.name),
         f"field `{new.name}` was `{spell(old.type, package)}` "
         f"and is `{spell(new.type, package)}` now",
@@ -212,7 +212,7 @@ def _used_type(sides: Sides, old: ir.Field, new: ir.Field, target: str) -> Itera
         levels.add("wire")
     if levels:
         yield Change(
-            codes.USED_TYPE,
+            codes.USED_TYPE_CHANGED,
             sides.subject(new.name),
             f"`{target}`, the type of field `{new.name}`, changed",
             frozenset(levels),
@@ -239,7 +239,7 @@ def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
             f"and is {spell_value(new.default.value)} now"
         )
     return Change(
-        codes.FIELD_DEFAULT,
+        codes.FIELD_DEFAULT_CHANGED,
         sides.subject(new.name),
         what,
         frozenset(levels),

@@ -83,7 +83,7 @@ def switched_off(found: Diagnostic, selection: Selection) -> bool:
     known = codes.find(found.span.text)
     if known is None or known.severity is Severity.ERROR:
         return False
-    return not selection.has(known.id)
+    return not selection.has(known)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:

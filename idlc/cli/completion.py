@@ -49,7 +49,7 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
 
 def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:
     """Offer what a list of rules can go on with."""
-    from idlc.checks.select import CATEGORIES
+    from idlc.diagnostics.codes import CATEGORIES
 
     before, comma, last = word.rpartition(",")
     groups = [CompletionItem(name) for name in ("all", *CATEGORIES) if name.startswith(last)]

@@ -204,7 +204,7 @@ def _with_needs(
         names = ", ".join(f"`{name}`" for name in missing)
         wheels = " ".join(f"ros-jazzy-{name.replace('_', '-')}" for name in missing)
         report.add(
-            codes.NOT_IMPORTABLE.of(
+            codes.DEPENDENCY_NOT_IMPORTABLE.of(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
                 hint=f"install it with ROS 2 or `pip install {wheels}`, or run idlc gen again "

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import msgspec
 
+from idlc.diagnostics.codes import Code
 from idlc.diagnostics.source import Source, Span
 
 #: An ordinary character for ROS 2, and therefore wrong wherever it stands (spec 1.1).
@@ -24,7 +25,7 @@ class Piece(msgspec.Struct, frozen=True):
 
     @property
     def end(self) -> int:
-        """The offset behind the last character."""
+        """The offset after the last character."""
         return self.start + len(self.text)
 
 
@@ -56,9 +57,9 @@ class Constant(msgspec.Struct, frozen=True):
 
 
 class Broken(msgspec.Struct, frozen=True):
-    """Code that is no definition: the guilty piece, a code's slug and words for the reader."""
+    """Code that is no definition: the guilty piece, and what to say about it."""
 
-    slug: str
+    code: Code
     piece: Piece
     message: str
     hint: str
@@ -82,7 +83,7 @@ class Line(msgspec.Struct, frozen=True):
 
     @property
     def definition(self) -> str:
-        """The code as a definition: TABs as spaces, nothing behind it; may be empty."""
+        """The code as a definition: TABs as spaces, nothing after it; may be empty."""
         return self.code.replace("\t", " ").rstrip()
 
 

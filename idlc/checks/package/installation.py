@@ -32,7 +32,7 @@ def installed_interfaces(facts: Facts, model: Model, report: Report) -> None:
             return  # computed
         if not any(kind in text.replace(".", "/").split("/") for text in texts):
             report.add(
-                codes.NOT_INSTALLED.at(
+                codes.INTERFACES_NOT_INSTALLED.at(
                     said[0].span if said else Span(facts.setup_py, 0, 0),
                     f"the .{kind} files are not among the `data_files`",
                     hint=f"add `('share/{facts.name}/{kind}', glob('{kind}/*.{kind}'))`",
@@ -136,7 +136,7 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
         if changed:
             listed = first_few((f"`{name}`" for name in sorted(changed)), 3)
             report.add(
-                codes.STALE_OUTPUT.of(
+                codes.STALE_GENERATED_CODE.of(
                     output.path,
                     f"the generated code is out of date: {listed} changed",
                     hint="run idlc gen",

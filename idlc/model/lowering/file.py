@@ -127,7 +127,7 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
 
 
 def _moved(constant: ir.Constant, span: Span) -> Diagnostic:
-    return codes.CONSTANT_MOVED.at(
+    return codes.REPEATED_SECTION_CONSTANT.at(
         span,
         f"ROS 2 gives `{constant.name}` to the earlier section only, because it is the same there",
         hint="give it another name or comment",
