@@ -18,7 +18,8 @@ RUNTIME = [path for path in MODULES if "runtime" in path.parts]
 
 #: Each stage may import those before it; `runtime` stands apart and imports none.
 STAGES = (
-    "diagnostics syntax model breaking export checks emit native site scaffold disk driver cli"
+    "diagnostics syntax model breaking export checks templating emit native site scaffold "
+    "disk driver cli"
 ).split()
 #: Stages that need fewer of those before them.
 NEEDS_ONLY = {"native": {"native", "model"}}
@@ -37,6 +38,7 @@ READS_ITS_OWN = {
     "idlc/model/catalog.py",
     "idlc/scaffold/new_package.py",
     "idlc/syntax/grammar.py",
+    "idlc/templating.py",
 }
 
 #: What runtime modules may import besides the standard library and each other, and only inside

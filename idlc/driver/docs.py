@@ -15,7 +15,7 @@ from idlc.disk.scope import Scope
 from idlc.driver.stages import sound_models, stage
 
 if TYPE_CHECKING:
-    from idlc.site.pages import About
+    from idlc.site.front import About
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
@@ -42,7 +42,7 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
 def _about(given: inputs.Inputs) -> About:
     """Return what a package's package.xml says of it."""
-    from idlc.site.pages import About
+    from idlc.site.front import About
 
     path = manifest(given.folders[0]) if given.folders else None
     said = statements(path, path.as_posix(), Report()) if path else ()

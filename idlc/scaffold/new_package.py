@@ -7,7 +7,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.emit.pynames import why_not_package
-from idlc.emit.render import environment
+from idlc.templating import environment
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from idlc.emit.render import environment
 from idlc.model import derive
 from idlc.scaffold import arguments, spec
 from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part
@@ -12,6 +11,7 @@ from idlc.scaffold.line_breaks import call, imports
 from idlc.scaffold.planned import Plan
 from idlc.scaffold.samples import INDENT, Page
 from idlc.scaffold.states import PAUSING, StatesView, kept, pauses, states
+from idlc.templating import environment
 
 #: Names that a module of a node uses itself.
 _OWN = (

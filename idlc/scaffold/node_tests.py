@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from idlc.emit.render import environment
 from idlc.model import derive, ir
 from idlc.scaffold.endpoints import DEFAULT_RATE, QOS, QOS_IMPORTS, log_head, shown
 from idlc.scaffold.line_breaks import call, collection, imports
 from idlc.scaffold.planned import Plan
 from idlc.scaffold.samples import Page
 from idlc.scaffold.spec import Endpoint, Role
+from idlc.templating import environment
 
 #: Seconds to wait for a first message, beyond what a node waits itself.
 PATIENCE = 20.0
