@@ -10,7 +10,6 @@ from pathlib import Path
 
 import jinja2
 import msgspec
-from markupsafe import Markup
 
 from idlc.diagnostics.visible import printable
 
@@ -44,8 +43,8 @@ def html() -> jinja2.Environment:
     return environment().overlay(autoescape=True, finalize=_text)
 
 
-def _text(value: object) -> str:
-    return value if isinstance(value, Markup) else printable(str(value))
+def _text(value: object) -> object:
+    return value if hasattr(value, "__html__") else printable(str(value))
 
 
 def verbatim(name: str) -> str:

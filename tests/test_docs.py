@@ -134,7 +134,7 @@ def test_the_title_page_tells_what_package_xml_says(tmp_path, monkeypatch):
     write(
         "demo/package.xml",
         "<package format='3'><name>demo_msgs</name><version>1.2.3</version>"
-        "<description>Drives\n   &amp; stops.</description>"
+        "<description>Drives\n   <b>&amp;</b> stops.</description>"
         "<maintainer email='a@example.org'>Ann</maintainer><license>MIT</license></package>",
     )
     assert main(["docs", "demo", "-o", "site"]) == 0

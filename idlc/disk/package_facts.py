@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.checks.package.facts import Facts, Output
+from idlc.checks.package.package_xml import statements
 from idlc.diagnostics.report import Report
 from idlc.disk.enclosing_package import manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.inputs import Inputs
-from idlc.disk.manifest_statements import read_statements
 from idlc.disk.output import lock_file
 from idlc.disk.read import decode, read_bytes, read_source, shown
 
@@ -40,7 +40,7 @@ def facts(
     path = manifest(next(iter(given.folders), given.home))
     unheard = Report()
     source = read_source(path, shown(path), unheard) if path else None
-    if path is None or source is None or not (said := read_statements(source)):
+    if path is None or source is None or not (said := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
 from idlc.disk import inputs
-from idlc.disk.enclosing_package import manifest
+from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import find
-from idlc.disk.manifest_statements import statements
 from idlc.disk.output.site import write
 from idlc.disk.scope import Scope
 from idlc.driver.stages import sound_models, stage
