@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 import msgspec
@@ -55,20 +54,3 @@ class Selection(msgspec.Struct, frozen=True):
             for pattern, ignored in self.per_path
             if fnmatchcase(path, pattern) or fnmatchcase(path, f"*/{pattern}")
         )
-
-
-def selection(table: Mapping[str, object]) -> Selection:
-    """Return the selection that a checked table of settings describes."""
-    select = table.get("select")
-    per_path = table.get("per-path")
-    return Selection(
-        _words(select) if select is not None else None,
-        _words(table.get("ignore")),
-        tuple((path, _words(words)) for path, words in per_path.items())
-        if isinstance(per_path, dict)
-        else (),
-    )
-
-
-def _words(value: object) -> tuple[str, ...]:
-    return tuple(map(str, value)) if isinstance(value, Sequence) else ()
