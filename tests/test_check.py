@@ -13,6 +13,7 @@ import pytest
 from sarif_schema import path_of, run_of
 
 from idlc.cli.main import main
+from idlc.cli.options import REPORT_FORMATS
 
 #: Ten mistakes of ten kinds in five files.
 MISTAKES = {
@@ -114,6 +115,10 @@ READERS = {
     "junit": from_junit,
     "sarif": from_sarif,
 }
+
+
+def test_every_format_is_read():
+    assert set(READERS) == set(REPORT_FORMATS)
 
 
 @pytest.mark.parametrize("style", READERS)

@@ -7,8 +7,10 @@ from typing import Any, TypeVar
 
 import click
 
+from idlc.diagnostics.formats import DOCUMENTS
+
 FORMATS = ("text", "json")
-REPORT_FORMATS = (*FORMATS, "github", "sarif", "junit", "gitlab")
+REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
