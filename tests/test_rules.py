@@ -8,6 +8,7 @@ import pytest
 from idlc.checks import registry
 from idlc.cli.main import main
 from idlc.diagnostics import codes
+from idlc.diagnostics.code_pages import page
 from idlc.diagnostics.report import Report, Severity
 
 CASES = Path(__file__).parents[1] / "golden" / "diag"
@@ -30,6 +31,12 @@ def test_advice_can_be_chosen_by_category_and_errors_cannot():
         assert [one.severity for one in rule.codes] == [Severity.WARNING] * len(rule.codes)
     for one in codes.CODES.values():
         assert one.default or one.severity is Severity.WARNING
+
+
+@pytest.mark.parametrize("code", codes.CODES)
+def test_a_page_says_whether_its_code_is_off(code):
+    text = " ".join((page(code) or "").split())
+    assert ("Off unless it is selected" in text) is not codes.CODES[code].default
 
 
 def test_every_code_of_advice_has_a_rule_of_its_own():

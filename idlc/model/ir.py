@@ -55,6 +55,11 @@ class PrimitiveInfo(NamedTuple):
     low: int | None = None
     high: int | None = None
 
+    @property
+    def dtype(self) -> str:
+        """How numpy calls it."""
+        return {"float": "float32", "double": "float64"}.get(self.idl, self.idl)
+
 
 PRIMITIVES: dict[str, PrimitiveInfo] = {
     "bool": PrimitiveInfo("boolean", 15, "?", 1),

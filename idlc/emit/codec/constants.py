@@ -9,6 +9,7 @@ from typing import NamedTuple
 from idlc.emit import pynames
 from idlc.emit.codec import wire_plan
 from idlc.emit.python_lines import Group, Node, call
+from idlc.model import ir
 
 
 class Mark(NamedTuple):
@@ -175,4 +176,4 @@ class Tables:
 
 def numpy_name(primitive: str) -> str:
     """Return the dtype of a numeric primitive."""
-    return {"char": "uint8"}.get(primitive, primitive)
+    return ir.PRIMITIVES[primitive].dtype
