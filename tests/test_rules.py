@@ -1,5 +1,6 @@
 """The registry of rules: constants, slugs, codes and checks tell the same story."""
 
+import re
 from pathlib import Path
 
 import golden_text
@@ -37,6 +38,18 @@ def test_advice_can_be_chosen_by_category_and_errors_cannot():
 def test_a_page_says_whether_its_code_is_off(code):
     text = " ".join((page(code) or "").split())
     assert ("Off unless it is selected" in text) is not codes.CODES[code].default
+
+
+def test_a_terminal_gets_each_page_without_its_markup(monkeypatch, capsys):
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    for code in codes.CODES:
+        assert main(["explain", code]) == 0
+        out = capsys.readouterr().out
+        plain = re.sub("\x1b\\[[0-9]*m", "", out)
+        assert plain != out
+        assert not re.search(r"(?m)^## |```", plain)
+        words = re.sub("[`#]", "", page(code)).replace("console\n", "\n").split()
+        assert plain.replace("`", "").replace("#", "").split() == words
 
 
 def test_every_code_of_advice_has_a_rule_of_its_own():
