@@ -94,14 +94,7 @@ def definition(text: str) -> tree.Body:
     if isinstance(body, tuple):
         return tree.Field(type_, *body)
     equals = text.index("=", type_.whole.end)
-    name = body.get("CONSTANT_NAME", tree.Piece("", equals))
-    value = body.get("VALUE", tree.Piece("", len(text)))
-    stripped = value.text.lstrip()
-    return tree.Constant(
-        type_,
-        tree.Piece(name.text.rstrip(), name.start),
-        tree.Piece(stripped, value.start + len(value.text) - len(stripped)),
-    )
+    return tree.constant(type_, body.get("CONSTANT_NAME"), equals, body.get("VALUE"), len(text))
 
 
 def _type(text: str, name: tree.Piece, *parts: tree.Piece | _Array) -> tree.Type:
