@@ -104,7 +104,7 @@ def missing_units(model: Model, report: Report) -> None:
 
 
 def _says(comment: Iterable[str], unit: str) -> bool:
-    """Tell whether a comment names a unit without the brackets."""
+    """Return whether a comment names a unit without the brackets."""
     return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
 
 

@@ -44,7 +44,7 @@ def once(wanted: GenOptions, style: str) -> int:
 
 
 def _line(package: Generated, check: bool) -> str:
-    """Return what is said of a package: what it is, and what was done if that is not all of it."""
+    """Return the line about a package: what it is, and what was done if only a part was written."""
     done = []
     if check:
         done.append("up to date")

@@ -122,6 +122,6 @@ def _modules(
 
 def _optional(path: Path) -> Source | None:
     """Return a file's text, `None` if it is not there or no text, which others complain about."""
-    unheard = Report()
-    data = read_bytes(path, shown(path), unheard) if path.is_file() else None
-    return None if data is None else decode(data, shown(path), unheard)
+    ignored = Report()
+    data = read_bytes(path, shown(path), ignored) if path.is_file() else None
+    return None if data is None else decode(data, shown(path), ignored)

@@ -193,5 +193,5 @@ def _version(given: tuple[inputs.Inputs, ...], report: Report) -> str | None:
     if len(given) != 1 or not given[0].folders:
         return None
     path = manifest(given[0].folders[0])
-    said = statements(path, path.as_posix(), report) if path else ()
-    return next((one.text for one in said if one.tag == "version"), None)
+    found = statements(path, path.as_posix(), report) if path else ()
+    return next((one.text for one in found if one.tag == "version"), None)

@@ -1,4 +1,4 @@
-"""The pipeline of `idlc check`: everything that can be said about files and their packages."""
+"""The pipeline of `idlc check`: every problem of files and of their packages."""
 
 from __future__ import annotations
 

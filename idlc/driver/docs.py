@@ -44,9 +44,9 @@ def _about(given: inputs.Inputs) -> About:
     from idlc.site.front import About
 
     path = manifest(given.folders[0]) if given.folders else None
-    said = statements(path, path.as_posix(), Report()) if path else ()
+    found = statements(path, path.as_posix(), Report()) if path else ()
     texts: dict[str, list[str]] = {}
-    for one in said:
+    for one in found:
         texts.setdefault(one.tag, []).append(" ".join(one.text.split()))
     return About(
         version=" ".join(texts.get("version", [])),

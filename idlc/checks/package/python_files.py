@@ -40,7 +40,7 @@ def imported_packages(source: Source) -> Iterator[tuple[str, Span]]:
 
 
 def defines(source: Source, name: str) -> bool:
-    """Tell whether a file gives a meaning to a name at its top level."""
+    """Return whether a file gives a meaning to a name at its top level."""
     tree = _parsed(source.text)
     if tree is None:
         return True

@@ -34,7 +34,7 @@ _MARK = "\0qos="
 
 
 def interactive() -> bool:
-    """Whether there is somebody to ask."""
+    """Return whether there is somebody to ask."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 

@@ -54,7 +54,7 @@ def _abandoned(out: Path) -> list[Path]:
 
 
 def _in_use(stage: Path) -> bool:
-    """Whether the process that made a staging folder may still be running."""
+    """Return whether the process that made a staging folder may still be running."""
     number = stage.name.removeprefix(STAGE)
     if not number.isdigit() or int(number) == os.getpid():
         return False

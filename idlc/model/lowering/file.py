@@ -93,7 +93,7 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 
 
 def _has_near_separator(file: tree.File, expected: int) -> bool:
-    """Tell whether some line was meant as a separator and is reported as such.
+    """Return whether some line was meant as a separator and is reported as such.
 
     What comes after the `expected` sections is not looked at any more.
     """
