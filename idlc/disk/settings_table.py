@@ -28,10 +28,7 @@ _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
 
 class Place(NamedTuple):
-    """A table of a file: the name in its header, and the how-manieth of that name it is.
-
-    `shown` is what messages call it.
-    """
+    """A table of a file: its name, how messages call it, and its number among those of one name."""
 
     source: Source
     table: str

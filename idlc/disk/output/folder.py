@@ -79,7 +79,7 @@ class Target:
         return environment.runs_nodes() or any(map(environment.python_folders, needed))
 
     def _finds(self, package: str, kind: str) -> bool:
-        """Return whether a package lies next to this one or could be imported; nothing is imported."""
+        """Return whether a package lies next to this one or could be imported; imports nothing."""
         inside = f"{kind}/__init__.py"
         return is_file(self._path.parent / package / inside) or any(
             is_file(place / inside) for place in environment.python_folders(package)
