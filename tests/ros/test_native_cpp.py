@@ -4,14 +4,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from installed import HERE, SHARE, interfaces_in, names_in
-from native import install, model_of
-from tools import MACHINES, emulator, run, tool
 
 from idlc.native.library import OWN
+from tests.support.installed import SHARE, interfaces_in, names_in
+from tests.support.native import install, model_of
+from tests.support.paths import EVERY_KIND, EXAMPLE, PROGRAMS
+from tests.support.tools import MACHINES, emulator, run, tool
 
-EXAMPLE = HERE.parents[1] / "examples" / "my_robot_controller"
-FOLDERS = (EXAMPLE, HERE / "every_kind", SHARE / "sensor_msgs", SHARE / "action_msgs")
+FOLDERS = (EXAMPLE, EVERY_KIND, SHARE / "sensor_msgs", SHARE / "action_msgs")
 #: How the program is started: on 64 KiB pages too, and where code checks where it is jumped to.
 WAYS = {"x86_64": [[]], "aarch64": [[], ["-p", "65536"], ["-cpu", "max"]]}
 
@@ -50,7 +50,7 @@ def program(tmp_path_factory):
     def build(machine):
         if machine not in built:
             built[machine] = tmp_path_factory.mktemp(machine) / "ask"
-            source = HERE / "native_ask.cpp"
+            source = PROGRAMS / "native_ask.cpp"
             run(tool("g++", machine), *options, source, "-o", built[machine], "-ldl")
         return built[machine]
 

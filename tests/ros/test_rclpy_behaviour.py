@@ -6,15 +6,15 @@ Each behaviour runs in a process of its own, because it might crash it.
 import json
 import shutil
 import signal
-import subprocess
 import sys
 import sysconfig
 import time
 from pathlib import Path
 
-import generated
 import pytest
-from installed import HERE, SHARE, generate
+
+from tests.support import generated
+from tests.support.installed import SHARE, generate
 
 QUIET = [
     "nothing_is_loaded_before_rclpy_asks",
@@ -40,26 +40,13 @@ def classes(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def start(classes, ros_environment):
-    """Start a behaviour; it is ended with the test."""
-    processes = []
+def start(classes, program):
+    """Start a behaviour."""
 
     def begin(*words, path=classes):
-        process = subprocess.Popen(
-            [sys.executable, str(HERE / "behaviour.py"), *words],
-            env={**ros_environment, "PYTHONPATH": str(path)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
-        return process
+        return program("behaviour.py", *words, path=path)
 
-    yield begin
-    for process in processes:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+    return begin
 
 
 def finish(process):

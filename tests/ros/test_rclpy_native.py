@@ -8,10 +8,12 @@ import json
 import sys
 
 import pytest
-from installed import HERE, SHARE, interfaces, interfaces_in, names_in
-from native import install, model_of
-from sides import OURS, PACKAGES, STANDARD, Side
-from tools import run
+
+from tests.support.installed import SHARE, interfaces, interfaces_in, names_in
+from tests.support.native import install, model_of
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS, PACKAGES, STANDARD, Side
+from tests.support.tools import run
 
 #: The namespace of the second side.
 FAR = "/far"
@@ -29,7 +31,7 @@ def prefix(tmp_path_factory):
 @pytest.fixture
 def environment(ros_environment, prefix):
     """Return an environment in which the libraries are found, and endpoints for certain."""
-    profiles = {"FASTDDS_DEFAULT_PROFILES_FILE": str(HERE / "no_type_lookup.xml")}
+    profiles = {"FASTDDS_DEFAULT_PROFILES_FILE": str(PROGRAMS / "no_type_lookup.xml")}
     return {**ros_environment, **profiles, "AMENT_PREFIX_PATH": str(prefix)}
 
 
@@ -44,11 +46,11 @@ def talk(environment, tmp_path, path_of, shapes):
     def run(names, ours, theirs):
         file = tmp_path / "known.json"
         file.write_text(json.dumps({"names": names, "shapes": shapes[0]}), encoding="utf-8")
-        peer = (HERE / "peer.py", "messages")
+        peer = (PROGRAMS / "peer.py", "messages")
         far = ("--ros-args", "--remap", f"__ns:={FAR}")
         start(path_of(*ours), *peer, "one", "two", file)
         start(path_of(*theirs), *peer, "two", "one", file, *far)
-        start(str(HERE), HERE / "native_bridge.py", FAR, file)
+        start(str(PROGRAMS), PROGRAMS / "native_bridge.py", FAR, file)
         assert [side.ready() for side in sides] == [[f"looked at {len(names)}"]] * 3
         assert [side.finish() for side in reversed(sides)] == [[], [], []]
 
@@ -71,5 +73,5 @@ def test_every_message_of_own_packages(talk):
 
 def test_events_feedback_and_a_hundred_creations(environment, path_of):
     environment["PYTHONPATH"] = path_of("my_robot_controller")
-    said = run(sys.executable, HERE / "native_events.py", FAR, env=environment)
+    said = run(sys.executable, PROGRAMS / "native_events.py", FAR, env=environment)
     assert said == "cycles 100\n"

@@ -13,10 +13,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from installed import HERE, SHARE, generate, interfaces, interfaces_in, names_in
+
+from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
+from tests.support.paths import EVERY_KIND, EXAMPLE, PROGRAMS
 
 PACKAGES = ("diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs")
-OURS = (HERE / "every_kind", HERE.parents[1] / "examples" / "my_robot_controller")
+OURS = (EVERY_KIND, EXAMPLE)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +27,7 @@ def walker(tmp_path_factory) -> Path:
     library = tmp_path_factory.mktemp("walker") / "walker.so"
     prefix = Path(sys.prefix)
     command = [os.environ.get("CC", "cc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
-    command += ["-o", library, HERE / "walker.c", f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
+    command += ["-o", library, PROGRAMS / "walker.c", f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
     for package in ("rcutils", "rosidl_runtime_c", "rosidl_typesupport_interface"):
         command += [f"-I{prefix / 'include' / package}"]
     command += [f"-I{prefix / 'include' / 'rosidl_typesupport_introspection_c'}", "-lpthread"]
@@ -39,11 +41,11 @@ def look(tmp_path_factory, ros_environment, walker):
     classes = tmp_path_factory.mktemp("classes")
     for files in (*(SHARE / package for package in (*PACKAGES, "test_msgs")), *OURS):
         generate(files, classes / files.name)
-    environment = {**ros_environment, "PYTHONPATH": f"{HERE}:{classes}", "WALKER": str(walker)}
+    environment = {**ros_environment, "PYTHONPATH": f"{PROGRAMS}:{classes}", "WALKER": str(walker)}
 
     def run(script, *words):
         done = subprocess.run(
-            [sys.executable, str(HERE / script), *words],
+            [sys.executable, str(PROGRAMS / script), *words],
             env=environment,
             capture_output=True,
             text=True,

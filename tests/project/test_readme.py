@@ -1,0 +1,71 @@
+"""What the README shows is what happens."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import EXAMPLE, ROOT
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def run(*words: object, cwd: Path) -> subprocess.CompletedProcess:
+    command = [sys.executable, *map(str, words)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def compiled(tmp_path) -> Path:
+    """Return a folder in which the README's first command was carried out."""
+    (words,) = re.findall(r"^    idlc (gen interfaces/ .*)$", README, re.MULTILINE)
+    shutil.copytree(EXAMPLE, tmp_path / "interfaces")
+    done = run("-m", "idlc", *words.split(), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    return tmp_path
+
+
+def test_the_examples_run_one_after_the_other(compiled):
+    codes = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(codes) == 2
+    done = run("-c", "".join(codes), cwd=compiled)
+    assert done.returncode == 0, done.stderr
+
+
+def test_what_the_classes_are_said_to_offer(compiled):
+    (names,) = re.findall(r"API of rosidl's: (.*?)\.\n", README, re.DOTALL)
+    shown = re.findall(r"`([\w.]+)(?:\(\))?`", names)
+    assert len(shown) >= 4
+    code = "\n".join(
+        [
+            "from my_robot_controller.msg import RobotCommand",
+            "from my_robot_controller.srv import AddTwoInts",
+            "from my_robot_controller.action import Countdown",
+            *(name if "." in name else f"RobotCommand.{name}" for name in shown),
+        ]
+    )
+    done = run("-c", code, cwd=compiled)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_error_looks_like_that(tmp_path):
+    (shown,) = re.findall(r"```\n(error.*?)```", README, re.DOTALL)
+    path = tmp_path / "demo_msgs" / "msg" / "Scan.msg"
+    path.parent.mkdir(parents=True)
+    path.write_text("std_msgs/Header header\nflot64[<=3] ranges  # [m]\n", encoding="utf-8")
+    done = run("-m", "idlc", "check", "demo_msgs", cwd=tmp_path)
+    assert done.returncode == 1
+    assert shown in done.stdout + done.stderr
+
+
+def test_every_make_target_and_command_exists():
+    targets = set(re.findall(r"(?:^    |`)make ([a-z-]+)", README, re.MULTILINE))
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert {"demo", "test"} <= targets
+    assert targets <= set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    for command in sorted(set(re.findall(r"^    idlc ([a-z]+) ", README, re.MULTILINE))):
+        done = run("-m", "idlc", command, "--help", cwd=ROOT)
+        assert done.returncode == 0, command
