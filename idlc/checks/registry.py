@@ -96,6 +96,7 @@ def package_advice() -> tuple[PackageRule, ...]:
         PackageRule(manifest.declared_imports, (codes.UNDECLARED_IMPORT,)),
         PackageRule(installation.installed_interfaces, (codes.INTERFACES_NOT_INSTALLED,)),
         PackageRule(installation.resource_marker, (codes.NO_RESOURCE_MARKER,)),
+        PackageRule(installation.installed_libraries, (codes.NO_LIBRARY_INSTALLED,)),
         PackageRule(installation.entry_points, (codes.BAD_ENTRY_POINT,)),
         PackageRule(installation.names, (codes.NAME_MISMATCH,)),
         PackageRule(installation.current_output, (codes.STALE_GENERATED_CODE,)),

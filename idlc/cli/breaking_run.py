@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import datetime
 import sys
+from typing import TYPE_CHECKING
 
 import click
 import msgspec
 
 from idlc.cli import output, reports
+from idlc.diagnostics.formats.github import notice
+from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report, first_few
 from idlc.disk import command_settings, pyproject
 from idlc.disk.scope import scope
 from idlc.driver.breaking import BreakingOptions, Verdict, breaking
 from idlc.driver.check import Checked
+
+if TYPE_CHECKING:
+    from idlc.driver.graph import GraphVerdict
+
+GRAPH = "graph"
+PATIENCE = 5.0
 
 
 class BreakingWishes(msgspec.Struct, frozen=True):
@@ -21,6 +30,7 @@ class BreakingWishes(msgspec.Struct, frozen=True):
 
     paths: tuple[str, ...]
     against: str | None
+    timeout: float | None
     levels: tuple[str, ...]
     package: str | None
     include: tuple[str, ...]
@@ -34,10 +44,12 @@ def compare(typed: BreakingWishes) -> int:
     settings = pyproject.load(report)
     against = typed.against or command_settings.against(settings, report)
     allowed = command_settings.allowances(settings, report)
-    verdict = None
-    if not report.had_errors:
-        if against is None:
-            raise click.UsageError("give --against DIR, git:REF or idlc.lock")
+    if against is None and not report.had_errors:
+        raise click.UsageError("give --against DIR, git:REF, idlc.lock or graph")
+    if typed.timeout is not None and against != GRAPH:
+        raise click.UsageError("--timeout is for --against graph")
+    verdict: Verdict | GraphVerdict | None = None
+    if against is not None and not report.had_errors:
         wanted = BreakingOptions(
             paths=typed.paths or settings.paths or (".",),
             against=against,
@@ -47,15 +59,28 @@ def compare(typed: BreakingWishes) -> int:
             allowed_in=settings.source.path if settings.source else "",
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
-        verdict = breaking(wanted, report)
+        verdict = _compared(wanted, typed, report)
     _show(report, verdict, typed.style)
     return output.status(report)
 
 
-def _show(report: Report, verdict: Verdict | None, style: str) -> None:
+def _compared(
+    wanted: BreakingOptions, typed: BreakingWishes, report: Report
+) -> Verdict | GraphVerdict | None:
+    if wanted.against != GRAPH:
+        return breaking(wanted, report)
+    from idlc.driver.graph import compare_with_graph
+
+    patience = typed.timeout or PATIENCE
+    return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))
+
+
+def _show(report: Report, verdict: Verdict | GraphVerdict | None, style: str) -> None:
     if style == "json":
         output.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
+        for endpoint in facts.pop("endpoints", ()):
+            output.fact(sys.stdout, "endpoint", **endpoint._asdict())
         output.fact(sys.stdout, "summary", **output.counts(report), **facts)
     elif style == "text":
         output.show(report, style, sys.stdout)
@@ -64,18 +89,27 @@ def _show(report: Report, verdict: Verdict | None, style: str) -> None:
     else:
         reports.write(report, style, Checked(()), sys.stdout, command="breaking")
         if style == "github" and verdict:
-            from idlc.diagnostics.formats.github import notice
-
             sys.stdout.write(notice("idlc breaking", _summary(verdict)))
 
 
-def _summary(verdict: Verdict) -> str:
+def _summary(verdict: Verdict | GraphVerdict) -> str:
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
     if verdict.allowed:
         text += f"; allowed: {verdict.allowed}"
-    if verdict.added:
-        text += f"; added: {first_few(verdict.added, 5)}"
+    return text + (_next(verdict) if isinstance(verdict, Verdict) else _seen(verdict))
+
+
+def _seen(verdict: GraphVerdict) -> str:
+    """Return what was looked at."""
+    seen = [counted(number, noun) for noun, number in verdict.seen.items()]
+    text = f"; looked at {', '.join(seen)}"
+    return f"{text}; without type hash: {verdict.silent}" if verdict.silent else text
+
+
+def _next(verdict: Verdict) -> str:
+    """Return what was added, and which version comes next."""
+    text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
     if verdict.part is None:
         return f"{text}; the versions are the same"
     if verdict.next_version:

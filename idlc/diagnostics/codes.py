@@ -145,6 +145,7 @@ BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING, PACKAGE)
 NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING, PACKAGE)
 UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING, PACKAGE)
 STALE_GENERATED_CODE = Code("IDL460", "stale-generated-code", WARNING, PACKAGE)
+NO_LIBRARY_INSTALLED = Code("IDL461", "no-library-installed", WARNING, PACKAGE)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
@@ -169,6 +170,8 @@ USED_TYPE_CHANGED = Code("IDL515", "used-type-changed", ERROR)
 HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
+SEVERAL_VERSIONS = Code("IDL530", "several-versions", ERROR)
+SEVERAL_TYPES = Code("IDL531", "several-types", ERROR)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
@@ -195,6 +198,9 @@ CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 NO_SUCH_REVISION = Code("IDL630", "no-such-revision", ERROR, usage=True)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR, usage=True)
+UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
+NO_RCLPY = Code("IDL640", "no-rclpy", ERROR, usage=True)
+EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR, usage=True)
 
 # idlc itself
 INTERNAL_ERROR = Code("IDL901", "internal-error", ERROR)

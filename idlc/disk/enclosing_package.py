@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.checks.package import package_xml
 from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.read import is_file, is_folder, read_bytes, read_source
 
 if TYPE_CHECKING:
     from idlc.checks.package.facts import Statement
-    from idlc.diagnostics.report import Diagnostic, Report
+    from idlc.diagnostics.report import Diagnostic
 
 MANIFEST = "package.xml"
 
@@ -55,6 +57,14 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
         )
         return None
     return declared
+
+
+def declared_version(path: Path) -> str:
+    """Return the version in a package.xml; empty if it has none or cannot be read."""
+    data = read_bytes(path, path.as_posix(), Report())
+    with contextlib.suppress(package_xml.NotXmlError):
+        return next(iter(package_xml.read(data or b"").texts("version")), "")
+    return ""
 
 
 def _broken(data: bytes, name: str, error: package_xml.NotXmlError) -> Diagnostic:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
@@ -13,6 +13,7 @@ from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
 from idlc.disk.read import absolute, shown
 from idlc.driver.stages import compile_package, stage
+from idlc.emit.render import support_packages
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.scaffold import new_interface as interface_text
@@ -44,13 +45,19 @@ class Result(NamedTuple):
 
 
 def package(
-    wanted: package_files.Package, folder: str, settings: Settings, report: Report
+    wanted: package_files.Package,
+    folder: str,
+    settings: Settings,
+    report: Report,
+    starters: Mapping[str, str] | None = None,
 ) -> Result | None:
-    """Write a new package below `folder`."""
+    """Write a new package below `folder`, with interfaces if it has none yet."""
     name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
     project = Project(name, report, force=settings.force)
     with stage("scaffold", wanted.name):
         files = package_files.files(wanted)
+    if not any(project.names(kind) for kind in ir.KINDS):
+        files |= starters or {}
     # what later commands add to stays as it is
     growing = (*_GROWING, f"launch/{wanted.name}_launch.py")
     new = {
@@ -101,8 +108,10 @@ def interface(
     setup = project.text("setup.py")
     if setup is not None and lists is None:
         kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
-        packages = [own, f"{own}._idlc", *(f"{own}.{one}" for one in sorted(kinds))]
-        edits.append(("setup.py", data_files.add_packages(setup, packages)))
+        parts = [*support_packages(), *sorted(kinds)]
+        packages = [own, *(f"{own}.{part}" for part in parts)]
+        wired = data_files.add_libraries(setup)
+        edits.append(("setup.py", data_files.add_packages(wired, packages)))
     edited = accepted(project, edits, report)
     if edited is None:
         return None

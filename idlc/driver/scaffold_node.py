@@ -161,7 +161,10 @@ def _edits(project: Project, planned: Plan) -> dict[str, Outcome]:
 def _descriptions(project: Project) -> dict[str, str]:
     """Return the texts of the files by which Python installs the package."""
     names = ("pyproject.toml", "setup.cfg", "setup.py")
-    return {name: text for name in names if (text := project.text(name)) is not None}
+    found = {name: text for name in names if (text := project.text(name)) is not None}
+    if "setup.py" in found and any(map(project.names, ir.KINDS)):
+        found["setup.py"] = data_files.add_libraries(found["setup.py"])
+    return found
 
 
 def _launched(

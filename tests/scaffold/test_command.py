@@ -235,10 +235,35 @@ def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
     assert "Bo" in (tmp_path / "other/setup.py").read_text()
 
 
-def test_interfaces_only_is_for_cmake(tmp_path, monkeypatch):
+def test_a_package_of_interfaces_has_one_to_begin_with(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["scaffold", "package", "demo_interfaces", "--interfaces-only"]) == 0
-    assert (tmp_path / "demo_interfaces/CMakeLists.txt").is_file()
+    package = ["scaffold", "package", "--interfaces", "demo_msgs"]
+    assert main([*package, "--dry-run"]) == 0
+    assert "+++ b/demo_msgs/msg/Example.msg" in capsys.readouterr().out
+    assert not (tmp_path / "demo_msgs").exists()
+    assert main(package) == 0
+    assert (tmp_path / "demo_msgs/CMakeLists.txt").is_file()
+    parse_package(tmp_path / "demo_msgs").validate()
+    assert main(["check", "demo_msgs"]) == 0
+    assert "no problems in 1 file" in capsys.readouterr().out
+    # none is added to others, so that the command can be run again
+    (tmp_path / "demo_msgs/msg/Example.msg").rename(tmp_path / "demo_msgs/msg/Drive.msg")
+    assert main(package) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("word", ["drive", "x/Drive", "../Drive", "srv/../Drive", "msg/", "a b"])
+def test_interfaces_to_begin_with_have_names(word, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "--interfaces", "demo_msgs", word]) == 2
+    assert "Error: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_interfaces_to_begin_with_are_for_packages_of_interfaces(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo", "Drive"]) == 2
+    assert "go with --interfaces" in capsys.readouterr().err
 
 
 def test_a_launch_file_that_cannot_be_edited_leaves_the_rest(package, capsys):

@@ -5,7 +5,7 @@ The positions are expat's, so that a file can be edited without being written an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 from xml.parsers import expat
 
@@ -34,6 +34,7 @@ class Element(NamedTuple):
     text: str
     start: int
     end: int
+    attributes: Mapping[str, str]
 
 
 class Manifest(NamedTuple):
@@ -70,7 +71,7 @@ def read(data: bytes, encoding: str | None = None) -> Manifest:
 class _Reader:
     """Collects elements while expat reads.
 
-    `open` are the tags of the open elements, `begun` start and texts of those that may matter.
+    `open` are the tags of the open elements, `begun` start, attributes and texts of those that may.
     """
 
     def __init__(self, data: bytes, encoding: str | None) -> None:
@@ -78,7 +79,7 @@ class _Reader:
         self.format = ""
         self.found: list[Element] = []
         self.open: list[str] = []
-        self.begun: list[tuple[int, list[str]]] = []
+        self.begun: list[tuple[int, dict[str, str], list[str]]] = []
         self.parser = expat.ParserCreate(encoding)
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start
@@ -90,19 +91,20 @@ class _Reader:
             self.format = attributes.get("format", "1")
         self.open.append(tag)
         if len(self.open) in _DEPTHS:
-            self.begun.append((self.parser.CurrentByteIndex, []))
+            self.begun.append((self.parser.CurrentByteIndex, attributes, []))
 
     def _end(self, tag: str) -> None:
         depth = len(self.open)
         self.open.pop()
         if depth in _DEPTHS:
-            start, texts = self.begun.pop()
+            start, attributes, texts = self.begun.pop()
             if (parents := tuple(self.open)) in _PARENTS:
                 end = self.data.find(b">", self.parser.CurrentByteIndex) + 1
-                self.found.append(Element(parents, tag, "".join(texts).strip(), start, end))
+                text = "".join(texts).strip()
+                self.found.append(Element(parents, tag, text, start, end, attributes))
 
     def _text(self, text: str) -> None:
-        for _, texts in self.begun:
+        for _, _, texts in self.begun:
             texts.append(text)
 
 
@@ -122,4 +124,4 @@ def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterato
         characters += len(data[at : element.start].decode("utf-8"))
         at = element.start
         span = Span(source, characters, characters + len(element.tag) + 2)
-        yield Statement(element.tag, element.text, span)
+        yield Statement(element.tag, element.text, span, element.attributes)

@@ -31,8 +31,15 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock",
-    help="The version to compare with: a folder, a git revision, or the type hashes in a lock.",
+    metavar="DIR|git:REF|idlc.lock|graph",
+    help="The version to compare with: a folder, a git revision, the type hashes in a lock, or "
+    "what the nodes of the running ROS 2 graph use (a folder of that name is ./graph).",
+)
+@click.option(
+    "--timeout",
+    metavar="SECONDS",
+    type=click.FloatRange(min=0, min_open=True),
+    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 5]",
 )
 @click.option(
     "--level",
@@ -48,6 +55,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 def command(
     paths: tuple[str, ...],
     against: str | None,
+    timeout: float | None,
     levels: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
@@ -58,8 +66,13 @@ def command(
 
     wire: bytes recorded before are read wrongly or not at all. hash: endpoints of both versions
     do not talk. source: code fails. behaviour: the same code does something else.
+
+    Against the graph, it reports the types of which running nodes have several versions, or
+    another one than the files here or the installed packages.
     """
     from idlc.cli.breaking_run import BreakingWishes, compare
 
-    typed = BreakingWishes(paths, against, levels or LEVELS, package, include, exclude, style)
+    typed = BreakingWishes(
+        paths, against, timeout, levels or LEVELS, package, include, exclude, style
+    )
     return compare(typed)

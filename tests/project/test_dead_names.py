@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from tests.support.paths import ROOT
 
-#: What is called by its name from outside: click, pytest, Python.
-CALLED = re.compile(r"__\w+__|pytest_\w+|command")
+#: What is called by its name from outside: by click, pytest, Python, and PEP 517's frontends.
+CALLED = re.compile(r"__\w+__|pytest_\w+|command|(get_requires_for_)?build_\w+")
 SEARCHED = ("idlc", "tests", "benchmarks", "examples")
 WORD = re.compile(r"\w+")
 

@@ -20,7 +20,7 @@ from tests.support.paths import DOCS, ROOT
 PAGES = DOCS / "contributing"
 COPIED = ("idlc", "templates", "tests", "docs", "golden/diag", "golden/gen", "examples")
 #: What `make test` looks at here: the whole suite takes minutes.
-TESTS = ("rules", "golden_diag", "check", "cli")
+TESTS = ("rules", "golden_diag", "check", "command_line")
 
 
 @pytest.fixture
