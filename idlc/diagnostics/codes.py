@@ -172,6 +172,7 @@ STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
+BROKEN_TEMPLATE = Code("IDL623", "broken-template", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
 
@@ -193,6 +194,7 @@ USAGE: frozenset[str] = frozenset(
         BAD_LOCK,
         NO_SUCH_TYPE,
         STRUCTURE_TOO_LARGE,
+        BROKEN_TEMPLATE,
         NO_REVISION,
         DUPLICATE_PACKAGE,
     )

@@ -39,6 +39,7 @@ class Config(msgspec.Struct, frozen=True):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     vendor_deps: bool = False
+    templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
@@ -51,6 +52,7 @@ _SHAPES = {
     "out": "a string",
     "package": "a string",
     "vendor-deps": "true or false",
+    "templates": "a string",
     "breaking": "a table",
     "check": "a table",
 }
@@ -119,6 +121,7 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         include=tuple(_typed(folder, path) for path in found.get("include", ())),
         exclude=tuple(found.get("exclude", ())),
         vendor_deps=found.get("vendor-deps", False),
+        templates=_typed(folder, found["templates"]) if "templates" in found else None,
         tables={key: value for key, value in found.items() if _SHAPES[key] == "a table"},
         source=source,
         folder=folder,
