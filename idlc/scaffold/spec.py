@@ -74,7 +74,8 @@ def check_name(name: str) -> str:
 def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
     """Return the endpoint that an option's value means, with a quality of service by its name."""
     if preset is not None and role.kind != "msg":
-        raise ValueError("--qos is for publishers and subscribers")
+        options = ", ".join(one.option for one in ROLES if one.kind == "msg")
+        raise ValueError(f"--qos is for {options}")
     quality = qos.DEFAULT if preset is None else qos.preset(preset)
     return Endpoint(role, *role.read(text), quality)
 

@@ -48,7 +48,7 @@ _OWNERS = "idlc.qos"
 
 def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
     """Return which endpoint each --qos comes after; `order` names the options as given."""
-    names = {role.name for role in ROLES}
+    names = {role.name for role in ROLES if role.kind}
     counts: Counter[str] = Counter()
     last: tuple[str, int] | None = None
     owners = []

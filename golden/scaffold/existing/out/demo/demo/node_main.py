@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 import signal
 from threading import Event
@@ -16,7 +16,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import ok, try_shutdown
+from rclpy.utilities import get_default_context, try_shutdown
 
 Main = Callable[..., None]
 
@@ -32,21 +32,25 @@ class WakingExecutor(SingleThreadedExecutor):
 def until_shutdown(main: Main) -> Main:
     """Make `main` return quietly on Ctrl-C, SIGTERM or a shutdown of rclpy."""
 
+    def run(args: list[str] | None) -> None:
+        try:
+            main(args)
+        except Exception:
+            # a signal can shut rclpy down before the node is complete, which is no error
+            context = get_default_context()
+            if context.handle is None or context.ok():
+                raise
+
     @wraps(main)
     def quiet(args: list[str] | None = None) -> None:
         try:
-            main(args)
+            run(args)
         except (KeyboardInterrupt, ExternalShutdownException):
             pass
-        except Exception:
-            if ok():
-                raise
-            # otherwise rclpy was shut down before the node was complete
         finally:
-            try:
+            # the signal that ended the node may be shutting rclpy down right now
+            with suppress(KeyboardInterrupt, RuntimeError):
                 try_shutdown()
-            except RuntimeError:
-                pass  # the signal that ended the node is shutting rclpy down right now
 
     return quiet
 
@@ -75,12 +79,9 @@ class Once:
         """Run a coroutine that returns whether it succeeded; `cancel` it if interrupted."""
         self._executor.add_node(node)
         task = self._executor.create_task(work, request)
-        try:
-            while not (task.done() or self._interrupted.is_set()):
-                self._executor.spin_once(timeout_sec=0.1)
-        except ExternalShutdownException:
-            self._succeeded = False
-            return
+        ended = self._interrupted.is_set
+        while self._executor.context.ok() and not (task.done() or ended()):
+            self._executor.spin_once(timeout_sec=0.1)
         self._succeeded = self._succeeded and bool(task.result())
         if self._interrupted.is_set() and cancel is not None:
             task = self._executor.create_task(cancel)
