@@ -55,6 +55,11 @@ def runtime_files() -> tuple[RenderedFile, ...]:
     )
 
 
+def support_packages() -> list[str]:
+    """Return the Python packages that the support package consists of, itself first."""
+    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
+
+
 def module_file(
     interface: ir.Interface, model: link.Model, modules: pynames.Modules
 ) -> RenderedFile:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from idlc.emit.render import support_packages
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.scaffold import new_interface
@@ -32,9 +33,8 @@ def enter(
         edits[CMAKE] = cmake.add_dependencies(texts[CMAKE], needed)
         return edits
     if SETUP in texts:
-        own = model.package
-        kinds = sorted({key.partition("/")[0] for key in keys})
-        packages = [own, f"{own}._idlc", *(f"{own}.{kind}" for kind in kinds)]
+        parts = [*support_packages(), *sorted({key.partition("/")[0] for key in keys})]
+        packages = [model.package, *(f"{model.package}.{part}" for part in parts)]
         edits[SETUP] = data_files.add_packages(texts[SETUP], packages)
     return edits
 
