@@ -175,7 +175,7 @@ def test_files_keep_their_mode(package):
         (["node", "a", "--timer", "1", "--qos", "latched"], "comes after the endpoint"),
         (["node", "a", "--publisher", "std_msgs/String:a\0qos=latched"], "cannot be the name"),
         (["node", "a", "--param", "x"], "NAME:TYPE=DEFAULT"),
-        (["node", "a", "--param", "x:int=1.5"], "is no int"),
+        (["node", "a", "--param", "x:int=1.5"], "is not an integer"),
         (["node", "a", "--timer", "soon"], "number of seconds"),
         (["interface", "msg", "my_message", "int8 a"], "cannot be an interface"),
         (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),

@@ -111,7 +111,8 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
             return _BOOLEANS[text.lower()]
         value = type_(text)
     except (ValueError, KeyError):
-        raise ValueError(f"`{text}` is no {type_.__name__}, for the parameter `{name}`") from None
+        what = {"int": "an integer", "str": "a string"}.get(type_.__name__, f"a {type_.__name__}")
+        raise ValueError(f"`{text}` is not {what}, for the parameter `{name}`") from None
     if isinstance(value, float) and value - value != 0:
         raise ValueError(f"`{text}` is not finite, for the parameter `{name}`")
     if isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:

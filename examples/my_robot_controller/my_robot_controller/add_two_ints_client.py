@@ -78,7 +78,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def add_two_ints_request(given: argparse.Namespace) -> AddTwoInts.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return AddTwoInts.Request(
         a=given.a,
         b=given.b,

@@ -112,7 +112,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def countdown_request(given: argparse.Namespace) -> Countdown.Goal:
-    """Return the goal that the command line asks for."""
+    """Return the goal that the command line describes."""
     return Countdown.Goal(
         target_count=given.target_count,
     )

@@ -113,7 +113,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def execute_task_request(given: argparse.Namespace) -> ExecuteTask.Goal:
-    """Return the goal that the command line asks for."""
+    """Return the goal that the command line describes."""
     return ExecuteTask.Goal(
         task_name=given.task_name,
     )

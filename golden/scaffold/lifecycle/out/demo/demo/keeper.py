@@ -175,7 +175,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def switch_request(given: argparse.Namespace) -> SetBool.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return SetBool.Request(
         data=given.data,
     )

@@ -84,7 +84,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def ask_request(given: argparse.Namespace) -> Ask.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return Ask.Request(
         question=given.question,
         loud=given.loud,

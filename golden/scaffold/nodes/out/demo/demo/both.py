@@ -129,7 +129,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def ask_request(given: argparse.Namespace) -> Ask.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return Ask.Request(
         question=given.ask_question,
         loud=given.ask_loud,
@@ -138,7 +138,7 @@ def ask_request(given: argparse.Namespace) -> Ask.Request:
 
 
 def dock_request(given: argparse.Namespace) -> Dock.Goal:
-    """Return the goal that the command line asks for."""
+    """Return the goal that the command line describes."""
     return Dock.Goal(
         station=given.dock_station,
     )

@@ -104,7 +104,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def dock_request(given: argparse.Namespace) -> Dock.Goal:
-    """Return the goal that the command line asks for."""
+    """Return the goal that the command line describes."""
     return Dock.Goal(
         station=given.station,
     )
