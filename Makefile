@@ -5,7 +5,7 @@
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
-#                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu
+#                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
@@ -30,7 +30,7 @@ LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros -m 'not ros'
-WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),--ignore=tests/test_docs_browser.py)
+WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),--ignore=tests/cli/test_docs_browser.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
@@ -60,15 +60,15 @@ ifeq ($(ROS),no)
 	@echo 'without the ROS 2 wheels: the tests marked "ros" are left out'
 endif
 ifeq ($(BROWSER),no)
-	@echo 'without Chromium: tests/test_docs_browser.py is left out'
+	@echo 'without Chromium: tests/cli/test_docs_browser.py is left out'
 endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
-	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py $(ARGS)
+	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py tests/ros/test_native_*.py $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
-	@PYTHON=$(PYTHON) sh tests/every_python.sh $(INTERPRETERS)
+	@PYTHON=$(PYTHON) sh tests/project/every_python.sh $(INTERPRETERS)
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
@@ -76,11 +76,13 @@ test-lowest: ## run the tests that need no ROS with the lowest versions that pyp
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
-	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/test_fuzz.py tests/test_limits.py \
-	    tests/test_emit_hostile.py $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
+	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
+	    tests/hardening/test_limits.py tests/runtime/test_hostile.py \
+	    $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
 	@if $(TEST_ENV)/bin/python $(PIP_INSTALL) atheris; then \
-	    for target in $$(cd tests && ../$(TEST_ENV)/bin/python -c 'import fuzzing; print(*fuzzing.TARGETS)'); do \
-	        PYTHONPATH=tests $(TEST_ENV)/bin/python tests/fuzz_atheris.py $$target 300 || exit 1; \
+	    for target in $$($(TEST_ENV)/bin/python -c \
+	        'from tests.support.fuzzing import TARGETS; print(*TARGETS)'); do \
+	        $(TEST_ENV)/bin/python -m tests.hardening.fuzz_atheris $$target 300 || exit 1; \
 	    done; \
 	else echo 'atheris has no build for this Python: its part is left out'; fi
 

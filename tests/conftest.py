@@ -1,8 +1,9 @@
 import signal
 
-import generated
 import pytest
 from hypothesis import HealthCheck, settings
+
+from tests.support import generated
 
 # Who starts tests in the background may ignore these, and what tests start would, too.
 for number, handler in (
@@ -25,6 +26,14 @@ def pytest_terminal_summary(terminalreporter):
         for name, value in report.user_properties:
             if name == "found":
                 terminalreporter.write_line(f"{report.nodeid}: {value}")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """The working folder: empty, and with no ROS but what is built in."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Names that ROS 2 refuses: packages, interfaces, and the same name twice (spec section 2.2)."""
+"""Names that ROS 2 refuses: packages, interfaces, and the same name twice (language 2.2)."""
 
 from __future__ import annotations
 

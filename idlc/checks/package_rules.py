@@ -16,6 +16,7 @@ RULES = (
     manifest.declared_imports,
     installation.installed_interfaces,
     installation.resource_marker,
+    installation.installed_libraries,
     installation.entry_points,
     installation.names,
     installation.current_output,

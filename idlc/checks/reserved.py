@@ -1,4 +1,4 @@
-"""Names that ROS 2 accepts and that then break somebody's code (spec section 2.3).
+"""Names that ROS 2 accepts and that then break somebody's code (language 2.3).
 
 The verdict stays "accepted": a warning says who will suffer. idlc's own Python code copes with
 all of them.

@@ -16,7 +16,7 @@ def completed(wanted: GenOptions, settings: Config) -> GenOptions:
     """Return what was typed, with what pyproject.toml says where nothing was."""
     return wanted._replace(
         paths=wanted.paths or settings.paths,
-        out=wanted.out or settings.out or "",
+        out=wanted.out or ("" if wanted.ament else settings.out or ""),
         vendor_deps=wanted.vendor_deps or settings.vendor_deps,
     )
 

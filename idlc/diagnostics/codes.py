@@ -124,6 +124,7 @@ BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING)
 NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING)
 UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING)
 STALE_OUTPUT = Code("IDL460", "stale-generated-code", WARNING)
+NO_LIBRARY = Code("IDL461", "no-library-installed", WARNING)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
@@ -175,6 +176,7 @@ UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
 BROKEN_TEMPLATE = Code("IDL623", "broken-template", ERROR)
 NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
+UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
 
 # idlc itself
 INTERNAL = Code("IDL901", "internal-error", ERROR)

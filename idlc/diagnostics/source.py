@@ -23,7 +23,7 @@ class Source:
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
-        """The lines with their ends, split as `str.splitlines` does (spec 1.1)."""
+        """The lines with their ends, split as `str.splitlines` does (language 1.1)."""
         return tuple(self.text.splitlines(keepends=True))
 
     @cached_property

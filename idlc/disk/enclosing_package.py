@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.read import is_file, is_folder, read_bytes
 
 if TYPE_CHECKING:
-    from idlc.diagnostics.report import Diagnostic, Report
+    from idlc.diagnostics.report import Diagnostic
 
 MANIFEST = "package.xml"
 
@@ -39,30 +41,11 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
     data = read_bytes(path, name, report)
     if data is None:
         return None
-    found: list[str] = []
-    stack: list[str] = []
-    parser = expat.ParserCreate()
-    parser.buffer_text = True
-
-    def start(tag: str, _: dict[str, str]) -> None:
-        stack.append(tag)
-
-    def end(_: str) -> None:
-        stack.pop()
-
-    def text(content: str) -> None:
-        if stack == ["package", "name"]:
-            found.append(content)
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = text
     try:
-        parser.Parse(data, True)
+        declared = _text_of(data, "name")
     except (expat.ExpatError, ValueError, LookupError) as error:  # an unknown encoding
         report.add(_broken(data, name, error))
         return None
-    declared = "".join(found).strip()
     if not declared:
         report.add(
             codes.BAD_PACKAGE_XML.of(
@@ -73,6 +56,38 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
         )
         return None
     return declared
+
+
+def declared_version(path: Path) -> str:
+    """Return the version in a package.xml; empty if it has none or cannot be read."""
+    data = read_bytes(path, path.as_posix(), Report())
+    with contextlib.suppress(expat.ExpatError, ValueError, LookupError):
+        return _text_of(data or b"", "version")
+    return ""
+
+
+def _text_of(data: bytes, tag: str) -> str:
+    """Return the text of an element right below the root of a package.xml."""
+    found: list[str] = []
+    stack: list[str] = []
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+
+    def start(name: str, _: dict[str, str]) -> None:
+        stack.append(name)
+
+    def end(_: str) -> None:
+        stack.pop()
+
+    def text(content: str) -> None:
+        if stack == ["package", tag]:
+            found.append(content)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = text
+    parser.Parse(data, True)
+    return "".join(found).strip()
 
 
 def _broken(

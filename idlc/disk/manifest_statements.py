@@ -31,19 +31,20 @@ def read_statements(source: Source) -> tuple[Statement, ...]:
     parser.buffer_text = True
     above: list[str] = []
     texts: list[str] = []
-    begun: list[int] = []
-    found: list[tuple[str, str, int]] = []
+    begun: list[tuple[int, dict[str, str]]] = []
+    found: list[tuple[int, str, str, dict[str, str]]] = []
 
-    def start(tag: str, _: dict[str, str]) -> None:
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        if above in _PARENTS:
+            texts.clear()  # a description may hold elements
         above.append(tag)
-        begun.append(parser.CurrentByteIndex)
-        texts.clear()
+        begun.append((parser.CurrentByteIndex, attributes))
 
     def end(tag: str) -> None:
         del above[-1]
-        at = begun.pop()
+        at, attributes = begun.pop()
         if above in _PARENTS:
-            found.append((tag, "".join(texts).strip(), at))
+            found.append((at, tag, "".join(texts).strip(), attributes))
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end
@@ -56,12 +57,12 @@ def read_statements(source: Source) -> tuple[Statement, ...]:
 
 
 def _placed(
-    found: Iterable[tuple[str, str, int]], source: Source, data: bytes
+    found: Iterable[tuple[int, str, str, dict[str, str]]], source: Source, data: bytes
 ) -> Iterator[Statement]:
     """Yield elements with their places, which expat counts in bytes."""
     at = characters = 0
-    for tag, text, begun in sorted(found, key=lambda one: one[2]):
+    for begun, tag, text, attributes in sorted(found, key=lambda one: one[0]):
         characters += len(data[at:begun].decode("utf-8"))
         at = begun
         span = Span(source, characters, characters + len(tag) + 2)
-        yield Statement(tag, text, span)
+        yield Statement(tag, text, span, attributes)

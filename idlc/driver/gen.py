@@ -11,11 +11,13 @@ from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
+from idlc.disk.output.overlay import Overlay
 from idlc.disk.package_names import accept_name
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.gen_package import Package, as_inputs, package_of
+from idlc.driver.overlay import enter
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import derive, ir
 
@@ -24,14 +26,15 @@ if TYPE_CHECKING:
 
 
 class GenOptions(NamedTuple):
-    """What `idlc gen` was asked to do."""
+    """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both."""
 
     paths: tuple[str, ...]
-    out: str
+    out: str = ""
     scope: Scope = Scope()
     check: bool = False
     vendor_deps: bool = False
     force: bool = False
+    ament: str = ""
 
 
 class Generated(NamedTuple):
@@ -52,16 +55,45 @@ class Generated(NamedTuple):
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
+    runs = [options._replace(ament="")] if options.out else []
+    runs += [options] if options.ament else []  # OUT may give the package its name
+    done: list[Generated] = []
+    for run in runs:
+        done += () if report.had_errors else _written(run, report)
+    report.notes[:] = dict.fromkeys(report.notes)
+    return () if report.had_errors else tuple(done)
+
+
+def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     paths = [word for word in options.paths if not _is_name(word)]
-    named = _named([word for word in options.paths if _is_name(word)], options.scope, report)
+    words = [word for word in options.paths if _is_name(word)]
+    named = _named(words, options.scope, report, whole=bool(options.ament))
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
-    found = targets(given, options.out, report, force=options.force) if given else ()
+    found = _targets(given, options, report) if given else ()
     if not found:
         return ()
     with found[0].alone(beside=options.vendor_deps or len(found) > 1):
-        return _made(dict(zip(found, given, strict=True)), options, report)
+        done = _made(dict(zip(found, given, strict=True)), options, report)
+        if isinstance(found[0], Overlay) and done and not options.check:
+            enter(found[0])
+        return done
+
+
+def _targets(
+    given: Sequence[inputs.Inputs], options: GenOptions, report: Report
+) -> tuple[Target, ...]:
+    """Return the folder that each package is written to."""
+    if not options.ament:
+        return targets(given, options.out, report, force=options.force)
+    prefix = options.ament.rstrip("/") or "/"
+    homes = (
+        (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
+        for one in given
+    )
+    found = [Overlay(prefix, name, home, report, force=options.force) for name, home in homes]
+    return tuple(found) if found[0].usable() else ()
 
 
 def _is_name(word: str) -> bool:
@@ -70,14 +102,21 @@ def _is_name(word: str) -> bool:
     return not is_path(word) and ("/" not in word or not last[:1].islower())
 
 
-def _named(words: Sequence[str], scope: Scope, report: Report) -> list[inputs.Inputs]:
-    """Return the packages that names mean, with those of their interfaces that are meant."""
+def _named(
+    words: Sequence[str], scope: Scope, report: Report, *, whole: bool
+) -> list[inputs.Inputs]:
+    """Return the packages that names mean, with those of their interfaces that are meant.
+
+    They are `whole` in a prefix, where they hide those of the same name in others.
+    """
     chosen: dict[str, set[ir.TypeName]] = {}
     found = []
     for word in words:
         library, meant = named_types.resolve(word, scope.include, report)
         for one in meant:
-            chosen.setdefault(one.interface.package, set()).add(one.interface)
+            package = one.interface.package
+            names = library.interfaces(package) if whole else (one.interface,)
+            chosen.setdefault(package, set()).update(names)
         found += [(library, package) for package in {one.interface.package for one in meant}]
     libraries = {package: library for library, package in found}
     return [borrowed(types, libraries[package]) for package, types in sorted(chosen.items())]

@@ -85,7 +85,8 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
         compile(text, path, "exec", dont_inherit=True)
     read = {path: project.text(path) for path in enter_node.paths(own, project.names("launch"))}
     texts = {path: text for path, text in read.items() if text is not None}
-    entry = enter_node.enter(planned, texts, files, used)
+    has_interfaces = any(map(project.names, ir.KINDS))
+    entry = enter_node.enter(planned, texts, files, used, has_interfaces=has_interfaces)
     if launch:
         entry = enter_node.launch(planned, texts, entry, used)
     return entry._replace(added={**files, **entry.added})

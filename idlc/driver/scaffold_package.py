@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from idlc.diagnostics.report import Report
 from idlc.disk.output.project import Project
 from idlc.driver.scaffold import Result, Settings, rendering, templates, write
+from idlc.model import ir
 from idlc.scaffold import new_package
 
 
 def package(
-    wanted: new_package.Package, folder: str, settings: Settings, report: Report
+    wanted: new_package.Package,
+    folder: str,
+    settings: Settings,
+    report: Report,
+    starters: Mapping[str, str] | None = None,
 ) -> Result | None:
-    """Write a new package below `folder`."""
+    """Write a new package below `folder`, with interfaces if it has none yet."""
     name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
     project = Project(name, report, force=settings.force)
     used = templates(settings, report)
@@ -20,6 +27,8 @@ def package(
     files: dict[str, str] = {}
     with rendering(wanted.name, report):
         files = new_package.files(wanted, used)
+    if not any(project.names(kind) for kind in ir.KINDS):
+        files |= starters or {}
     # what later commands add to stays as it is
     growing = (*new_package.GROWING, f"launch/{wanted.name}_launch.py")
     new = {

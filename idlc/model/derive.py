@@ -1,4 +1,4 @@
-"""The structures that services and actions imply, built in one place (spec section 5)."""
+"""The structures that services and actions imply, built in one place (language 5)."""
 
 from __future__ import annotations
 

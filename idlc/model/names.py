@@ -1,4 +1,4 @@
-"""Which names ROS 2 allows (spec section 2.2)."""
+"""Which names ROS 2 allows (language 2.2)."""
 
 from __future__ import annotations
 
@@ -52,6 +52,6 @@ def message_name_like(name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def snake_case(name: str) -> str:
-    """Return the module name that rosidl derives from an interface's name (spec section 7.1)."""
+    """Return the module name that rosidl derives from an interface's name (language 7.1)."""
     name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()

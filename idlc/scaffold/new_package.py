@@ -16,7 +16,7 @@ _TEXTS = Path(__file__).parent / "licenses"
 PYTHON = "ament_python"
 CMAKE = "ament_cmake"
 #: What interfaces need of ROS 2 itself: events of services, goals and states of actions.
-IMPLIED = ("action_msgs", "builtin_interfaces", "service_msgs", "unique_identifier_msgs")
+IMPLIED = ("action_msgs", "service_msgs", "unique_identifier_msgs")
 
 
 class Package(NamedTuple):
@@ -114,6 +114,7 @@ _PYTHON_FILES = {
 _CMAKE_FILES = {
     "package.xml": "package/package.xml.jinja",
     "CMakeLists.txt": "package/CMakeLists.txt.jinja",
+    "pyproject.toml": "package/interfaces_pyproject.toml.jinja",
     "README.md": "package/README.md.jinja",
 }
 #: Files of a new package that are edited later on.

@@ -12,7 +12,7 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 
-#: An ordinary character for ROS 2, and therefore wrong wherever it stands (spec 1.1).
+#: An ordinary character for ROS 2, and therefore wrong wherever it stands (language 1.1).
 BYTE_ORDER_MARK = "\ufeff"
 
 

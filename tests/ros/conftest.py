@@ -7,12 +7,14 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
-from installed import SHARE, generate, interfaces, interfaces_in, names_in
-from sides import OURS, PACKAGES
+
+from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS
 
 HERE = Path(__file__).parent
 
@@ -47,23 +49,42 @@ def _bound(held: socket.socket, domain: int) -> bool:
     return True
 
 
+@pytest.fixture
+def program(ros_environment):
+    """Start a file of programs/, with idlc's classes on PYTHONPATH; it ends with the test."""
+    processes = []
+
+    def start(name: str, *words: object, path: Path) -> subprocess.Popen:
+        process = subprocess.Popen(
+            [sys.executable, str(PROGRAMS / name), *map(str, words)],
+            env={**ros_environment, "PYTHONPATH": str(path)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
 @pytest.fixture(scope="session")
-def classes(tmp_path_factory) -> Path:
-    """Return a folder with idlc's classes of all packages, each in a folder of its own."""
+def path_of(tmp_path_factory):
+    """Return the PYTHONPATH on which `packages` are idlc's, each in a folder of its own."""
     folder = tmp_path_factory.mktemp("classes")
-    for package in PACKAGES:
-        generate(SHARE / package, folder / package / package)
-    for package, files in OURS.items():
-        generate(files, folder / package / package)
-    return folder
 
-
-@pytest.fixture(scope="session")
-def path_of(classes):
-    """Return the PYTHONPATH on which `packages` are idlc's."""
+    @cache
+    def classes(package: str) -> str:
+        generate(OURS.get(package, SHARE / package), folder / package / package)
+        return str(folder / package)
 
     def path(*packages: str) -> str:
-        return ":".join([str(HERE), *(str(classes / package) for package in packages)])
+        return ":".join([str(PROGRAMS), *map(classes, packages)])
 
     return path
 
@@ -74,7 +95,7 @@ def shapes(path_of, ros_environment):
     own_names = names_in(OURS, interfaces_in(OURS.values()))
     names = [*names_in(interfaces(), interfaces()), *own_names]
     done = subprocess.run(
-        [sys.executable, str(HERE / "shapes.py"), *names],
+        [sys.executable, str(PROGRAMS / "shapes.py"), *names],
         env={**ros_environment, "PYTHONPATH": path_of(*OURS)},
         capture_output=True,
         text=True,

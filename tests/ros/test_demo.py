@@ -4,13 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.support.paths import EXAMPLE, ROOT
 
 
 def test_the_demo(ros_environment, tmp_path):
     wheels = Path(sys.prefix) / "share"
     for source, package in (
-        (ROOT / "examples" / "my_robot_controller", "my_robot_controller"),
+        (EXAMPLE, "my_robot_controller"),
         (wheels / "std_msgs", "std_msgs_by_idlc"),
     ):
         words = ["gen", source, "-o", tmp_path / package, "--package", package]

@@ -7,9 +7,9 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from nodes import nodes
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "my_robot_controller"
+from tests.support.nodes import nodes
+from tests.support.paths import EXAMPLE
 
 
 @pytest.fixture

@@ -10,13 +10,13 @@ import time
 import venv
 from pathlib import Path
 
-import programs
 import pytest
 
 from idlc.cli.main import main
+from tests.support.paths import DOCS
+from tests.support.programs import run_with
 
-ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "existing-package.md"
+PAGE = DOCS / "existing-package.md"
 SETUP = """\
 from setuptools import setup
 
@@ -107,10 +107,6 @@ def workspace(tmp_path_factory) -> Path:
     return workspace
 
 
-def run(*command: object, cwd: Path, **environment: str) -> str:
-    return programs.run(*command, cwd=cwd, environment={**os.environ, **environment})
-
-
 def works(program: Path, tmp_path: Path, environment: dict[str, str]) -> None:
     """Start the installed node; it publishes until it is asked to end."""
     log = tmp_path / f"{time.monotonic_ns()}.log"
@@ -130,7 +126,7 @@ def works(program: Path, tmp_path: Path, environment: dict[str, str]) -> None:
         rclpy.shutdown()
     """
     try:
-        said = run(sys.executable, "-c", code, cwd=tmp_path, **environment)
+        said = run_with(sys.executable, "-c", code, cwd=tmp_path, **environment)
         assert "True" in said, said + log.read_text()
         node.send_signal(signal.SIGINT)
         assert node.wait(20) == 0, log.read_text()
@@ -143,11 +139,11 @@ def works(program: Path, tmp_path: Path, environment: dict[str, str]) -> None:
 def test_colcon_builds_it_whatever_was_built_before(workspace, tmp_path, ros_environment):
     colcon = [Path(sys.executable).parent / "colcon", "--log-base", "log", "build"]
     for options in (["--symlink-install"], ["--symlink-install"], [], ["--symlink-install"], []):
-        run(*colcon, *options, cwd=workspace)
+        run_with(*colcon, *options, cwd=workspace)
         prefix = workspace / "install" / "py_pubsub"
         setup = f". {prefix}/share/py_pubsub/package.sh && echo $PYTHONPATH"
         command = f"COLCON_CURRENT_PREFIX={prefix}; {setup}"
-        path = run("sh", "-c", command, cwd=workspace, PYTHONPATH="").split()[-1]
+        path = run_with("sh", "-c", command, cwd=workspace, PYTHONPATH="").split()[-1]
         assert str(workspace) in path
         environment = {**ros_environment, "PYTHONPATH": path}
         works(prefix / "lib" / "py_pubsub" / "weather", tmp_path, environment)
@@ -162,9 +158,11 @@ def test_pip_installs_it(workspace, tmp_path, ros_environment, options):
     ros = str(Path(rclpy.__file__).parents[1])
     environment = {**ros_environment, "PYTHONPATH": ros}
     words = ["-m", "pip", "install", "-q", "--no-deps", *options]
-    run(folder / "bin/python", *words, workspace / "src/py_pubsub", cwd=tmp_path, **environment)
+    run_with(
+        folder / "bin/python", *words, workspace / "src/py_pubsub", cwd=tmp_path, **environment
+    )
     (program,) = [p for p in folder.rglob("weather") if p.is_file() and os.access(p, os.X_OK)]
     code = "import py_pubsub; print(py_pubsub.__path__[0])"
-    path = run(folder / "bin/python", "-c", code, cwd=tmp_path, **environment).split()[-1]
+    path = run_with(folder / "bin/python", "-c", code, cwd=tmp_path, **environment).split()[-1]
     environment["PYTHONPATH"] = os.pathsep.join([str(Path(path).parent), ros])
     works(program, tmp_path, environment)

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from rosidl_parser.definition import Message
 from rosidl_parser.parser import parse_idl_string
-from test_format import assert_only_the_layout_changes
 
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
@@ -15,6 +14,7 @@ from idlc.model import ir
 from idlc.model.lowering.file import lower
 from idlc.syntax.format import format_file
 from idlc.syntax.parse import parse
+from tests.front_end.test_format import assert_only_the_layout_changes
 
 SHARE = Path(sys.prefix) / "share"
 FILES = sorted(path for kind in ir.KINDS for path in SHARE.glob(f"*/{kind}/*.{kind}"))

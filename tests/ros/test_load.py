@@ -5,13 +5,13 @@ import random
 import re
 import select
 import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
-from installed import HERE, generate
+
+from tests.support.installed import generate
+from tests.support.paths import EVERY_KIND
 
 #: Each is delivered eight times.
 MESSAGES = 125_000 if os.environ.get("IDLC_LONG") else 1_200
@@ -31,7 +31,7 @@ def sides(tmp_path_factory) -> dict[str, Path]:
     found = {}
     for side, text in (("sound", THING), ("other", OTHER)):
         folder = tmp_path_factory.mktemp(side)
-        shutil.copytree(HERE / "every_kind/msg", folder / "files/msg")
+        shutil.copytree(EVERY_KIND / "msg", folder / "files/msg")
         (folder / "files/msg/Others.msg").unlink()  # needs other packages
         (folder / "files/msg/Everything.msg").write_text(EVERYTHING, encoding="utf-8")
         (folder / "files/msg/Thing.msg").write_text(text, encoding="utf-8")
@@ -41,27 +41,13 @@ def sides(tmp_path_factory) -> dict[str, Path]:
 
 
 @pytest.fixture
-def start(sides, ros_environment):
-    """Start a function of load.py; it is ended with the test."""
-    processes = []
+def start(sides, program):
+    """Start a function of load.py."""
 
     def begin(*words, side="sound"):
-        process = subprocess.Popen(
-            [sys.executable, str(HERE / "load.py"), *map(str, words)],
-            env={**ros_environment, "PYTHONPATH": str(sides[side])},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
-        return process
+        return program("load.py", *words, path=sides[side])
 
-    yield begin
-    for process in processes:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+    return begin
 
 
 #: What rclpy says of its own when a subscription died between waiting and taking.

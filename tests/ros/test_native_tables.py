@@ -5,8 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from installed import HERE, SHARE, interfaces, names_in
-from native import install, model_of
+
+from tests.support.installed import SHARE, interfaces, names_in
+from tests.support.native import install, model_of
+from tests.support.paths import PROGRAMS
 
 
 def packages():
@@ -18,7 +20,7 @@ def packages():
 
 def read(whose, names, environment):
     done = subprocess.run(
-        [sys.executable, HERE / "native_reader.py", whose, *names],
+        [sys.executable, PROGRAMS / "native_reader.py", whose, *names],
         env=environment,
         capture_output=True,
         text=True,

@@ -6,15 +6,15 @@ Each behaviour runs in a process of its own, because it might crash it.
 import json
 import shutil
 import signal
-import subprocess
 import sys
 import sysconfig
 import time
 from pathlib import Path
 
-import generated
 import pytest
-from installed import HERE, SHARE, generate
+
+from tests.support import generated
+from tests.support.installed import SHARE, generate
 
 QUIET = [
     "nothing_is_loaded_before_rclpy_asks",
@@ -40,26 +40,13 @@ def classes(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def start(classes, ros_environment):
-    """Start a behaviour; it is ended with the test."""
-    processes = []
+def start(classes, program):
+    """Start a behaviour."""
 
     def begin(*words, path=classes):
-        process = subprocess.Popen(
-            [sys.executable, str(HERE / "behaviour.py"), *words],
-            env={**ros_environment, "PYTHONPATH": str(path)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        processes.append(process)
-        return process
+        return program("behaviour.py", *words, path=path)
 
-    yield begin
-    for process in processes:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
+    return begin
 
 
 def finish(process):
@@ -137,6 +124,7 @@ def test_the_type_description_is_the_installed_one(start):
         ("layout", ["Fast CDR", "unknown", "RMW_IMPLEMENTATION"]),
         ("symbol", ["Fast CDR", "no_such_symbol", "colcon"]),
         ("fast cdr", ["libfastcdr.so.1", "RMW_IMPLEMENTATION"]),
+        ("tables", ["does not know this version of ROS 2", "newer idlc", "colcon"]),
         ("machine", ["machine code", "there is none for", "rmw_fastrtps_cpp", "colcon"]),
         ("memory", ["machine code", "does not allow", "rmw_fastrtps_cpp", "colcon"]),
         ("library", ["librosidl_typesupport_elsewhere_c.so", "source your ROS 2"]),
@@ -145,6 +133,10 @@ def test_the_type_description_is_the_installed_one(start):
 def test_an_error_says_what_to_do(case, words, start):
     out, _ = finish(start("says_what_to_do", case))
     assert [word for word in words if word not in out] == [], out
+
+
+def test_services_work_where_nobody_knows_events(start):
+    assert finish(start("serves_without_events")) == ("", "")
 
 
 @pytest.fixture

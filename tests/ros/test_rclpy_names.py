@@ -3,15 +3,15 @@
 import subprocess
 import sys
 
-import generated
-import test_citizens
-from installed import HERE
+from tests.runtime import test_citizens
+from tests.support import generated
+from tests.support.paths import PROGRAMS
 
 
 def test_names_that_are_taken_are_free_in_ros(tmp_path, ros_environment):
     generated.write_package(tmp_path, "hiding_msgs", test_citizens.HIDING_FILES)
     done = subprocess.run(
-        [sys.executable, str(HERE / "citizens.py")],
+        [sys.executable, str(PROGRAMS / "citizens.py")],
         env={**ros_environment, "PYTHONPATH": str(tmp_path)},
         capture_output=True,
         text=True,

@@ -6,10 +6,12 @@ Both have the same names, so each lives in a process of its own; they meet over 
 import json
 
 import pytest
-from installed import HERE, interfaces, interfaces_in, names_in
-from sides import OURS, PACKAGES, STANDARD, Side
 
-PEER = HERE / "peer.py"
+from tests.support.installed import interfaces, interfaces_in, names_in
+from tests.support.paths import PROGRAMS
+from tests.support.sides import OURS, PACKAGES, STANDARD, Side
+
+PEER = PROGRAMS / "peer.py"
 
 
 @pytest.fixture

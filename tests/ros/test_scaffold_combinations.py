@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from nodes import nodes
 
 from idlc.cli.main import main
+from tests.support.nodes import nodes
 
 SEED = int(os.environ.get("IDLC_SEED", "4"))
 COUNT = 100

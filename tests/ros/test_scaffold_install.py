@@ -7,17 +7,13 @@ import sys
 import venv
 from pathlib import Path
 
-import programs
 import pytest
 from catkin_pkg.package import parse_package
 
-ROOT = Path(__file__).parents[2]
-EXAMPLE = ROOT / "examples" / "my_robot_controller"
+from tests.support.paths import EXAMPLE, ROOT
+from tests.support.programs import ended, run_with
+
 GENERATED = ("msg", "srv", "action", "_idlc", "idlc.lock", "py.typed")
-
-
-def run(*command: object, cwd: Path, **environment: str) -> str:
-    return programs.run(*command, cwd=cwd, environment={**os.environ, **environment})
 
 
 @pytest.fixture(scope="module")
@@ -25,13 +21,13 @@ def scaffolded(tmp_path_factory) -> Path:
     """Return a new package with an interface and a node, not compiled yet."""
     folder = tmp_path_factory.mktemp("scaffolded")
     idlc = [sys.executable, "-m", "idlc", "scaffold"]
-    run(*idlc, "package", "demo", cwd=folder, PYTHONPATH=str(ROOT))
+    run_with(*idlc, "package", "demo", cwd=folder, PYTHONPATH=str(ROOT))
     package = folder / "demo"
     for words in (
         ["interface", "msg", "Drive", "float32 speed"],
         ["node", "driver", "--publisher", "Drive:drive", "--client", "std_srvs/Empty:stop"],
     ):
-        run(*idlc, *words, cwd=package, PYTHONPATH=str(ROOT))
+        run_with(*idlc, *words, cwd=package, PYTHONPATH=str(ROOT))
     return package
 
 
@@ -53,7 +49,7 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     package = copied(scaffolded if name == "demo" else EXAMPLE, tmp_path / "src", compiled=False)
     parse_package(package).validate()
     colcon = Path(sys.executable).parent / "colcon"
-    said = run(colcon, "--log-base", "log", "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    said = run_with(colcon, "--log-base", "log", "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
     assert "1 package finished" in said
     prefix = tmp_path / "install" / name
     share = prefix / "share"
@@ -72,26 +68,11 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     assert list((share / name / "launch").glob("*_launch.py"))
     (site,) = prefix.glob("lib/python*/site-packages")
     code = f"import {name}.msg as m; print(*dir(m))"
-    said = run(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(site))
+    said = run_with(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(site))
     assert ("Drive" if name == "demo" else "RobotCommand") in said
     commands = {path.name for path in (prefix / "lib" / name).iterdir()}
     tests = {path.stem.removeprefix("test_") for path in package.glob("test/test_*")}
     assert commands == tests - {"interfaces", "style"}
-
-
-def test_colcon_builds_it_with_links_and_without_in_any_order(scaffolded, tmp_path):
-    copied(scaffolded, tmp_path / "src", compiled=False)
-    colcon = [Path(sys.executable).parent / "colcon", "--log-base", "log", "build"]
-    share = tmp_path / "install" / "demo" / "share"
-    wanted = [
-        *("demo/msg/Drive.msg", "demo/msg/Drive.json", "demo/launch/demo_launch.py"),
-        "ament_index/resource_index/rosidl_interfaces/demo",
-    ]
-    for options in (["--symlink-install"], ["--symlink-install"], [], ["--symlink-install"]):
-        run(*colcon, *options, cwd=tmp_path, PYTHONPATH=str(ROOT))
-        for path in wanted:
-            assert (share / path).is_file()
-            assert (share / path).is_symlink() == bool(options)
 
 
 def is_interface(path: Path) -> bool:
@@ -112,13 +93,13 @@ def test_pip_installs_the_committed_classes(options, environment, tmp_path):
     python = environment / "bin" / "python"
     pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
     clean = {"PYTHONPATH": "", "AMENT_PREFIX_PATH": ""}
-    run(*pip, "--force-reinstall", *options, package, cwd=tmp_path, **clean)
+    run_with(*pip, "--force-reinstall", *options, package, cwd=tmp_path, **clean)
     code = (
         "import importlib.util as u; assert not u.find_spec('idlc')\n"
         "from my_robot_controller.msg import RobotCommand\n"
         "print(RobotCommand.deserialize(RobotCommand('stop').serialize()))"
     )
-    assert "command_type='stop'" in run(python, "-c", code, cwd=environment, **clean)
+    assert "command_type='stop'" in run_with(python, "-c", code, cwd=environment, **clean)
     if not options:
         share = environment / "share"
         assert (share / "my_robot_controller" / "msg" / "RobotCommand.msg").is_file()
@@ -129,7 +110,9 @@ def test_pip_installs_the_committed_classes(options, environment, tmp_path):
     import rclpy
 
     borrowed = {**clean, "PYTHONPATH": str(Path(rclpy.__file__).parents[1])}
-    said = run(environment / "bin" / "countdown_action_client", "--help", cwd=tmp_path, **borrowed)
+    said = run_with(
+        environment / "bin" / "countdown_action_client", "--help", cwd=tmp_path, **borrowed
+    )
     assert "Where to start counting down" in said
 
 
@@ -152,13 +135,13 @@ def test_an_interface_that_is_wrong_ends_the_build_with_a_report(scaffolded, tmp
 def colcon_tested(*command: object, cwd: Path) -> tuple[int, str]:
     """Return the status of a run of tests, and what it says."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return programs.ended(*command, cwd=cwd, environment=environment)
+    return ended(*command, cwd=cwd, environment=environment)
 
 
 def test_colcon_tests_the_interfaces(scaffolded, tmp_path):
     package = copied(scaffolded, tmp_path / "src", compiled=False)
     colcon = [Path(sys.executable).parent / "colcon", "--log-base", "log"]
-    run(*colcon, "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
+    run_with(*colcon, "build", cwd=tmp_path, PYTHONPATH=str(ROOT))
     test = [*colcon, "test", "--event-handlers", "console_direct+", "--return-code-on-test-failure"]
     test += ["--pytest-args", "test/test_interfaces.py", "-p", "no:cacheprovider"]
     status, said = colcon_tested(*test, cwd=tmp_path)

@@ -13,7 +13,6 @@ import rclpy
 from action_msgs.msg import GoalStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from nodes import PATIENCE, nodes
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -23,6 +22,7 @@ from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
 
 from idlc.cli.main import main
+from tests.support.nodes import PATIENCE, nodes
 
 WORDS = (
     *("--publisher", "std_msgs/Empty:out@20", "--subscriber", "std_msgs/Empty:in"),

@@ -5,11 +5,11 @@ import signal
 import sys
 from pathlib import Path
 
-import programs
 import pytest
-from nodes import nodes
 
 from idlc.cli.main import main
+from tests.support import programs
+from tests.support.nodes import nodes
 
 #: How `main` goes on after rclpy has started, and the status that the process ends with.
 ENDINGS = {

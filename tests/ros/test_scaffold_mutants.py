@@ -10,10 +10,10 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import programs
 import pytest
 
 from idlc.cli.main import main
+from tests.support import programs
 
 EVERY = 1 if os.environ.get("IDLC_LONG") else 6
 AT_ONCE = 4

@@ -7,11 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import programs
 import pytest
 
-ROOT = Path(__file__).parents[2]
-GUIDE = ROOT / "docs" / "contributing" / "add-a-role.md"
+from tests.support import programs
+from tests.support.paths import DOCS, ROOT
+
+GUIDE = DOCS / "contributing" / "add-a-role.md"
 
 
 def blocks() -> dict[str, str]:

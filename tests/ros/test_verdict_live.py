@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import pytest
-import rosidl_view
-from inventions import Inventor
-from oddities import Oddities
 
-HERE = Path(__file__).parent
-GOLDEN = HERE.parents[1] / "golden" / "spec" / "accept_reject.jsonl"
+from tests.support import rosidl_view
+from tests.support.inventions import Inventor
+from tests.support.oddities import Oddities
+from tests.support.paths import PROGRAMS, VERDICTS
+
 SEED = int(os.environ.get("IDLC_LIVE_SEED", "1"))
 FILES = int(os.environ.get("IDLC_LIVE_FILES", "1000"))  # rosidl takes about 0.1 s for each
 FAMILIES = {
@@ -29,7 +29,7 @@ PARTS = 5
 
 def known_texts() -> dict[str, list[str]]:
     texts: dict[str, list[str]] = {"msg": [], "srv": [], "action": []}
-    for line in GOLDEN.read_text(encoding="utf-8").splitlines():
+    for line in VERDICTS.read_text(encoding="utf-8").splitlines():
         case = json.loads(line)
         # rosidl's pattern for constants takes for ever on a long name once it is mutated
         slow = "A" * 20 in case.get("text", "")
@@ -41,7 +41,7 @@ def known_texts() -> dict[str, list[str]]:
 def ask_rosidl(cases: list[dict], folder: Path) -> list[dict]:
     asked, answered = folder / "cases.jsonl", folder / "outcomes.jsonl"
     asked.write_text("".join(json.dumps(case) + "\n" for case in cases), encoding="utf-8")
-    command = [sys.executable, str(HERE / "rosidl_side.py"), str(asked), str(answered)]
+    command = [sys.executable, str(PROGRAMS / "rosidl_side.py"), str(asked), str(answered)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     return [json.loads(line) for line in answered.read_text(encoding="utf-8").splitlines()]

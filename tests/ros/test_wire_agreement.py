@@ -8,7 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from installed import HERE, SHARE, generate, interfaces, names_in
+
+from tests.support.installed import SHARE, generate, interfaces, names_in
+from tests.support.paths import PROGRAMS
 
 #: Packages that others refer to: compiled alone, they must work with rosidl's classes inside.
 MIXED = ("nav_msgs", "sensor_msgs", "std_srvs", "test_msgs")
@@ -21,7 +23,7 @@ def side(ros_environment):
     def run(step: str, file: Path, names: list[str], classes: Path | None = None) -> None:
         environment = ros_environment | ({"PYTHONPATH": str(classes)} if classes else {})
         done = subprocess.run(
-            [sys.executable, str(HERE / "one_side.py"), step, str(file), *names],
+            [sys.executable, str(PROGRAMS / "one_side.py"), step, str(file), *names],
             env=environment,
             capture_output=True,
             text=True,

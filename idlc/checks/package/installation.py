@@ -40,6 +40,15 @@ def installed_interfaces(facts: Facts, model: Model, report: Report) -> None:
             )
 
 
+def installed_libraries(facts: Facts, model: Model, report: Report) -> None:
+    """setup.py installs what C++ tools load, where the package is in the index by which they go."""
+    if facts.setup_py is None or facts.build_type != "ament_python" or not model.own:
+        return
+    from idlc.checks.package.libraries import unusable_entry
+
+    report.extend(unusable_entry(facts.setup_py, facts.name))
+
+
 def resource_marker(facts: Facts, _: Model, report: Report) -> None:
     """The package's marker is there and installed, without which `ros2 run` does not find it."""
     if facts.setup_py is None or facts.build_type != "ament_python":

@@ -34,13 +34,15 @@ class Change(NamedTuple):
 class Plan(NamedTuple):
     """Changes in the order in which to make them, and the digests of all files afterwards.
 
-    `record` is what the changes were planned against: the lock's content, if there was one.
+    `record` is what the changes were planned against: the lock's content, if there was one. It
+    lies in `home`, which is empty or ends with a slash.
     """
 
     out: Path
     changes: tuple[Change, ...]
     outputs: dict[str, str]
     record: bytes | None = None
+    home: str = ""
 
 
 def plan(
@@ -51,6 +53,7 @@ def plan(
     report: Report,
     *,
     force: bool = False,
+    home: str = "",
 ) -> Plan | None:
     """Return what to change so that `out` holds `files`; report and return `None` if it must not.
 
@@ -59,11 +62,11 @@ def plan(
     Reports IDL613 and IDL614.
     """
     tree = Tree(out)
-    record = tree.read(FILE)
+    record = tree.read(home + FILE)
     changes: list[Change] = []
     refused: list[Diagnostic] = []
     outputs: dict[str, str] = {}
-    stale = [path for path in owned if path not in files and path != FILE]
+    stale = [path for path in owned if path not in files and path != home + FILE]
     for path in (*files, *sorted(stale)):
         new = files.get(path)
         old = tree.read(path)
@@ -82,11 +85,11 @@ def plan(
                 refused.append(_refusal(name, path, old, new, path in owned, diff))
             changes.append(Change(path, old, new, backup=not mine))
     if isinstance(record, Obstacle):
-        refused.append(_in_the_way(name, FILE, record))
+        refused.append(_in_the_way(name, home + FILE, record))
     report.extend(refused)
     if refused or isinstance(record, Obstacle):
         return None
-    return Plan(out, tuple(changes), outputs, record)
+    return Plan(out, tuple(changes), outputs, record, home)
 
 
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:

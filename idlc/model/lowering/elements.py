@@ -27,7 +27,7 @@ def elements(inside: str) -> list[tuple[str, int]] | Fault:
 
 
 def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
-    """Split as rosidl's scanner does, wrong turns included (spec section 4)."""
+    """Split as rosidl's scanner does, wrong turns included (language 4)."""
     found: list[tuple[str, int]] = []
     ends = {quote: _Ends(inside, quote) for quote in QUOTES}
     at = 0

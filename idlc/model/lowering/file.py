@@ -104,7 +104,7 @@ def _has_near_separator(file: tree.File, expected: int) -> bool:
 
 
 def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir.Message]:
-    """Drop constants that rosidl's parser gives to an earlier section (spec section 3).
+    """Drop constants that rosidl's parser gives to an earlier section (language 3).
 
     It looks constants up by equality, so one that repeats an earlier section's type, name, value
     and comment ends up there, and is missing from its own.

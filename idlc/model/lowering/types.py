@@ -1,4 +1,4 @@
-"""Type syntax → IR type (spec section 2.1), or what is wrong with it."""
+"""Type syntax → IR type (language 2.1), or what is wrong with it."""
 
 from __future__ import annotations
 

@@ -35,7 +35,8 @@ def enter(
     if SETUP in texts:
         parts = [*support_packages(), *sorted({key.partition("/")[0] for key in keys})]
         packages = [model.package, *(f"{model.package}.{part}" for part in parts)]
-        edits[SETUP] = data_files.add_packages(texts[SETUP], packages)
+        wired = data_files.add_libraries(texts[SETUP])
+        edits[SETUP] = data_files.add_packages(wired, packages)
     return edits
 
 

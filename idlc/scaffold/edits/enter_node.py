@@ -41,15 +41,23 @@ def paths(package: str, launch_files: Iterable[str]) -> list[str]:
 
 
 def enter(
-    planned: Plan, texts: Mapping[str, str], files: Mapping[str, str], templates: Templates
+    planned: Plan,
+    texts: Mapping[str, str],
+    files: Mapping[str, str],
+    templates: Templates,
+    *,
+    has_interfaces: bool = False,
 ) -> Entry:
     """Return how a node, whose own files are `files`, is entered, but for the launch file.
 
-    `texts` are those of the package's files that exist.
+    `texts` are those of the package's files that exist. A package that `has_interfaces` installs
+    libraries for C++ tools.
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
     described = {one: texts[one] for one in ("pyproject.toml", "setup.cfg", SETUP) if one in texts}
+    if has_interfaces and SETUP in described:
+        described[SETUP] = data_files.add_libraries(described[SETUP])
     path, outcome = console_script.add_script(described, script)
     tests = node_tests.packages(planned)
     manifest = package_xml.add(texts.get(MANIFEST, ""), depends=planned.packages, tests=tests)

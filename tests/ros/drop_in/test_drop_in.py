@@ -6,13 +6,13 @@ import shutil
 import subprocess
 import sys
 from collections import Counter
-from pathlib import Path
 
 import pytest
-from differences import DIFFERENCES, Case, refuses
-from installed import SHARE, generate, interfaces, names_in
 
-HERE = Path(__file__).parent
+from tests.ros.drop_in.differences import DIFFERENCES, Case, refuses
+from tests.support.installed import SHARE, generate, interfaces, names_in
+from tests.support.paths import DOCS, EVERY_KIND, PROGRAMS
+
 #: Messages with fields of all kinds.
 CHECKED = [
     *("test_msgs/msg/BasicTypes", "test_msgs/msg/Strings", "test_msgs/msg/Arrays"),
@@ -26,7 +26,7 @@ KEY = re.compile(
 
 
 def start(outcomes, names, environment):
-    command = [sys.executable, str(HERE / "side.py"), str(outcomes), *names]
+    command = [sys.executable, str(PROGRAMS / "drop_in_side.py"), str(outcomes), *names]
     return subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -57,7 +57,7 @@ def outcomes(classes, environment, folder, names):
     for process in both:
         _, errors = process.communicate()
         assert process.returncode == 0, errors[-3000:]
-    command = [sys.executable, str(HERE / "canonical.py"), str(official), str(idlc)]
+    command = [sys.executable, str(PROGRAMS / "drop_in_canonical.py"), str(official), str(idlc)]
     done = subprocess.run(command, env=theirs, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     shapes = json.loads(done.stdout)
@@ -151,9 +151,9 @@ def test_the_environment_lets_all_messages_check(
 def test_invented_messages_of_every_kind(classes, ros_environment, record_property, tmp_path):
     """rosidl's classes without its C code: all but what is sent."""
     source, theirs = tmp_path / "source", tmp_path / "rosidl" / "every_kind"
-    shutil.copytree(HERE.parent / "every_kind" / "msg", source / "msg")
+    shutil.copytree(EVERY_KIND / "msg", source / "msg")
     (source / "msg" / "Keywords.msg").unlink()  # rosidl's Python cannot be imported
-    command = [sys.executable, str(HERE / "rosidl_package.py"), str(source), str(theirs)]
+    command = [sys.executable, str(PROGRAMS / "rosidl_package.py"), str(source), str(theirs)]
     subprocess.run(command, check=True, capture_output=True)
     generate(source, classes / "every_kind")
     names = [f"every_kind/msg/{path.stem}" for path in sorted(source.glob("msg/*.msg"))]
@@ -163,7 +163,7 @@ def test_invented_messages_of_every_kind(classes, ros_environment, record_proper
 
 
 def test_the_document_lists_the_differences():
-    text = (HERE.parents[2] / "docs/differences.md").read_text(encoding="utf-8")
+    text = (DOCS / "differences.md").read_text(encoding="utf-8")
     headings = re.findall(r"^## (.+)$", text, re.MULTILINE)
     named = {one.__name__.replace("_", " ").capitalize() for one in DIFFERENCES}
     assert sorted(headings) == sorted(named)

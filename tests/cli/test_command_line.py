@@ -1,0 +1,457 @@
+"""The command line as people and programs meet it: in its own process, from outside."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from idlc import __version__
+from idlc.cli.app import COMMANDS
+from idlc.cli.main import main
+from idlc.diagnostics import codes
+from tests.support.files import write
+from tests.support.paths import ROOT
+
+MSG = "float64 speed\n"
+
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+def make(path: str, text: str = MSG) -> None:
+    write(path, text)
+
+
+def idlc(*words: str, **options) -> subprocess.CompletedProcess:
+    options.setdefault("env", {**os.environ, "PYTHONUTF8": "1"})
+    done = subprocess.run(
+        [sys.executable, "-m", "idlc", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        **options,
+    )
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def stamps(folder: str) -> dict[str, int]:
+    return {str(path): path.stat().st_mtime_ns for path in Path(folder).rglob("*.py")}
+
+
+@pytest.mark.parametrize("option", ["--version", "-V"])
+def test_the_version(option):
+    assert idlc(option).stdout == f"idlc {__version__}\n"
+
+
+def imported(words: list[str]) -> set[str]:
+    """Return the top-level modules that a command imports."""
+    code = (
+        "import sys\nfrom idlc.cli.main import main\n"
+        f"status = main({words!r})\n"
+        "print('\\n' + ' '.join({name.partition('.')[0] for name in sys.modules}))\n"
+        "sys.exit(status)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_imports_nothing_heavy(command):
+    heavy = {"jinja2", "lark", "msgspec", "numpy", "rich"}
+    assert not heavy & imported([command, "--help"])
+
+
+def test_a_run_with_nothing_to_do_imports_no_compiler():
+    make("pkg/msg/A.msg")
+    words = ["gen", "pkg", "-o", "out/demo"]
+    assert "jinja2" in imported(words)
+    assert not {"lark", "jinja2", "numpy", "rich"} & imported(words)
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_the_example_in_each_help_works_as_pasted(command):
+    words = [command, "--help"] if command else ["--help"]
+    text = idlc(*words).stdout
+    example = text.partition("Example:\n\n")[2].partition("\n\n  ")[0]
+    lines = [line.strip() for line in example.splitlines() if line.startswith("    ")]
+    assert any(line.startswith("idlc ") for line in lines), text
+    script = f"set -e\nidlc() {{ '{sys.executable}' -m idlc \"$@\"; }}\n" + "\n".join(lines)
+    done = subprocess.run(["/bin/sh", "-c", script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ("check good", 0),
+        ("check bad", 1),
+        ("check good/msg/A.msg bad", 1),
+        ("check missing", 2),
+        ("check missing bad", 2),
+        ("check empty", 2),
+        ("check --no-such-option", 2),
+        ("chekc", 2),
+        ("gen good -o out/demo", 0),
+        ("gen warned -o out/demo", 0),
+        ("gen bad -o out/demo", 1),
+        ("gen good", 2),
+        ("gen", 2),
+        ("gen empty -o out", 2),
+        ("gen good -o good/msg/A.msg", 2),
+        ("gen good -o /proc/none/demo", 2),
+        ("gen good -o out/1abc", 2),
+        ("gen good -o out/demo --package class", 2),
+        ("gen good -o out/demo --check", 1),
+        ("gen good -o out/demo --check --force", 2),
+        ("hash good std_msgs/msg/Header", 0),
+        ("hash bad", 1),
+        ("hash std_msgs/msg/Nope", 2),
+        ("hash", 2),
+        ("describe std_srvs/srv/SetBool_Request", 0),
+        ("describe good/msg/A.msg --package good", 0),
+        ("describe nope", 2),
+        ("explain IDL201", 0),
+        ("explain idl201", 0),
+        ("explain unknown-type", 0),
+        ("explain", 0),
+        ("help", 0),
+        ("explain IDL999", 2),
+        ("--help", 0),
+    ],
+)
+def test_exit_statuses(words, status, capfd):
+    make("good/msg/A.msg")
+    make("bad/msg/A.msg", "flot64 speed\n")
+    make("warned/msg/A.msg", "float64 class\n")
+    make("empty/README.md")
+    assert main(words.split()) == status
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_an_unknown_code_or_command_gets_a_suggestion(capsys):
+    for words, hint in (
+        (["explain", "IDL2O1"], "did you mean IDL201?"),
+        (["explain", "wide-strin"], "did you mean wide-string?"),
+        (["explain", "nonsense"], "`idlc explain` lists the codes"),
+        (["chekc"], "did you mean `check`?"),
+        (["generate"], "did you mean `gen`?"),
+        (["new"], "did you mean `scaffold`?"),
+        (["help", "lint"], "did you mean `check`?"),
+        (["xyzzy"], "the commands are gen, check"),
+        (["scaffold", "pkg"], "did you mean `package`?"),
+        (["scaffold", "xyzzy"], "the commands are package, interface, node"),
+    ):
+        assert main(words) == 2
+        assert hint in capsys.readouterr().err
+
+
+def test_help_is_a_command_too(capsys):
+    for words in ([], ["gen"], ["scaffold"], ["scaffold", "node"]):
+        assert main([*words, "--help"]) == 0
+        expected = capsys.readouterr().out
+        assert main(["help", *words]) == 0
+        assert capsys.readouterr().out == expected
+
+
+def test_codes_go_by_id_and_name(capsys):
+    assert main(["explain", "IDL422"]) == 0
+    expected = capsys.readouterr().out
+    for word in ("char-type", "CHAR_TYPE", "idl422", "422"):
+        assert main(["explain", word]) == 0
+        assert capsys.readouterr().out == expected
+    assert main(["explain"]) == 0
+    listed = capsys.readouterr().out
+    assert all(f"  {one.id}  {one.slug} " in listed for one in codes.CODES.values())
+    assert re.search(r"(?m)^Style\n  IDL401 ", listed)
+
+
+def test_what_is_compiled_again_and_what_is_not():
+    make("pkg/msg/A.msg", "dep_msgs/B b\n")
+    make("src/dep_msgs/msg/B.msg")
+    words = ["gen", "pkg", "-o", "out/demo", "-I", "src"]
+
+    def changed() -> bool:
+        before = stamps("out/demo")
+        assert idlc(*words).returncode == 0
+        return stamps("out/demo") != before
+
+    assert changed()
+    assert not changed()
+    make("src/dep_msgs/msg/B.msg", f"# a comment\n{MSG}")
+    assert not changed()
+    make("src/dep_msgs/msg/B.msg", "float32 speed\n")
+    assert changed()
+    make("pkg/msg/A.msg", "dep_msgs/B c\n")
+    assert changed()
+    assert not changed()
+    make("pkg/srv/S.srv", "---\n")
+    assert changed()
+    Path("pkg/srv/S.srv").unlink()
+    assert changed()
+    assert not Path("out/demo/srv").exists()
+    next(Path("out/demo/msg").glob("_*.py")).unlink()
+    assert changed()
+    assert idlc(*words, "--check").returncode == 0
+
+
+def test_the_lock_names_nothing_of_this_machine(here):
+    make("pkg/msg/A.msg", "std_msgs/Header header\n")
+    make("pkg/action/G.action", "---\n---\n")
+    assert idlc("gen", str(here / "pkg"), "-o", str(here / "out/demo")).returncode == 0
+    text = Path("out/demo/idlc.lock").read_text(encoding="utf-8")
+    assert str(here) not in text
+    record = json.loads(text)
+    assert record["inputs"].keys() == {"action/G.action", "msg/A.msg"}
+    assert "std_msgs/msg/Header" in record["dependencies"]
+    assert record["types"]["demo/action/G_Goal"].startswith("RIHS01_")
+    written = {p.relative_to("out/demo").as_posix() for p in Path("out/demo").rglob("*.*")}
+    assert record["outputs"].keys() == written - {"idlc.lock"}
+
+
+def test_a_single_file_brings_the_neighbours_that_it_needs():
+    make("demo/msg/A.msg", "B b\n")
+    make("demo/msg/B.msg")
+    make("demo/msg/C.msg")
+    assert idlc("gen", "demo/msg/A.msg", "-o", "out/demo").returncode == 0
+    names = {path.name for path in Path("out/demo/msg").iterdir()}
+    assert {"_a.py", "_b.py"} <= names
+    assert "_c.py" not in names
+    assert "(unchanged)" in idlc("gen", "demo/msg/A.msg", "-o", "out/demo").stdout
+
+
+def test_vendored_dependencies_are_whole_packages_with_locks_of_their_own():
+    make("demo/msg/A.msg", "std_msgs/Header header\n")
+    make("demo/action/G.action", "---\n---\n")
+    done = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps")
+    assert done.returncode == 0, done.stderr
+    expected = {"action_msgs", "builtin_interfaces", "service_msgs", "std_msgs"}
+    assert {p.name for p in Path("out").iterdir()} == expected | {"demo", "unique_identifier_msgs"}
+    for package in expected:
+        record = json.loads(Path(f"out/{package}/idlc.lock").read_text(encoding="utf-8"))
+        assert record["package"] == package
+        assert Path(f"out/{package}/_idlc").is_dir()
+    assert "msg/String.msg" in json.loads(Path("out/std_msgs/idlc.lock").read_text())["inputs"]
+    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps").stdout
+    assert again.count("(unchanged)") == 6
+    next(Path("out/std_msgs/msg").glob("_b*.py")).unlink()
+    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps").stdout
+    assert "std_msgs: 30 interfaces" in again
+    assert "(1 written)" in again
+
+
+def test_settings_come_from_the_nearest_pyproject_and_options_override_them(monkeypatch):
+    text = '[tool.idlc]\npaths = ["interfaces"]\nout = "gen/demo"\ninclude = ["deps"]\n'
+    make("pyproject.toml", text)
+    make("interfaces/msg/A.msg", "dep_msgs/B b\n")
+    make("deps/dep_msgs/msg/B.msg")
+    Path("deep/er").mkdir(parents=True)
+    monkeypatch.chdir("deep/er")
+    assert idlc("check").stdout == "no problems in 1 file\n"
+    assert idlc("gen").returncode == 0
+    assert Path("../../gen/demo/msg/_a.py").is_file()
+    assert idlc("gen", "-o", "elsewhere/other").returncode == 0
+    assert Path("elsewhere/other/msg/_a.py").is_file()
+
+
+def test_json_output_is_one_object_per_line():
+    make("demo/msg/A.msg", "float64 class\nstereo_msgs/DisparityImage image\n")
+    make("site/rclpy/__init__.py", "")
+    env = {**os.environ, "PYTHONPATH": "site"}
+    done = idlc("gen", "demo", "-o", "out/demo", "--format", "json", env=env)
+    facts = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [fact["type"] for fact in facts][-2:] == ["package", "summary"]
+    assert {fact["code"] for fact in facts if fact["type"] == "diagnostic"} == {
+        "IDL220",
+        "IDL222",
+        "IDL617",
+    }
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_piped_output_is_plain_unless_colour_is_asked_for(colour):
+    make("demo/msg/A.msg", "flot64 a\n")
+    more = {"FORCE_COLOR": "1"} if colour else {}
+    plain = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
+    done = idlc("check", "demo", env={**plain, "PYTHONUTF8": "1", **more})
+    assert ("\x1b[" in done.stdout) is colour
+
+
+def test_a_terminal_that_knows_only_ascii_gets_ascii():
+    make("demo/msg/A.msg", "float64 größe\n")
+    done = idlc("check", "demo", env={**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"})
+    assert done.returncode == 1
+    assert done.stdout.isascii()
+
+
+def test_file_names_that_are_not_text():
+    Path("demo/msg").mkdir(parents=True)
+    make(os.fsdecode(b"demo/msg/\xff\x1b[31m.msg"))
+    done = idlc("check", "demo")
+    assert done.returncode == 1
+    assert "\x1b" not in done.stdout
+
+
+def test_a_closed_pipe_is_no_error():
+    with subprocess.Popen(
+        [sys.executable, "-m", "idlc", "describe", "sensor_msgs/msg/Image"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141
+
+
+def test_ctrl_c_ends_with_the_status_that_shells_expect(monkeypatch, capsys):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("idlc.driver.check.look", interrupt)
+    assert main(["check", "."]) == 130
+    assert capsys.readouterr().err.strip() == "interrupted"
+
+
+def test_an_internal_error_shows_its_traceback_only_when_asked(monkeypatch, capsys):
+    def fail(*_):
+        raise RuntimeError("oh")
+
+    make("demo/msg/A.msg")
+    monkeypatch.setattr("idlc.syntax.parse.parse", fail)
+    assert main(["check", "demo"]) == 3
+    shown = capsys.readouterr().err
+    assert "IDL901" in shown
+    assert "stage `parse`" in shown
+    assert "Traceback" not in shown
+    monkeypatch.setenv("IDLC_DEBUG", "1")
+    assert main(["check", "demo"]) == 3
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch, capsys):
+    from idlc.emit import render
+
+    make("demo/msg/A.msg")
+    real = render.render_package
+
+    def broken(model):
+        return tuple(
+            type(file)(file.path, "def (: \\\n") if file.path == "msg/_a.py" else file
+            for file in real(model)
+        )
+
+    monkeypatch.setattr("idlc.emit.render.render_package", broken)
+    assert main(["gen", "demo", "-o", "out/demo"]) == 3
+    shown = capsys.readouterr().err
+    assert "stage `compile`" in shown
+    assert "out/demo/msg/_a.py" in shown
+    assert not Path("out").exists()
+
+
+def test_a_huge_file_is_refused_unread():
+    make("demo/msg/A.msg")
+    os.truncate("demo/msg/A.msg", 100 << 30)  # sparse: reading it would take a minute
+    done = idlc("check", "demo", timeout=20)
+    assert done.returncode == 1
+    assert "IDL604" in done.stdout
+
+
+def test_messages_nested_deeper_than_pythons_stack():
+    depth = 2000
+    for number in range(depth):
+        make(f"demo/msg/M{number}.msg", f"M{number + 1} m\n")
+    make(f"demo/msg/M{depth}.msg", "M0 m\n")
+    done = idlc("check", "demo")
+    assert done.returncode == 1
+    assert "IDL210" in done.stdout
+    make(f"demo/msg/M{depth}.msg")
+    assert idlc("check", "demo").returncode == 0
+    assert len(idlc("hash", "demo").stdout.splitlines()) == depth + 1
+
+
+def test_a_name_longer_than_the_file_system_allows():
+    make("demo/msg/A.msg", f"{'A' * 5000} a\nstd_msgs/{'B' * 5000} b\n{'c' * 5000}/C c\n")
+    make("deps/x_msgs/msg/X.msg")
+    done = idlc("check", "demo", "-I", "deps")
+    assert done.returncode == 1
+    assert done.stdout.count("error[IDL20") == 3
+    assert idlc("hash", f"std_msgs/msg/{'A' * 5000}").returncode == 2
+
+
+def test_a_working_folder_that_is_gone():
+    done = subprocess.run(
+        ["/bin/sh", "-c", f"mkdir x && cd x && rmdir ../x && '{sys.executable}' -m idlc check"],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert done.returncode == 2
+    assert "the working folder is gone" in done.stderr
+
+
+def wait_for(condition) -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.05)
+
+
+def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
+    make("demo/msg/A.msg")
+    both = ["-o", "out/demo", "--ament", "prefix"]
+    library = Path("prefix/lib/libdemo__rosidl_typesupport_cpp.so")
+    with subprocess.Popen(
+        [sys.executable, "-m", "idlc", "gen", "demo", *both, "--watch"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUTF8": "1"},
+    ) as process:
+        try:
+            for _ in both[::2]:
+                assert "demo: 1 interface" in process.stdout.readline()
+            assert "watching demo" in process.stderr.readline()
+            make("demo/msg/B.msg")
+            wait_for(Path("out/demo/msg/_b.py").is_file)
+            for _ in both[::2]:
+                assert "demo: 2 interfaces" in process.stdout.readline()
+            assert b"__demo__msg__B\0" in library.read_bytes()
+            make("demo/msg/B.msg", "flot64 broken\n")
+            assert "IDL201" in process.stderr.readline()
+            Path("demo/msg/B.msg").unlink()
+            wait_for(lambda: not Path("out/demo/msg/_b.py").exists())
+            wait_for(lambda: b"__demo__msg__B\0" not in library.read_bytes())
+        finally:
+            process.send_signal(signal.SIGINT)
+            _, err = process.communicate(timeout=30)
+    assert process.returncode == 0
+    assert "Traceback" not in err
+
+
+def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monkeypatch, capsys):
+    from idlc.cli.main import main
+
+    make("demo/msg/A.msg", "stereo_msgs/DisparityImage image\nstd_msgs/Header header\n")
+    here = {"rclpy": ["/ros/rclpy"]}
+    folders = "idlc.disk.environment.python_folders"
+    monkeypatch.setattr(folders, lambda package: [Path(one) for one in here.get(package, ())])
+    assert main(["gen", "demo", "-o", "out/demo"]) == 0
+    assert "warning[IDL617]" in capsys.readouterr().err
+    # as in an environment of pipx, uv or pre-commit, which holds idlc alone
+    here.clear()
+    for words in (["gen", "demo", "-o", "out/demo"], ["gen", "demo", "-o", "other/demo"]):
+        assert main(words) == 0
+        said = capsys.readouterr()
+        assert said.err == ""
+        assert said.out.endswith("; imports std_msgs, stereo_msgs\n")
+        assert main([*words, "--check"]) == 0
+        assert "imports" not in "".join(capsys.readouterr())

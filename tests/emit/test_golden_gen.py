@@ -1,0 +1,230 @@
+"""Each golden/gen/<case>/in compiles to out; out is typed, formatted, clean and works.
+
+`IDLC_REFRESH='gen/*' pytest tests/emit/test_golden_gen.py` rewrites the cases that match, and
+fails, so that the changes are looked at. The support package is the same in all cases and not
+among them.
+"""
+
+import random
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from idlc.emit.render import PACKAGE, render_package
+from idlc.model import derive
+from tests.support import generated, refresh, values
+from tests.support.paths import GOLDEN
+
+FOLDER = GOLDEN / "gen"
+CASES = sorted(path for path in FOLDER.iterdir() if path.is_dir())
+EACH = pytest.mark.parametrize("case", CASES, ids=lambda path: path.name)
+
+
+def package_of(case):
+    return f"{case.name}_msgs"
+
+
+def outputs(case):
+    """Return what is generated for a case, by path, but the support package's modules."""
+    model = generated.model_of(package_of(case), generated.files_of(case / "in"))
+    files = {file.path: file.text for file in render_package(model)}
+    support = {path for path in files if path.startswith("_idlc/")} - {"_idlc/type_data.py"}
+    for path in support:
+        source = PACKAGE / "runtime" / path.removeprefix("_idlc/")
+        assert files.pop(path) == source.read_text(encoding="utf-8")
+    assert len(support) == len(list((PACKAGE / "runtime").rglob("*.py")))
+    return files
+
+
+@EACH
+def test_golden_tree(case):
+    found = outputs(case)
+    out = case / "out"
+    if refresh.wanted(f"gen/{case.name}"):
+        shutil.rmtree(out, ignore_errors=True)
+        for path, text in found.items():
+            (out / path).parent.mkdir(parents=True, exist_ok=True)
+            (out / path).write_text(text, encoding="utf-8")
+        refresh.refreshed()
+    wanted = {
+        path.relative_to(out).as_posix(): path.read_text(encoding="utf-8")
+        for path in out.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert sorted(found) == sorted(wanted)
+    for path, text in wanted.items():
+        assert found[path] == text, path
+
+
+@pytest.fixture(scope="module")
+def trees(tmp_path_factory):
+    """All cases' packages and what they depend on, in one folder."""
+    folder = tmp_path_factory.mktemp("trees")
+    for case in CASES:
+        generated.write_package(folder, package_of(case), generated.files_of(case / "in"))
+    catalog = generated.catalog_files()
+    for package in ("action_msgs", "builtin_interfaces", "geometry_msgs", "service_msgs",
+                    "std_msgs", "unique_identifier_msgs"):  # fmt: skip
+        generated.write_package(folder, package, catalog[package])
+    return folder
+
+
+@EACH
+def test_everything_in_it_is_written_and_read(trees, case):
+    model = generated.model_of(package_of(case), generated.files_of(case / "in"))
+    rng = random.Random(case.name)
+    with generated.importable(trees):
+        for interface in model.own:
+            for structure in derive.messages(interface):
+                cls = generated.class_of(str(structure.name))
+                for _ in range(20):
+                    message = values.randomized(cls(), rng)
+                    # a field may hide a method
+                    methods, class_methods = super(cls, message), super(cls, cls)
+                    methods.validate()
+                    for order in ("little", "big"):
+                        buffer = methods.serialize(byteorder=order)
+                        assert class_methods.deserialize(buffer) == message
+                    assert class_methods.from_dict(methods.to_dict()) == message
+
+
+def run(*command, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", *map(str, command)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_generated_code_is_formatted(trees):
+    result = run("ruff", "format", "--check", "--diff", "--isolated", "--no-cache", ".", cwd=trees)
+    assert result.returncode == 0, result.stdout[-3000:] + result.stderr[-300:]
+
+
+def test_generated_code_is_clean(trees):
+    # Where C calls Python, nothing at all may be raised; what says so here says it to our rules.
+    through_c = "--per-file-ignores=**/_idlc/typesupport*.py:BLE001,**/_idlc/typesupport*.py:RUF100"
+    result = run("ruff", "check", "--isolated", "--no-cache", through_c, ".", cwd=trees)
+    assert result.returncode == 0, result.stdout[-3000:]
+    more = "--extend-select=A004,B,C4,E,F,FURB,I,ISC,PERF,PIE,RET,RSE,S,SIM,UP,W"
+    # Generated modules only: the support package follows the project's own rules.
+    result = run(
+        "ruff", "check", "--isolated", "--no-cache", more, "--ignore=E501,B905,S101,SIM905",
+        "--exclude=_idlc", ".", cwd=trees,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stdout[-3000:]
+
+
+USER_CODE = '''
+"""What users write, checked as they would."""
+
+import dataclasses
+from array import array
+
+import numpy as np
+from comments_msgs.action import Fill
+from comments_msgs.msg import Gauge
+from comments_msgs.srv import Reset
+from layouts_msgs.msg import Everything, Inner
+from names_msgs.msg import Hiding, Odd, Point
+from numpy.typing import NDArray
+from typing_extensions import assert_type
+
+gauge = Gauge(1.0, 2, label="x", samples=[1, 2], covariance=[0.0] * 9)
+gauge.samples = range(3)
+gauge.samples = np.zeros(3, np.int16)
+gauge.covariance = np.eye(3).ravel()
+gauge.notes.append("note")
+assert_type(gauge.samples, "array[int]")
+assert_type(gauge.rate, float)
+assert_type(gauge.flags, bytes)
+assert_type(gauge.notes, list[str])
+assert_type(Gauge().covariance, "NDArray[np.float64]")
+full: int = Gauge.FULL
+rate_default: float = Gauge.RATE__DEFAULT
+assert_type(Gauge.deserialize(gauge.serialize()), Gauge)
+assert_type(Gauge.deserialize(bytearray()), Gauge)
+assert_type(Gauge.deserialize(b"", copy=False), Gauge)
+assert_type(Gauge.deserialize_many([b"", bytearray()], copy=False), list[Gauge])
+assert_type(Gauge.serialize_many(gauge for _ in range(3)), list[bytes])
+print(Gauge.to_columns([gauge.serialize()])["value"].mean())
+assert_type(Gauge.from_dict(gauge.to_dict()), Gauge)
+assert_type(dataclasses.replace(gauge, level=3, samples=[1]), Gauge)
+assert_type(Gauge.get_fields_and_field_types(), dict[str, str])
+big: bytes = gauge.serialize(byteorder="big")
+gauge.validate()
+
+match gauge:
+    case Gauge(rate, level=level):
+        assert_type(rate, float)
+        assert_type(level, int)
+
+everything = Everything(inners=[Inner()], flags=[True], stamps=[])
+assert_type(everything.inners[0].c, str)
+odd = Odd(class_=1, item=[Point(1.0, 2.0)])
+assert_type(odd.class_, int)
+assert_type(odd.list, str)
+assert_type(odd.str, list[str])
+assert_type(odd.item[0].x, float)
+hiding = Hiding(Point(1.0), deserialize=[1, 2], from_dict=(1, 2, 3))
+assert_type(hiding.validate.x, float)
+assert_type(hiding.serialize, int)
+assert_type(hiding.deserialize, "array[float]")
+assert_type(super(Hiding, hiding).serialize(), bytes)
+
+request: Reset.Request = Reset.Request(reason="why")
+goal: Fill.Goal = Fill.Goal(1.0)
+assert_type(request.reason, str)
+assert_type(Fill.Impl.SendGoalService.Request().goal.level, float)
+names = [field.name for field in dataclasses.fields(gauge)]
+'''
+
+MISTAKES = """
+from comments_msgs.msg import Gauge
+
+gauge = Gauge("fast")
+gauge.level = "full"
+gauge.samples = ["a"]
+gauge.unknown = 1
+gauge.serialize(byteorder="middle")
+Gauge(unknown=1)
+"""
+
+
+@pytest.fixture(scope="module")
+def user(trees):
+    (trees / "user_code.py").write_text(USER_CODE, encoding="utf-8")
+    (trees / "mistakes.py").write_text(MISTAKES, encoding="utf-8")
+    yield trees
+    (trees / "user_code.py").unlink()
+    (trees / "mistakes.py").unlink()
+
+
+def test_user_code_and_generated_code_pass_mypy_strict(user):
+    flags = ["--strict", "--cache-dir", user / ".mypy", "--warn-unreachable"]
+    packages = [word for case in CASES for word in ("-p", package_of(case))]
+    result = run("mypy", *flags, *packages, "-m", "user_code", cwd=user)
+    assert result.returncode == 0, result.stdout[-3000:]
+    result = run("mypy", *flags, "mistakes.py", cwd=user)
+    assert wrong_lines(result.stdout) == {4, 5, 6, 7, 8, 9}, result.stdout
+
+
+def test_user_code_and_generated_code_pass_basedpyright(user):
+    (user / "pyrightconfig.json").write_text('{"typeCheckingMode": "standard"}', encoding="utf-8")
+    packages = [package_of(case) for case in CASES]
+    result = run("basedpyright", *packages, "user_code.py", cwd=user)
+    assert result.returncode == 0, result.stdout[-3000:]
+    result = run("basedpyright", "mistakes.py", cwd=user)
+    assert wrong_lines(result.stdout) == {4, 5, 6, 7, 8, 9}, result.stdout
+
+
+def wrong_lines(output):
+    """Return the numbers of the lines in mistakes.py that a checker complains of."""
+    found = (
+        line.split("mistakes.py:")[1] for line in output.splitlines() if "mistakes.py:" in line
+    )
+    return {int(line.split(":")[0]) for line in found}

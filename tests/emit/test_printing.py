@@ -1,0 +1,128 @@
+"""Where a line is broken changes nothing: neither what it says nor what a message holds."""
+
+import ast
+import random
+import subprocess
+import sys
+
+import pytest
+
+from idlc.emit import python_lines
+from idlc.emit.render import render_package
+from tests.support import generated, values
+
+PARTS = {
+    "msg/Number.msg": "int32 value\n",
+    "msg/Words.msg": "string text\n",
+    "msg/Nothing.msg": "",
+    "msg/Deep.msg": "Number inner\nbool flag\n",
+    "msg/Mixed.msg": "string name\nfloat64[] values\nNumber number\nWords[] words\n",
+}
+SINGLE = ["float64", "bool", "byte", "string", "wstring", "string<=9",
+          "Number", "Words", "Nothing", "Deep", "Mixed"]  # fmt: skip
+KINDS = [
+    *SINGLE,
+    *(f"{kind}[]" for kind in SINGLE),
+    *(f"{kind}[<=7]" for kind in SINGLE),
+    *(f"{kind}[2]" for kind in SINGLE),
+    *("float64[200]", "uint8[1100]", "byte[1100]", "Deep[6]", "Words[6]", "Mixed[6]"),
+]
+DEFAULTS = (
+    "int32 A_CONSTANT = 1\n"
+    f"string A_LONG_CONSTANT = {'constant ' * 9}\n"
+    "float64 number 0.5\nfloat64[] numbers [1.0]\nuint8[1] one [7]\n"
+    'string[1] text ["a"]\nstring[] texts ["a", "b c", "d"]\n'
+)
+LENGTHS = range(1, 121)
+
+
+def named(number, length):
+    """Return the name of a field: as long as wanted, or as it takes to differ from others."""
+    short = chr(97 + number // 26) + chr(97 + number % 26)
+    return (short + "x" * length)[: max(length, 2)]
+
+
+def every_kind(length):
+    """Return fields of all kinds as text, every other time in reverse."""
+    fields = [f"{kind} {named(number, length)}\n" for number, kind in enumerate(KINDS)]
+    return "".join(fields[:: 1 if length % 2 else -1])
+
+
+@pytest.fixture
+def rendered(monkeypatch):
+    """Return a function that renders a model with lines of some width."""
+
+    def render(model, width):
+        monkeypatch.setattr(python_lines, "WIDTH", width)
+        return {file.path: file.text for file in render_package(model) if "/_" in file.path}
+
+    return render
+
+
+def test_statements_say_the_same_in_lines_of_every_width(rendered):
+    files = {**PARTS, "msg/Defaults.msg": DEFAULTS, "srv/Ask.srv": "Number a\n---\nWords[] b\n"}
+    for number, kind in enumerate(kind for kind in KINDS if "<=" not in kind):
+        files[f"msg/Alone{number}.msg"] = f"{kind} value_of_this\n"
+        files[f"msg/Amid{number}.msg"] = f"string a\n{kind} value_of_this\nstring c\n"
+    model = generated.model_of("widths_msgs", files)
+    wanted = {path: ast.dump(ast.parse(text)) for path, text in rendered(model, 10**6).items()}
+    seen = set()
+    for width in range(44, 96):
+        for path, text in rendered(model, width).items():
+            if text not in seen:
+                seen.add(text)
+                assert ast.dump(ast.parse(text)) == wanted[path], (path, width)
+    assert len(seen) > 7 * len(wanted)
+
+
+def test_one_target_that_does_not_fit_on_a_line_remains_a_tuple():
+    for width in range(60, 120):
+        name = "x" * (width - len("(,) = read(data)"))
+        found = python_lines.assign(
+            python_lines.tuple_of(name), python_lines.call("read", "data"), 0
+        )
+        assert isinstance(ast.parse("\n".join(found)).body[0].targets[0], ast.Tuple), found
+
+
+@pytest.fixture(scope="module")
+def lengths(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lengths")
+    files = dict(PARTS)
+    for length in LENGTHS:
+        files[f"msg/All{length}.msg"] = every_kind(length)
+        alone = named(0, length)
+        files[f"msg/Only{length}.msg"] = f"float64 {alone}\n"
+        files[f"msg/Nested{length}.msg"] = f"Only{length} {alone}\nOnly{length}[] {alone}s\n"
+        files[f"msg/L{'o' * length}ng.msg"] = f"float64 {alone}\nWords {alone}s\n"
+    generated.write_package(folder, "lengths_msgs", files)
+    with generated.importable(folder):
+        yield folder
+
+
+@pytest.mark.parametrize("stem", ["All", "Only", "Nested", "Long"])
+def test_names_of_every_length_hold_what_they_were_given(lengths, stem):
+    rng = random.Random(stem)
+    for length in LENGTHS:
+        name = f"L{'o' * length}ng" if stem == "Long" else f"{stem}{length}"
+        cls = generated.class_of(f"lengths_msgs/msg/{name}")
+        message = values.randomized(cls(), rng, longest=3)
+        assert cls(*(getattr(message, field) for field in cls.__match_args__)) == message
+        for order in ("little", "big"):
+            raw = message.serialize(byteorder=order)
+            read = [cls.deserialize(raw), cls.deserialize(raw, copy=False)]
+            assert [*read, *cls.deserialize_many([raw])] == [message] * 3, (name, order)
+            assert read[0].to_dict() == message.to_dict(), (name, order)
+
+
+def test_no_line_is_longer_than_its_longest_name_makes_it(lengths):
+    """A name of up to 12 characters never makes a line too long."""
+    paths = [
+        str(path)
+        for path in (lengths / "lengths_msgs" / "msg").glob("_*.py")
+        if int("".join(filter(str.isdigit, path.stem)) or "99") <= 12
+    ]
+    words = ["check", "--isolated", "--no-cache", "--select=E501,F,E9", *paths]
+    result = subprocess.run(
+        [sys.executable, "-m", "ruff", *words], capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout

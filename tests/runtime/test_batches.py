@@ -1,0 +1,317 @@
+"""Many messages at once: lists of buffers, streams, numpy columns; and views instead of copies."""
+
+import pickle
+import random
+import struct
+from contextlib import suppress
+from copy import deepcopy
+
+import numpy as np
+import pytest
+
+from tests.support import generated, values
+
+FILES = {
+    "msg/Point.msg": "float64 x\nfloat64 y\nfloat64 z\n",
+    "msg/Odd.msg": "uint8 a\nuint16 b\nuint8 c\n",
+    "msg/Empty.msg": "",
+    "msg/Stamp.msg": "int32 sec\nuint32 nanosec\n",
+    "msg/Header.msg": "Stamp stamp\nstring frame_id\n",
+    "msg/Sample.msg": "Header header\nbool valid\nbyte state\nPoint position\nfloat32[4] weights\n",
+    "msg/Joints.msg": "Header header\nstring[] name\nfloat64[] position\nbool[] moving\n",
+    "msg/Marks.msg": "uint8 n\nPoint[] points\nOdd[3] odds\nHeader[<=4] headers\nEmpty empty\n",
+    "msg/Wide.msg": "wstring text\n",
+    "msg/Image.msg": "uint32 width\nuint8[] data\nfloat32[300] gains\nint16[] more\n",
+}
+
+
+@pytest.fixture(scope="module")
+def msg(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("batches")
+    generated.write_package(folder, "batch_msgs", FILES)
+    with generated.importable(folder):
+        import batch_msgs.msg
+
+        yield batch_msgs.msg
+
+
+@pytest.fixture(scope="module")
+def runtime(msg):
+    import batch_msgs._idlc
+
+    return batch_msgs._idlc
+
+
+@pytest.fixture(scope="module")
+def batches(msg):
+    from batch_msgs._idlc.on_demand import batches
+
+    return batches
+
+
+def many(cls, count=20, seed=1):
+    rng = random.Random(seed)
+    return [values.randomized(cls(), rng) for _ in range(count)]
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize("name", ["Point", "Sample", "Joints", "Marks", "Wide", "Image", "Empty"])
+def test_a_batch_is_what_its_messages_are(msg, name, order):
+    cls = getattr(msg, name)
+    messages = many(cls)
+    buffers = cls.serialize_many(iter(messages), byteorder=order)
+    assert buffers == [message.serialize(byteorder=order) for message in messages]
+    assert cls.deserialize_many(iter(buffers)) == messages
+    mixed = [memoryview(raw) if n % 2 else bytearray(raw) for n, raw in enumerate(buffers)]
+    assert cls.deserialize_many(mixed) == messages
+    assert cls.deserialize_many(buffers, copy=False) == messages
+
+
+def test_a_batch_names_the_message_that_is_wrong(msg, runtime):
+    messages = many(msg.Odd, 4)
+    messages[2].b = 70_000
+    with pytest.raises(runtime.ValidationError, match=r"^\[2\]\.b: must be an integer from 0"):
+        msg.Odd.serialize_many(messages)
+    buffers = msg.Header.serialize_many(many(msg.Header, 4))
+    buffers[3] = buffers[3][:10]
+    with pytest.raises(runtime.DecodeError, match=r"^\[3\]\.stamp\.nanosec: 4 bytes expected"):
+        msg.Header.deserialize_many(buffers)
+    with pytest.raises(runtime.DecodeError, match=r"^\[0\]: the encapsulation header"):
+        msg.Header.deserialize_many([b""])
+    with pytest.raises(ValueError, match="byteorder must be"):
+        msg.Header.serialize_many([], byteorder="middle")
+
+
+def test_a_batch_mends_what_one_message_would(msg):
+    raw = bytearray(msg.Header(frame_id="abc").serialize())
+    raw[16:19] = b"\xff\xff\xff"
+    assert msg.Header.deserialize_many([raw]) == [msg.Header.deserialize(raw)]
+
+
+def test_a_batch_of_a_users_subclass(msg):
+    class Mine(msg.Point):
+        pass
+
+    found = Mine.deserialize_many(msg.Point.serialize_many(many(msg.Point)))
+    assert {type(message) for message in found} == {Mine}
+
+
+def test_a_stream_of_sizes_and_messages(msg, runtime, batches):
+    messages = many(msg.Joints)
+    stream = runtime.on_demand.batches.delimited(msg.Joints.serialize_many(messages))
+    assert (
+        msg.Joints.deserialize_many(runtime.on_demand.batches.split_delimited(stream)) == messages
+    )
+    assert list(runtime.on_demand.batches.split_delimited(b"")) == []
+    for size in (1, 3, 4, 10, len(stream) - 1):
+        with pytest.raises(runtime.DecodeError, match="ends within a message"):
+            list(runtime.on_demand.batches.split_delimited(stream[:size]))
+
+
+def test_the_chunks_of_an_mcap_file(msg, runtime, batches, tmp_path):
+    """The file is written by the mcap project's own library."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+    from mcap.writer import CompressionType, Writer
+
+    points, odds = many(msg.Point, 500), many(msg.Odd, 500, 2)
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4096, compression=CompressionType.NONE)
+        writer.start()
+        channels = {}
+        for name in ("Point", "Odd"):
+            schema = writer.register_schema(f"batch_msgs/msg/{name}", "ros2msg", b"")
+            channels[name] = writer.register_channel(f"/{name}", "cdr", schema)
+        for time, pair in enumerate(zip(points, odds, strict=True)):
+            for message in pair:
+                channel = channels[type(message).__name__]
+                writer.add_message(channel, time, message.serialize(), time)
+        writer.finish()
+    with path.open("rb") as file:
+        records = StreamReader(file, emit_chunks=True).records
+        chunks = [record.data for record in records if isinstance(record, Chunk)]
+    assert len(chunks) > 3
+    for cls, messages in ((msg.Point, points), (msg.Odd, odds)):
+        number = channels[cls.__name__]
+        split = [
+            part for c in chunks for part in runtime.on_demand.batches.split_mcap_chunk(c, number)
+        ]
+        assert cls.deserialize_many(split) == messages
+        assert len(cls.to_columns(split)) == len(messages)
+    for size in (1, 8, 9, 20, len(chunks[0]) - 1):
+        with pytest.raises(runtime.DecodeError, match="ends within a record"):
+            list(runtime.on_demand.batches.split_mcap_chunk(chunks[0][:size], channels["Point"]))
+
+
+# columns
+
+
+def row_of(plain):
+    """Return what a row of columns holds of a message given as a dictionary."""
+    if isinstance(plain, dict):
+        return {name: row_of(value) for name, value in plain.items()}
+    if isinstance(plain, list):
+        return [row_of(value) for value in plain]
+    return plain.encode().rstrip(b"\0") if isinstance(plain, str) else plain
+
+
+def dictionary(row):
+    """Return a row of columns as a dictionary."""
+    if getattr(row.dtype, "names", None) is not None:
+        if row.ndim:
+            return [dictionary(one) for one in row]
+        return {name: dictionary(row[name]) for name in row.dtype.names}
+    return row.tolist()
+
+
+def same_sizes(messages):
+    """Give sequences the same number of elements in all messages, so that columns can hold them."""
+    first = messages[0]
+    for message in messages:
+        for field in first.get_fields_and_field_types():
+            held = getattr(message, field)
+            wanted = getattr(first, field)
+            if isinstance(held, list) or hasattr(held, "typecode"):
+                setattr(message, field, deepcopy(wanted))
+    return messages
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("name", ["Point", "Odd", "Header", "Sample", "Joints", "Marks", "Image"])
+def test_columns_hold_what_the_messages_hold(msg, name, seed):
+    cls = getattr(msg, name)
+    messages = same_sizes(many(cls, 40, seed))
+    orders = [random.Random(seed).choice(["little", "big"]) for _ in messages]
+    buffers = [
+        message.serialize(byteorder=order) + b"\0" * (seed % 3)
+        for message, order in zip(messages, orders, strict=True)
+    ]
+    table = cls.to_columns(iter(buffers))
+    assert table.shape == (40,)
+    for row, message in zip(table, messages, strict=True):
+        assert dictionary(row) == row_of(message.to_dict())
+
+
+def test_columns_of_one_layout_and_of_thousands(msg):
+    messages = many(msg.Sample, 3000)
+    table = msg.Sample.to_columns(map(memoryview, msg.Sample.serialize_many(messages)))
+    assert table["position"]["x"].tolist() == [message.position.x for message in messages]
+    assert table["header"]["stamp"]["sec"].tolist() == [m.header.stamp.sec for m in messages]
+    assert table["weights"].shape == (3000, 4)
+    assert table["valid"].dtype == bool
+
+
+def test_columns_without_rows_have_names(msg):
+    assert msg.Joints.to_columns([]).dtype.names == ("header", "name", "position", "moving")
+    assert msg.Empty.to_columns(msg.Empty.serialize_many(many(msg.Empty, 3))).shape == (3,)
+    assert msg.Marks.to_columns([msg.Marks().serialize()])["points"]["x"].shape == (1, 0)
+
+
+def test_any_byte_but_zero_is_true_in_a_column(msg):
+    raw = bytearray(msg.Joints(moving=[True, False]).serialize())
+    raw[-2] = 77
+    assert msg.Joints.to_columns([raw])["moving"].tolist() == [[True, False]]
+
+
+def test_what_columns_cannot_hold_is_said(msg, runtime):
+    two = [msg.Joints(position=[1.0] * count).serialize() for count in (2, 2, 3)]
+    with pytest.raises(ValueError, match=r"\[2\]\.position: has 3 elements and 2 in a message"):
+        msg.Joints.to_columns(two)
+    with pytest.raises(ValueError, match="text is a wstring"):
+        msg.Wide.to_columns([msg.Wide().serialize()])
+    good = msg.Header(frame_id="map").serialize()
+    with pytest.raises(runtime.DecodeError, match=r"^\[1\]\.frame_id: 4 bytes expected"):
+        msg.Header.to_columns([good, good[:-4]])
+    with pytest.raises(runtime.DecodeError, match=r"^\[0\]: the encapsulation header"):
+        msg.Header.to_columns([b"\0"])
+    huge = good[:12] + struct.pack("<I", 0xFFFF_FFFF) + good[16:]
+    with pytest.raises(runtime.DecodeError, match="bytes expected"):
+        msg.Header.to_columns([huge])
+
+
+def test_mutated_buffers_end_in_rows_or_in_an_error(msg, runtime):
+    rng = random.Random(5)
+    for cls in (msg.Sample, msg.Joints, msg.Marks, msg.Image):
+        for message in many(cls, 60, 7):
+            raw = bytearray(message.serialize())
+            for _ in range(rng.choice([1, 1, 3])):
+                raw[rng.randrange(len(raw))] = rng.choice([0, 1, 5, 127, 255])
+            raw = raw[: rng.choice([len(raw), rng.randrange(len(raw))])]
+            with suppress(runtime.DecodeError):
+                assert len(cls.to_columns([raw])) == 1
+
+
+def test_thousands_of_layouts_are_refused(msg):
+    buffers = [msg.Header(frame_id="x" * size).serialize() for size in range(1001)]
+    with pytest.raises(ValueError, match="more than 1000 different layouts"):
+        msg.Header.to_columns(buffers)
+    assert len(msg.Header.to_columns(buffers[:1000])) == 1000
+
+
+# views
+
+
+@pytest.mark.parametrize("order", ["little", "big"])
+@pytest.mark.parametrize("wrap", [bytes, bytearray, memoryview, np.frombuffer])
+def test_views_share_the_buffers_memory(msg, wrap, order):
+    made = msg.Image(width=3, data=range(200), more=[-1, 2], gains=np.arange(300))
+    raw = made.serialize(byteorder=order)
+    raw = np.frombuffer(raw, np.uint8) if wrap is np.frombuffer else wrap(raw)
+    read = msg.Image.deserialize(raw, copy=False)
+    everything = np.frombuffer(raw, np.uint8)
+    for field in ("data", "gains", "more"):
+        view = getattr(read, field)
+        assert np.shares_memory(view, everything), field
+        assert not view.flags.writeable
+        with pytest.raises(ValueError, match="read-only"):
+            view[0] = 1
+    assert read == made == msg.Image.deserialize(raw)
+    assert read.to_dict() == made.to_dict()
+    read.validate()
+    assert read.serialize(byteorder=order) == bytes(raw)
+    assert deepcopy(read) == made
+    assert pickle.loads(pickle.dumps(read)) == made
+
+
+def test_a_view_of_nothing(msg):
+    read = msg.Image.deserialize(msg.Image().serialize(), copy=False)
+    assert (read.data.shape, read.data.dtype) == ((0,), np.uint8)
+    assert read == msg.Image()
+
+
+def test_a_copy_shares_nothing(msg):
+    raw = bytearray(msg.Image(data=range(200)).serialize())
+    read = msg.Image.deserialize(raw)
+    raw[:] = bytes(len(raw))
+    assert list(read.data) == list(range(200))
+
+
+# strings that repeat from message to message
+
+
+def test_arrays_of_strings_are_independent_of_each_other(msg):
+    one = msg.Joints(name=["a", "b"]).serialize()
+    two = msg.Joints(name=["a", "c"]).serialize()
+    for _ in range(3):
+        first = msg.Joints.deserialize(one)
+        first.name.append("mine")
+        first.name[0] = "changed"
+        assert msg.Joints.deserialize(one).name == ["a", "b"]
+        assert msg.Joints.deserialize(two).name == ["a", "c"]
+        assert msg.Joints.deserialize(memoryview(two)).name == ["a", "c"]
+        assert msg.Joints.deserialize(msg.Joints(name=["a"]).serialize()).name == ["a"]
+        assert msg.Joints.deserialize(msg.Joints().serialize()).name == []
+
+
+def test_arrays_of_strings_are_written_as_they_are_now(msg):
+    joints = msg.Joints(name=["a", "b"])
+    for names in (["a", "b"], ["a", "c"], [], ["a"], ("a", "b"), ["é" * 5, ""], ["a", "b"]):
+        joints.name = names
+        assert msg.Joints.deserialize(joints.serialize()).name == list(names)
+    joints.name = names = ["a", "b"]
+    joints.serialize()
+    names[0] = "changed in place"
+    assert msg.Joints.deserialize(joints.serialize()).name == names
+    joints.name = ["x", "y"]
+    assert joints.serialize() == msg.Joints(name=["x", "y"]).serialize()
