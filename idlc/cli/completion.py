@@ -7,8 +7,6 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-_KINDS = {"publisher": "msg", "subscriber": "msg", "service": "srv", "client": "srv"}
-
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer packages."""
@@ -31,11 +29,17 @@ def types_and_paths(
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
     from idlc.driver import completion
-    from idlc.model.ir import KINDS
+    from idlc.scaffold.roles import ROLES
 
-    wanted = _KINDS.get(option.name or "", "action")
-    kinds = [kind for kind in KINDS if kind == wanted]
+    kinds = [role.kind for role in ROLES if role.name == option.name and role.kind]
     return completion.types(word, _include(context), kinds, bare="own")
+
+
+def templates(_: click.Context, __: click.Parameter, word: str) -> list[str]:
+    """Offer the templates that a user can replace."""
+    from idlc.scaffold.templates import names
+
+    return [name for name in names() if name.startswith(word)]
 
 
 def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionItem[str]]:

@@ -35,6 +35,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     out: Text = ""
     package: Text = ""
     vendor_deps: Switch = False
+    templates: Text = ""
     breaking: Table = {}
     check: Table = {}
 
@@ -52,6 +53,7 @@ class Config(msgspec.Struct, frozen=True):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     vendor_deps: bool = False
+    templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
@@ -115,6 +117,7 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         include=tuple(_typed(folder, path) for path in found.include),
         exclude=found.exclude,
         vendor_deps=found.vendor_deps,
+        templates=_typed(folder, found.templates) if found.templates else None,
         tables={"breaking": found.breaking, "check": found.check},
         source=source,
         folder=folder,

@@ -256,7 +256,7 @@ def imported_by(*words: str, cwd: Path, given: str = "runpy") -> set[str]:
 
 @pytest.mark.parametrize("option", ["--version", "--help"])
 def test_starting_up_imports_nothing_heavy(option, tmp_path):
-    heavy = {"jinja2", "lark", "msgspec", "numpy", "rich"}
+    heavy = {"jinja2", "lark", "msgspec", "numpy", "rich", "idlc.scaffold"}
     assert heavy & imported_by(option, cwd=tmp_path) == set()
 
 
@@ -277,4 +277,5 @@ def test_checking_a_file_imports_little(tmp_path):
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
     assert "idlc.checks.package.manifest" in own
+    assert "idlc.scaffold" not in own
     assert len(own) <= 76, "what a run without problems does not need can wait"
