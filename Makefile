@@ -5,7 +5,7 @@
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
-#                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu
+#                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
@@ -65,7 +65,7 @@ endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
-	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py $(ARGS)
+	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py tests/ros/test_native_*.py $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/project/every_python.sh $(INTERPRETERS)

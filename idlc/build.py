@@ -15,27 +15,33 @@ from idlc.disk.find import look
 from idlc.disk.inputs import packages
 from idlc.disk.output.project import Project
 from idlc.disk.scope import scope
+from idlc.disk.setup_command import distribution_class
 from idlc.driver.gen import GenOptions, gen
+from idlc.driver.libraries import Libraries, libraries_of
 from idlc.driver.query import describe
+from idlc.driver.stages import models_of
 from idlc.scaffold import new_interface
 
 
-def compile_interfaces(package: str) -> None:
+def compile_interfaces(package: str) -> dict[str, type]:
     """Bring the package's classes, and what ROS 2 installs beside interfaces, up to date.
+
+    Returns what setup() is to be given besides, for its libraries: `setup(..., **compiled)`.
 
     Works in the folder of the setup.py that is run, and writes nothing where nothing changed. A
     rejected interface ends the build with a report.
     """
     if "--dry-run" in sys.argv:
-        return  # colcon asks setup.py for the package's name whatever it is to do, to test as well
+        return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
     here, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
-        installed = _compile(package)
+        installed, libraries = _compile(package)
     finally:
         os.chdir(here)
     if source != here:
         _link(installed, source, here)
+    return {"distclass": distribution_class(package, libraries.files, libraries.missing)}
 
 
 def _link(paths: Iterable[str], source: Path, here: Path) -> None:
@@ -50,13 +56,13 @@ def _link(paths: Iterable[str], source: Path, here: Path) -> None:
             (here / path).symlink_to(source / path)
 
 
-def _compile(package: str) -> Iterable[str]:
+def _compile(package: str) -> tuple[Iterable[str], Libraries]:
     """Compile the package in the working folder; return the files that ROS 2's tools read."""
     report = Report()
     where = scope(pyproject.load(report), package)
     found = packages(look((".",), Report(), where.exclude).files, where, report)
     if not found:
-        return ()
+        return (), Libraries({})
     (given,) = found
     gen(GenOptions(paths=(".",), out=package, scope=where), report)
     project = Project(".", report)
@@ -71,4 +77,5 @@ def _compile(package: str) -> Iterable[str]:
     output.show(report, "text", sys.stderr)
     if report.had_errors:
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    return files
+    ((_, model),) = models_of(found, where, Report())
+    return files, libraries_of(model)

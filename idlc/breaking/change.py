@@ -21,6 +21,7 @@ class Change(NamedTuple):
 
     `subject` is what changed, such as `pkg/msg/Name.field`; `cause` is the other type whose change
     it follows from. A change without a `span` has the `path` of its file.
+    `detail` is text of several lines.
     """
 
     code: Code
@@ -32,6 +33,7 @@ class Change(NamedTuple):
     path: str = ""
     hint: str | None = None
     cause: str = ""
+    detail: str = ""
 
     def without(self, level: Level) -> Change:
         """Return the change with a level that turned out not to be true."""
@@ -49,5 +51,6 @@ class Change(NamedTuple):
             path=self.path,
             labels=label,
             hint=self.hint,
+            detail=self.detail,
             levels=tuple(level for level in LEVELS if level in self.levels),
         )

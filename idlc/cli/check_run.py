@@ -26,6 +26,7 @@ class Wishes(msgspec.Struct, frozen=True):
     exclude: tuple[str, ...] = ()
     style: str = "text"
     statistics: bool = False
+    prefix: str | None = None
 
 
 def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
@@ -35,7 +36,11 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     settings = pyproject.load(report)
     chosen = _selection(command_settings.selection(settings, report), wishes)
     checked = Checked(())
-    if not report.had_errors:
+    if wishes.prefix is not None:
+        from idlc.driver.prefix import check_prefix
+
+        checked = check_prefix(wishes.prefix, report)
+    elif not report.had_errors:
         wanted = CheckOptions(
             paths=paths or settings.paths or (".",),
             scope=scope(settings, wishes.package, wishes.include, wishes.exclude),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -14,6 +15,17 @@ def ament_prefixes() -> tuple[Path, ...]:
     return tuple(dict.fromkeys(Path(prefix) for prefix in (*listed, sys.prefix) if prefix))
 
 
+def modules_folder() -> str:
+    """Return the folder of a prefix in which the Python of ROS 2 here looks for modules."""
+    found = (
+        path.parent.relative_to(prefix).as_posix()
+        for prefix in ament_prefixes()
+        for path in sorted(prefix.glob("lib/python3*/site-packages/rclpy"))
+    )
+    own = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+    return next(found, own)
+
+
 def runs_nodes() -> bool:
     """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
     return bool(python_folders("rclpy"))
@@ -23,3 +35,9 @@ def python_folders(package: str) -> list[Path]:
     """Return the folders that importing a package would use, without importing it."""
     spec = PathFinder.find_spec(package, sys.path)
     return [Path(place) for place in (spec and spec.submodule_search_locations) or ()]
+
+
+def machine() -> str:
+    """Return the processor that programs here are for, such as `x86_64`; empty if not on Linux."""
+    whole = sys.maxsize > 1 << 32  # a 32-bit Python on a 64-bit kernel
+    return platform.machine() if sys.platform == "linux" and whole else ""

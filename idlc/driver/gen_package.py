@@ -10,8 +10,10 @@ from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.output import lock_file
 from idlc.disk.output.folder import Target
+from idlc.disk.output.overlay import Overlay
 from idlc.disk.output.up_to_date import dependencies
 from idlc.disk.output.write_plan import Plan
+from idlc.driver.overlay import overlaid
 from idlc.driver.stages import derived_names, stage
 from idlc.model import derive, ir
 
@@ -58,7 +60,8 @@ def package_of(
         target.report.extend(refused)
         return None
     with stage("render", model.package):
-        files = {file.path: file.text for file in render_package(model)}
+        modules = {file.path: file.text for file in render_package(model)}
+        files = overlaid(model, modules, target) if isinstance(target, Overlay) else {**modules}
     plan = target.plan(files, check=check)
     if plan is None:
         return None
@@ -91,7 +94,7 @@ def _check_syntax(plan: Plan, target: Target) -> None:
     front of it; modules without one are like those that the tests read.
     """
     for change in plan.changes:
-        rendered = change.path.endswith(".py") and not change.path.startswith("_idlc/")
+        rendered = change.path.endswith(".py") and "/_idlc/" not in f"/{change.path}"
         if rendered and change.new and b"\\" in change.new:
             with stage("compile", f"{target.name}/{change.path}"):
                 # parses, and resolves names, without the cost of making bytecode

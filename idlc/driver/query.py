@@ -14,6 +14,9 @@ from idlc.driver import named_types
 from idlc.driver.stages import compile_package, derived_names, sound_models, stage
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
+    from idlc.disk.library import Library
+    from idlc.model import ir
     from idlc.model.link import Model
 
 
@@ -68,11 +71,8 @@ def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[
     """Yield the models that a type's or package's name means, and the names that are meant."""
     library, meant = named_types.resolve(text, include, report)
     for name, interface in meant:
-        source = library.source(interface)
-        model = source and compile_package(
-            interface.package, [(interface, source)], library, report
-        )
-        if not model or report.had_errors:
+        model = _compiled(interface, library, report)
+        if model is None:
             return
         names = [n for own in model.own if own.name == interface for n in derived_names(own)]
         if name == interface:
@@ -80,6 +80,19 @@ def _named(text: str, include: Sequence[str], report: Report) -> Iterator[tuple[
         elif str(name) in names:
             yield model, [str(name)]
         else:
-            parts = (one.rpartition("/")[2] for one in names if one != str(interface))
-            hint = f"the parts of `{interface}` are {', '.join(f'`{one}`' for one in parts)}"
-            report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
+            report.add(_no_such_part(text, interface, names))
+
+
+def _compiled(interface: ir.TypeName, library: Library, report: Report) -> Model | None:
+    """Return the model of an interface alone, `None` after an error."""
+    source = library.source(interface)
+    if source is None:
+        return None
+    model = compile_package(interface.package, [(interface, source)], library, report)
+    return None if report.had_errors else model
+
+
+def _no_such_part(text: str, interface: ir.TypeName, names: Sequence[str]) -> Diagnostic:
+    parts = (f"`{one.rpartition('/')[2]}`" for one in names if one != str(interface))
+    hint = f"the parts of `{interface}` are {', '.join(parts)}"
+    return codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint)

@@ -10,33 +10,12 @@ from functools import cache
 from pathlib import Path
 
 import jinja2
-import msgspec
 
 from idlc.emit import listing, pynames, type_data, view
 from idlc.model import ir, link
+from idlc.templating import RenderedFile, environment
 
 PACKAGE = Path(__file__).parent.parent
-
-
-class RenderedFile(msgspec.Struct, frozen=True):
-    """A file to write: `path` with slashes, relative to the package's folder."""
-
-    path: str
-    text: str
-
-
-@cache
-def environment() -> jinja2.Environment:
-    """Return the environment of all templates: strict, without filters of our own."""
-    folders = [PACKAGE / "templates", PACKAGE.parent / "templates"]
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folders),
-        undefined=jinja2.StrictUndefined,
-        autoescape=False,  # noqa: S701 (Python source, escaped by emit.literals)
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
 
 
 @cache
@@ -54,6 +33,11 @@ def runtime_files() -> tuple[RenderedFile, ...]:
         )
         for path in sorted(runtime.rglob("*.py"))
     )
+
+
+def support_packages() -> list[str]:
+    """Return the Python packages that the support package consists of, itself first."""
+    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
 
 
 def module_files(

@@ -1,4 +1,4 @@
-"""An interface as the .idl file that rosidl's adapter makes of it (spec 1.5)."""
+"""An interface as the .idl file that rosidl's adapter makes of it (language 1.6)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The structures that services and actions imply, built in one place (spec section 5)."""
+"""The structures that services and actions imply, built in one place (language 5)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from idlc.model import ir
 SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
 TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
-CANCEL_GOAL = ir.TypeName("action_msgs", "srv", "CancelGoal")
-GOAL_STATUS_ARRAY = ir.TypeName("action_msgs", "msg", "GoalStatusArray")
 
 #: What each kind of file needs beside the types that it names.
 IMPLICIT_PACKAGES: dict[ir.Kind, tuple[str, ...]] = {

@@ -1,4 +1,4 @@
-"""Type descriptions and RIHS01 hashes (spec section 6), from one place."""
+"""Type descriptions and RIHS01 hashes (language 6), from one place."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class PrimitiveInfo(NamedTuple):
     """The facts of one primitive: IDL spelling, RIHS type id, wire format and value range.
 
     `code` is the struct format character; `low` and `high` are `None` for bool and floats.
-    Source: spec section 2.
+    Source: language 2.
     """
 
     idl: str
@@ -54,6 +54,11 @@ class PrimitiveInfo(NamedTuple):
     size: int
     low: int | None = None
     high: int | None = None
+
+    @property
+    def dtype(self) -> str:
+        """How numpy calls it."""
+        return {"float": "float32", "double": "float64"}.get(self.idl, self.idl)
 
 
 PRIMITIVES: dict[str, PrimitiveInfo] = {
@@ -125,7 +130,7 @@ class Default(msgspec.Struct, frozen=True):
     """A declared default.
 
     `value` is what Python sees (a tuple for arrays); `text` is the annotation's `str()` as it
-    stands in type descriptions (spec section 6).
+    stands in type descriptions (language 6).
     """
 
     value: Value
@@ -133,7 +138,7 @@ class Default(msgspec.Struct, frozen=True):
 
 
 class Field(msgspec.Struct, frozen=True, kw_only=True):
-    """A field. `comment` is condensed (spec 1.4) but not yet escaped; `unit` likewise."""
+    """A field. `comment` is condensed (language 1.4) but not yet escaped; `unit` likewise."""
 
     name: str
     type: FieldType
@@ -172,7 +177,7 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def wire_fields(self) -> tuple[Field, ...]:
-        """The fields as hashed and sent: the dummy member where there are none (spec 5, 8.6)."""
+        """The fields as hashed and sent: a dummy member where there are none (language 5, 8.6)."""
         return self.fields or (Field(name=DUMMY_FIELD, type=Primitive("uint8")),)
 
     @property

@@ -1,4 +1,4 @@
-"""Which names ROS 2 allows (spec section 2.2)."""
+"""Which names ROS 2 allows (language 2.2)."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ MESSAGE_HINT = "use letters and digits, a capital letter first"
 
 
 def is_package_name(name: str) -> bool:
-    """Tell whether a package may be called so."""
+    """Return whether a package may be called so."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_field_name(name: str) -> bool:
-    """Tell whether a field may be called so."""
+    """Return whether a field may be called so."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_constant_name(name: str) -> bool:
-    """Tell whether a constant may be called so."""
+    """Return whether a constant may be called so."""
     return _UPPER.fullmatch(name) is not None
 
 
 def is_message_name(name: str) -> bool:
-    """Tell whether a message may be called so; each derived suffix counts once, in this order."""
+    """Return whether a message may be called so; each derived suffix counts once, in this order."""
     name = name.removeprefix("Sample_")
     for suffix in _MESSAGE_SUFFIXES:
         name = name.removesuffix(suffix)
@@ -52,6 +52,6 @@ def message_name_like(name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def snake_case(name: str) -> str:
-    """Return the module name that rosidl derives from an interface's name (spec section 7.1)."""
+    """Return the module name that rosidl derives from an interface's name (language 7.1)."""
     name = re.sub(r"(.)([A-Z][a-z]+)", r"\1_\2", name)
     return re.sub(r"([a-z0-9])([A-Z])", r"\1_\2", name).lower()

@@ -11,6 +11,11 @@ from idlc.native.image import Image, Place
 Words = tuple[int | Place | None, ...]
 
 
+def hash_bytes(text: str) -> bytes:
+    """Return a type's hash as C has it: the version, and the digest."""
+    return b"\1" + bytes.fromhex(text.removeprefix("RIHS01_"))
+
+
 class Descriptions:
     """The functions of each type that return these three, made once."""
 
@@ -31,8 +36,7 @@ class Descriptions:
         return self._about[name]
 
     def _hash(self, name: str) -> Place:
-        digest = self._model.describer.hash(name).removeprefix("RIHS01_")
-        return self._image.constants.put(b"\1" + bytes.fromhex(digest))
+        return self._image.constants.put(hash_bytes(self._model.describer.hash(name)))
 
     def _description(self, name: str) -> tuple[Place, Place]:
         full = self._model.describer.description(name)

@@ -117,29 +117,20 @@ class _File:
 
         Each segment is mapped some pages further on than it is in the file, so that it shares none.
         """
-        at = 0
+        at, page = 0, self.image.machine.page
         for index, (flags, kinds) in enumerate(KINDS.items()):
-            at += -at % 16
+            at, distance = at + -at % 16, index * page
             if flags & WRITE:
-                at += -(at + self._constant_size()) % self.image.machine.page
+                at += -(at + self._constant_size()) % page
             start = at
             at += 0 if index else HEADER + SEGMENT * SEGMENTS
             for name in kinds:
                 section = self.sections[name]
                 at += -at % section.align
                 self.offsets[name] = at
-                section.address = at + index * self.image.machine.page
+                section.address = at + distance
                 at += len(section.data)
-            self.loaded.append(
-                (
-                    1,
-                    flags,
-                    start,
-                    index * self.image.machine.page + start,
-                    at - start,
-                    self.image.machine.page,
-                )
-            )
+            self.loaded.append((1, flags, start, start + distance, at - start, page))
         return at
 
     def _constant_size(self) -> int:

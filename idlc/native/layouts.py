@@ -1,4 +1,4 @@
-"""Where the C structures of a distribution of ROS 2 differ from those of others."""
+"""Where the structures of a distribution of ROS 2 differ from those of others."""
 
 from __future__ import annotations
 
@@ -21,23 +21,35 @@ class Layout(NamedTuple):
     members: int = 40  #: the offset of `members_` in MessageMembers
     member: int = 112  #: the size of a MessageMember
     is_array: int = 33  #: the offset of `is_array_` in it
+    string: int = 24
+    bool_sequence: int = 24
     primitive_sequence: int = 24
     string_sequence: int = 24
     message_sequence: int = 24
 
+    def of_cpp(self) -> Layout:
+        """Return it with messages of C++, where fields are of libstdc++'s types.
 
+        What follows a `uint8[]` lies elsewhere in Lyrical: its own class for those has had another
+        size in each version.
+        """
+        return self._replace(string=32, bool_sequence=40, primitive_sequence=24, string_sequence=24)
+
+
+#: Sequences in C, but those of messages, say here whether their data are a buffer of Lyrical's.
+_LYRICAL = Layout(member=120, bool_sequence=32, primitive_sequence=32, string_sequence=32)
 LAYOUTS = {
     "humble": Layout(members=32, is_array=32),
     "iron": Layout(members=32, is_array=32),
     "jazzy": Layout(),
     "kilted": Layout(),
-    "lyrical": Layout(member=120, primitive_sequence=32, string_sequence=32),
-    "rolling": Layout(member=120, primitive_sequence=32, string_sequence=32),
+    "lyrical": _LYRICAL,
+    "rolling": _LYRICAL,
 }
 
 
 class Structure(NamedTuple):
-    """A message's C structure, as rosidl's C generator lays it out."""
+    """A message's structure, as a compiler lays out what rosidl generates."""
 
     offsets: tuple[int, ...]
     size: int
@@ -45,7 +57,7 @@ class Structure(NamedTuple):
 
 
 class Structures:
-    """The C structures of messages: `add` them with those first that others hold."""
+    """The structures of messages: `add` them with those first that others hold."""
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
@@ -69,9 +81,10 @@ class Structures:
         match element:
             case ir.Primitive():
                 size = align = element.info.size
-                sequence = layout.primitive_sequence
+                is_bool = element.name == "bool"
+                sequence = layout.bool_sequence if is_bool else layout.primitive_sequence
             case ir.String():
-                size, align, sequence = 24, 8, layout.string_sequence
+                size, align, sequence = layout.string, 8, layout.string_sequence
             case ir.Ref():
                 _, size, align = self._known[element.target]
                 sequence = layout.message_sequence

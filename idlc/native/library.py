@@ -14,6 +14,8 @@ symbol that is missing, none with half a service.
 
 from __future__ import annotations
 
+from struct import pack
+
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.native import aarch64, x86_64
@@ -25,6 +27,7 @@ from idlc.native.machine import Machine
 
 MACHINES = {"x86_64": x86_64.MACHINE, "aarch64": aarch64.MACHINE}
 
+AUTHOR = b"idlc"
 OWN = "rosidl_typesupport_cpp"
 FASTRTPS = "rosidl_typesupport_fastrtps_c"
 FIELDS = "rosidl_typesupport_introspection_c"
@@ -47,15 +50,26 @@ def libraries(
     }
 
 
+def told(layout: Layout) -> bytes:
+    """Return what a library's constants begin with: who made it, and for which layout."""
+    return AUTHOR + pack(f"<{len(layout)}I", *layout)
+
+
+def symbol(identifier: str, name: ir.TypeName) -> str:
+    """Return the symbol under which tools ask a library of this kind for a message."""
+    return "__".join((identifier, "get_message_type_support_handle", *name))
+
+
 def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
+    image.constants.put(told(layout))
     support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
     for interface in model.own:
         for message in derive.messages(interface):
             handle = support.fields[message.name]
             if identifier == OWN:
                 handle = support.own(message.name, handle)
-            symbol = "__".join((identifier, "get_message_type_support_handle", *message.name))
-            image.exports[symbol] = image.function("get", target=handle)
+            name = symbol(identifier, message.name)
+            image.exports[name] = image.function("get", target=handle)
     return shared_library(image, f"lib{model.package}__{identifier}.so")
 
 
@@ -67,7 +81,7 @@ class _TypeSupport:
         self.layout = layout
         self.cpp = cpp
         self.descriptions = Descriptions(model, image)
-        self.structures = Structures(layout)
+        self.structures = Structures(layout.of_cpp() if cpp else layout)
         self.refuse = image.function("refuse")
         self.fields: dict[ir.TypeName, Place] = {}
         for message in _reached(model):

@@ -37,10 +37,34 @@ def text(kind: str, fields: Sequence[str], comment: str = "") -> str:
     return head + gap + body
 
 
+#: What a new file holds to begin with.
+_STARTERS = {
+    "msg": ("float32 speed  # forwards [m/s]",),
+    "srv": ("bool enable  # what is wanted", "---", "bool enabled  # what is so now"),
+    "action": (
+        "uint32 count  # how many times",
+        "---",
+        "uint32 total  # how many times it was",
+        "---",
+        "uint32 done  # how many times until now",
+    ),
+}
+
+
+def starter(word: str) -> tuple[str, str]:
+    """Return path and text of a new interface file, named like `Drive` or `srv/Ask`."""
+    kind, _, name = word.rpartition("/")
+    kind = kind or "msg"
+    if kind not in _STARTERS:
+        raise ValueError(f"`{word}` is no interface: write `Drive`, `srv/Ask` or `action/Walk`")
+    comment = "An example: say here what it is for."
+    return f"{kind}/{check_name(name)}.{kind}", text(kind, _STARTERS[kind], comment)
+
+
 def index(package: str, keys: Iterable[str]) -> tuple[str, str]:
     """Return path and text of the file by which ROS 2's tools know a package's interfaces.
 
-    `keys` are the interface files, such as `msg/Drive.msg`. Source: spec section 9.
+    `keys` are the interface files, such as `msg/Drive.msg`. Source: language 9.
     """
     return f"{RESOURCE}/rosidl_interfaces/{package}", "".join(f"{key}\n" for key in sorted(keys))
 

@@ -193,7 +193,7 @@ def _in(columns: set[_Edge], word: _Word) -> bool:
 
 
 def _is_even(block: _Column) -> bool:
-    """Tell whether the block's gaps are the same; a comment may stand where it likes if alone."""
+    """Return whether the block's gaps are the same; a comment may stand where it likes if alone."""
     gaps = {word.gap for row, word in block if not row.is_comment}
     alone = len(block) == 1 and block[0][1].kind != "comment"
     return len(gaps) == 1 and "" not in gaps and not alone

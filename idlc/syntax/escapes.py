@@ -1,4 +1,4 @@
-r"""What happens to text on its way through ROS 2's pipeline (spec section 1.5).
+r"""What happens to text on its way through ROS 2's pipeline (language 1.5).
 
 rosidl writes each comment line, unit, string constant and string default into an .idl file and
 reads it back. On the way escapes are interpreted twice or three times, and some text breaks the
@@ -35,7 +35,7 @@ class EscapeError(ValueError):
 def through_idl(text: str) -> str:
     """Return what rosidl's parser sees of `text` after rosidl's adapter wrote it.
 
-    Raises EscapeError for text that the pipeline refuses. Source: spec 1.5, steps B to F.
+    Raises EscapeError for text that the pipeline refuses. Source: language 1.5, steps B to F.
     """
     if "\\" not in text and "\n" not in text:
         return text

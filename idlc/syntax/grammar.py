@@ -6,7 +6,7 @@ import re
 from functools import lru_cache
 from pathlib import Path
 
-#: The characters that end a line, as `str.splitlines` has it (spec 1.1).
+#: The characters that end a line, as `str.splitlines` has it (language 1.1).
 LINE_ENDS = "\n\r\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"
 
 

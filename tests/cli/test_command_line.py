@@ -407,23 +407,29 @@ def wait_for(condition) -> None:
 
 def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
     make("demo/msg/A.msg")
+    both = ["-o", "out/demo", "--ament", "prefix"]
+    library = Path("prefix/lib/libdemo__rosidl_typesupport_cpp.so")
     with subprocess.Popen(
-        [sys.executable, "-m", "idlc", "gen", "demo", "-o", "out/demo", "--watch"],
+        [sys.executable, "-m", "idlc", "gen", "demo", *both, "--watch"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONUTF8": "1"},
     ) as process:
         try:
-            assert "demo: 1 interface" in process.stdout.readline()
+            for _ in both[::2]:
+                assert "demo: 1 interface" in process.stdout.readline()
             assert "watching demo" in process.stderr.readline()
             make("demo/msg/B.msg")
             wait_for(Path("out/demo/msg/_b.py").is_file)
-            assert "demo: 2 interfaces" in process.stdout.readline()
+            for _ in both[::2]:
+                assert "demo: 2 interfaces" in process.stdout.readline()
+            assert b"__demo__msg__B\0" in library.read_bytes()
             make("demo/msg/B.msg", "flot64 broken\n")
             assert "IDL201" in process.stderr.readline()
             Path("demo/msg/B.msg").unlink()
             wait_for(lambda: not Path("out/demo/msg/_b.py").exists())
+            wait_for(lambda: b"__demo__msg__B\0" not in library.read_bytes())
         finally:
             process.send_signal(signal.SIGINT)
             _, err = process.communicate(timeout=30)

@@ -11,6 +11,7 @@ from jinja2 import UndefinedError
 
 from idlc.emit import literals, render
 from idlc.model import ir, link
+from idlc.templating import environment
 
 HOSTILE = [
     '"""',
@@ -140,4 +141,4 @@ def test_pages_of_hostile_text_are_formatted_and_clean(hostile_folder):
 
 def test_an_unknown_name_in_a_template_is_an_error():
     with pytest.raises(UndefinedError):
-        render.environment().from_string("{{ nothing }}").render()
+        environment().from_string("{{ nothing }}").render()

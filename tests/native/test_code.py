@@ -1,15 +1,25 @@
 """The machine code of the libraries for C++ tools is what its assembler text says."""
 
+import ast
 import re
 import subprocess
+from pathlib import Path
 
 import pytest
 
+import idlc.native
 from idlc.native.library import MACHINES as MADE_FOR
 from tests.support.tools import MACHINES, assemble, run, tool
 
 #: Where code lies and what it refers to; within the smallest reach that a machine has.
 PLACES = [(0x10000, 0x20000), (0x12340, 0x11008), (0x7654320, 0x0), (0x0, 0x7FFF000)]
+
+#: The instruction at which code may be entered through a pointer: endbr64, bti c.
+PADS = {"x86_64": "f30f1efa", "aarch64": "5f2403d5"}
+#: Functions that others of the library jump to, and nobody else.
+INNER = {"same"}
+#: What a machine's module has besides the writer's code.
+OF_A_MACHINE = {"TEXT", "CODE", "ENTRIES", "HOLES"}
 
 
 @pytest.fixture(params=MACHINES)
@@ -48,3 +58,20 @@ def test_addresses_are_filled_in_as_a_linker_does(machine, here, there, tmp_path
 def test_all_machines_have_the_same_functions():
     found = [(list(one.entries), sorted(set(one.holes.values()))) for one in MADE_FOR.values()]
     assert found[0] == found[1]
+
+
+def test_functions_may_be_entered_through_pointers(machine):
+    code, entries = MADE_FOR[machine].code.hex(), MADE_FOR[machine].entries
+    found = {name for name, at in entries.items() if code.startswith(PADS[machine], 2 * at)}
+    assert found == set(entries) - INNER
+
+
+def test_the_writer_is_small():
+    count = 0
+    for path in Path(idlc.native.__file__).parent.glob("*.py"):
+        lines = path.read_text(encoding="utf-8").splitlines()
+        for node in reversed(ast.parse("\n".join(lines)).body):
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in OF_A_MACHINE:
+                del lines[node.lineno - 1 : node.end_lineno]
+        count += sum(bool(line.strip()) for line in lines)
+    assert 0 < count < 800

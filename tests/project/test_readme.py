@@ -4,9 +4,8 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import takewhile
 from pathlib import Path
-
-import pytest
 
 from tests.support.paths import EXAMPLE, ROOT
 
@@ -18,24 +17,30 @@ def run(*words: object, cwd: Path) -> subprocess.CompletedProcess:
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
 
 
-@pytest.fixture
-def compiled(tmp_path) -> Path:
-    """Return a folder in which the README's first command was carried out."""
-    (words,) = re.findall(r"^    idlc (gen interfaces/ .*)$", README, re.MULTILINE)
-    shutil.copytree(EXAMPLE, tmp_path / "interfaces")
-    done = run("-m", "idlc", *words.split(), cwd=tmp_path)
+def shell(script: str, cwd: Path) -> None:
+    idlc = f"idlc() {{ '{sys.executable}' -m idlc \"$@\"; }}\n"
+    done = subprocess.run(
+        ["/bin/sh", "-e", "-c", idlc + script], cwd=cwd, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
-    return tmp_path
 
 
-def test_the_examples_run_one_after_the_other(compiled):
+def test_the_first_result_comes_soon(tmp_path):
+    """As pasted into an empty folder: the commands after the installation, then the code."""
+    lines = README.splitlines()
+    first = next(n for n, line in enumerate(lines) if line.startswith("    pip install"))
+    commands = list(takewhile(lambda line: line.startswith("    "), lines[first + 1 :]))
+    shell("\n".join(commands), tmp_path)
     codes = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len(codes) == 2
-    done = run("-c", "".join(codes), cwd=compiled)
+    done = run("-c", "".join(codes), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    assert README[: README.index(codes[0]) + len(codes[0])].count("\n") < 25
 
 
-def test_what_the_classes_are_said_to_offer(compiled):
+def test_what_the_classes_are_said_to_offer(tmp_path):
+    shutil.copytree(EXAMPLE, tmp_path / "interfaces")
+    shell("idlc gen interfaces -o my_robot_controller", tmp_path)
     (names,) = re.findall(r"API of rosidl's: (.*?)\.\n", README, re.DOTALL)
     shown = re.findall(r"`([\w.]+)(?:\(\))?`", names)
     assert len(shown) >= 4
@@ -47,7 +52,7 @@ def test_what_the_classes_are_said_to_offer(compiled):
             *(name if "." in name else f"RobotCommand.{name}" for name in shown),
         ]
     )
-    done = run("-c", code, cwd=compiled)
+    done = run("-c", code, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
 
 

@@ -7,14 +7,15 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import partial
+from contextlib import contextmanager
+from functools import cache, partial
 from pathlib import Path
 
 import pytest
 
 from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
 from tests.support.paths import PROGRAMS
-from tests.support.sides import OURS, PACKAGES
+from tests.support.sides import OURS
 
 HERE = Path(__file__).parent
 
@@ -25,8 +26,8 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.ros)
 
 
-@pytest.fixture(scope="session")
-def ros_environment() -> Iterator[dict[str, str]]:
+@contextmanager
+def _domain_of_its_own() -> Iterator[dict[str, str]]:
     """Yield an environment in which DDS stays on this machine and meets no other run.
 
     A domain is held by a port, as the tests of scaffolded packages do it.
@@ -39,6 +40,20 @@ def ros_environment() -> Iterator[dict[str, str]]:
             "ROS_DOMAIN_ID": str(domain),
             "PYTHONDONTWRITEBYTECODE": "1",
         }
+
+
+@pytest.fixture(scope="session")
+def ros_environment() -> Iterator[dict[str, str]]:
+    """Yield the environment that tests share."""
+    with _domain_of_its_own() as environment:
+        yield environment
+
+
+@pytest.fixture
+def lonely_environment() -> Iterator[dict[str, str]]:
+    """Yield an environment for one test, which sees no nodes of others, dead ones included."""
+    with _domain_of_its_own() as environment:
+        yield environment
 
 
 def _bound(held: socket.socket, domain: int) -> bool:
@@ -74,22 +89,17 @@ def program(ros_environment):
 
 
 @pytest.fixture(scope="session")
-def classes(tmp_path_factory) -> Path:
-    """Return a folder with idlc's classes of all packages, each in a folder of its own."""
+def path_of(tmp_path_factory):
+    """Return the PYTHONPATH on which `packages` are idlc's, each in a folder of its own."""
     folder = tmp_path_factory.mktemp("classes")
-    for package in PACKAGES:
-        generate(SHARE / package, folder / package / package)
-    for package, files in OURS.items():
-        generate(files, folder / package / package)
-    return folder
 
-
-@pytest.fixture(scope="session")
-def path_of(classes):
-    """Return the PYTHONPATH on which `packages` are idlc's."""
+    @cache
+    def classes(package: str) -> str:
+        generate(OURS.get(package, SHARE / package), folder / package / package)
+        return str(folder / package)
 
     def path(*packages: str) -> str:
-        return ":".join([str(PROGRAMS), *(str(classes / package) for package in packages)])
+        return ":".join([str(PROGRAMS), *map(classes, packages)])
 
     return path
 

@@ -1,19 +1,21 @@
 """A C++ program does with idlc's libraries what rclcpp and rosbag2 do, on either machine."""
 
-import sys
-from pathlib import Path
+import signal
+import subprocess
 
 import pytest
 
 from idlc.native.library import OWN
 from tests.support.installed import SHARE, interfaces_in, names_in
-from tests.support.native import install, model_of
-from tests.support.paths import EVERY_KIND, EXAMPLE, PROGRAMS
+from tests.support.native import built, install, model_of
+from tests.support.paths import EVERY_KIND, EXAMPLE
 from tests.support.tools import MACHINES, emulator, run, tool
 
 FOLDERS = (EXAMPLE, EVERY_KIND, SHARE / "sensor_msgs", SHARE / "action_msgs")
 #: How the program is started: on 64 KiB pages too, and where code checks where it is jumped to.
 WAYS = {"x86_64": [[]], "aarch64": [[], ["-p", "65536"], ["-cpu", "max"]]}
+
+BTI_C, NOP = bytes.fromhex("5f2403d5"), bytes.fromhex("1f2003d5")
 
 
 @pytest.fixture(scope="module")
@@ -42,17 +44,12 @@ def prefixes(models, tmp_path_factory):
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a function that builds the program for a machine, with ROS 2's own headers."""
-    include = Path(sys.prefix, "include")
-    folders = [include, *(path for path in include.glob("r*") if path.name != "rcl")]
-    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in folders)]
-    built = {}
+    found = {}
 
     def build(machine):
-        if machine not in built:
-            built[machine] = tmp_path_factory.mktemp(machine) / "ask"
-            source = PROGRAMS / "native_ask.cpp"
-            run(tool("g++", machine), *options, source, "-o", built[machine], "-ldl")
-        return built[machine]
+        if machine not in found:
+            found[machine] = built(tmp_path_factory.mktemp(machine), machine)
+        return found[machine]
 
     return build
 
@@ -78,6 +75,23 @@ def test_every_message_is_found_and_asked(ask, models, names, machine, way):
         told = f"{name} {package}::{kind}::{short} "
         digest = describers[package].hash(name).removeprefix("RIHS01_")
         assert any(line.startswith(f"{told}{digest} {name} ") for line in lines), name
+
+
+def test_code_that_is_entered_elsewhere_ends_the_program(
+    models, program, ros_environment, tmp_path
+):
+    """So it is where a processor checks; the tests above would not pass with other code."""
+    model, *_ = models
+    for path in install(model, tmp_path, "aarch64"):
+        path.write_bytes(path.read_bytes().replace(BTI_C, NOP))
+    command = [*emulator("aarch64", "-cpu", "max"), program("aarch64")]
+    done = subprocess.run(
+        [*command, f"{model.package}/msg/RobotCommand"],
+        env={**ros_environment, "AMENT_PREFIX_PATH": str(tmp_path)},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == -signal.SIGILL
 
 
 def test_all_machines_say_the_same(ask):

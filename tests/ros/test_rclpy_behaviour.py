@@ -124,6 +124,7 @@ def test_the_type_description_is_the_installed_one(start):
         ("layout", ["Fast CDR", "unknown", "RMW_IMPLEMENTATION"]),
         ("symbol", ["Fast CDR", "no_such_symbol", "colcon"]),
         ("fast cdr", ["libfastcdr.so.1", "RMW_IMPLEMENTATION"]),
+        ("tables", ["does not know this version of ROS 2", "newer idlc", "colcon"]),
         ("machine", ["machine code", "there is none for", "rmw_fastrtps_cpp", "colcon"]),
         ("memory", ["machine code", "does not allow", "rmw_fastrtps_cpp", "colcon"]),
         ("library", ["librosidl_typesupport_elsewhere_c.so", "source your ROS 2"]),
@@ -132,6 +133,10 @@ def test_the_type_description_is_the_installed_one(start):
 def test_an_error_says_what_to_do(case, words, start):
     out, _ = finish(start("says_what_to_do", case))
     assert [word for word in words if word not in out] == [], out
+
+
+def test_services_work_where_nobody_knows_events(start):
+    assert finish(start("serves_without_events")) == ("", "")
 
 
 @pytest.fixture

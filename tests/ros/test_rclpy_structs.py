@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.ros.test_rclpy_abi import VERSIONS
 from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
 from tests.support.paths import EVERY_KIND, EXAMPLE, PROGRAMS
 
@@ -21,18 +22,22 @@ PACKAGES = ("diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_
 OURS = (EVERY_KIND, EXAMPLE)
 
 
-@pytest.fixture(scope="module")
-def walker(tmp_path_factory) -> Path:
-    """Return the middleware of walker.c, compiled."""
-    library = tmp_path_factory.mktemp("walker") / "walker.so"
+def compiled(library: Path, source: str, *words: str) -> Path:
+    """Return a library, made of C with the headers of the installed ROS 2."""
     prefix = Path(sys.prefix)
-    command = [os.environ.get("CC", "cc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC"]
-    command += ["-o", library, PROGRAMS / "walker.c", f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
+    command = [os.environ.get("CC", "cc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC", *words]
+    command += ["-o", library, PROGRAMS / source, f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
     for package in ("rcutils", "rosidl_runtime_c", "rosidl_typesupport_interface"):
         command += [f"-I{prefix / 'include' / package}"]
     command += [f"-I{prefix / 'include' / 'rosidl_typesupport_introspection_c'}", "-lpthread"]
     subprocess.run([str(word) for word in command], check=True)
     return library
+
+
+@pytest.fixture(scope="module")
+def walker(tmp_path_factory) -> Path:
+    """Return the middleware of walker.c, compiled."""
+    return compiled(tmp_path_factory.mktemp("walker") / "walker.so", "walker.c")
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +48,10 @@ def look(tmp_path_factory, ros_environment, walker):
         generate(files, classes / files.name)
     environment = {**ros_environment, "PYTHONPATH": f"{PROGRAMS}:{classes}", "WALKER": str(walker)}
 
-    def run(script, *words):
+    def run(script, *words, **more):
         done = subprocess.run(
             [sys.executable, str(PROGRAMS / script), *words],
-            env=environment,
+            env={**environment, **more},
             capture_output=True,
             text=True,
             check=False,
@@ -60,8 +65,8 @@ def look(tmp_path_factory, ros_environment, walker):
     shapes.write_text(run("shapes.py", *every)[0], encoding="utf-8")
     assert json.loads(shapes.read_text("utf-8"))
 
-    def check(official, names):
-        complaints = run("structs_side.py", str(shapes), official, *names)
+    def check(official, names, **more):
+        complaints = run("structs_side.py", str(shapes), official, *names, **more)
         assert complaints == [f"looked at {len(names)}"]
 
     return check
@@ -76,3 +81,15 @@ def test_every_kind_of_field(look):
 
 def test_every_message_agrees_with_generated_code(look):
     look("official", names_in((*PACKAGES, "test_msgs"), interfaces()))
+
+
+@pytest.mark.parametrize("version", ["humble", "lyrical", "rolling"])
+def test_every_message_in_the_structures_of_another_version(version, look, tmp_path):
+    """Type support measures its tables, and walker.c walks over what it then makes."""
+    words = [f"-D{one}" for one in VERSIONS[version]]
+    soname = "-Wl,-soname,librcl_interfaces__rosidl_typesupport_introspection_c.so"
+    tables = compiled(tmp_path / "tables.so", "abi.c", soname, *words)
+    walker = compiled(tmp_path / "walker.so", "walker.c", "-DOTHER_VERSION", *words)
+    names = ["every_kind/msg/Others", *names_in((*PACKAGES, "test_msgs"), interfaces())]
+    names += names_in(interfaces_in(OURS), interfaces_in(OURS))
+    look("alone", names, TABLES=str(tables), WALKER=str(walker))

@@ -75,21 +75,6 @@ def test_colcon_builds_it_and_compiles_its_interfaces(name, scaffolded, tmp_path
     assert commands == tests - {"interfaces", "style"}
 
 
-def test_colcon_builds_it_with_links_and_without_in_any_order(scaffolded, tmp_path):
-    copied(scaffolded, tmp_path / "src", compiled=False)
-    colcon = [Path(sys.executable).parent / "colcon", "--log-base", "log", "build"]
-    share = tmp_path / "install" / "demo" / "share"
-    wanted = [
-        *("demo/msg/Drive.msg", "demo/msg/Drive.json", "demo/launch/demo_launch.py"),
-        "ament_index/resource_index/rosidl_interfaces/demo",
-    ]
-    for options in (["--symlink-install"], ["--symlink-install"], [], ["--symlink-install"]):
-        run_with(*colcon, *options, cwd=tmp_path, PYTHONPATH=str(ROOT))
-        for path in wanted:
-            assert (share / path).is_file()
-            assert (share / path).is_symlink() == bool(options)
-
-
 def is_interface(path: Path) -> bool:
     return path.suffix[1:] == path.parent.name
 

@@ -84,7 +84,11 @@ def test_golden_packages_pass_the_checks_of_style(case, tmp_path):
     for package in sorted((tmp_path / "out").glob("*")):
         ours = package / "pyproject.toml"
         style = [] if ours.is_file() else ["--config", str(FOLDER / "package/out/demo" / ours.name)]
-        for words in (["ruff", "check", "."], ["ruff", "format", "--check", "."]):
+        for words in (
+            ["ruff", "check", "."],
+            ["ruff", "check", "--select=D401", "."],  # which ament_pep257 wants
+            ["ruff", "format", "--check", "."],
+        ):
             done = subprocess.run(
                 [sys.executable, "-m", *words, *style, "--no-cache"],
                 cwd=package,
@@ -158,6 +162,7 @@ def test_files_keep_their_mode(package):
         (["node", "Talker"], "cannot be a node"),
         (["node", "class"], "cannot be a node"),
         (["node", "msg"], "taken"),
+        (["node", "node_main"], "taken"),
         (["node", "signal"], "taken"),
         (["node", "a", "--publisher", "String"], "TYPE:TOPIC"),
         (["node", "a", "--publisher", "std_msgs/String:a@0"], "above 0"),
@@ -167,8 +172,10 @@ def test_files_keep_their_mode(package):
         (["node", "a", "--qos", "latched"], "comes after the endpoint"),
         (["node", "a", "--publisher", "std_msgs/String:a", "--qos", "best"], "--qos is one of"),
         (["node", "a", "--service", "std_srvs/Empty:a", "--qos", "latched"], "--qos is for"),
+        (["node", "a", "--timer", "1", "--qos", "latched"], "comes after the endpoint"),
+        (["node", "a", "--publisher", "std_msgs/String:a\0qos=latched"], "cannot be the name"),
         (["node", "a", "--param", "x"], "NAME:TYPE=DEFAULT"),
-        (["node", "a", "--param", "x:int=1.5"], "is no int"),
+        (["node", "a", "--param", "x:int=1.5"], "is not an integer"),
         (["node", "a", "--timer", "soon"], "number of seconds"),
         (["interface", "msg", "my_message", "int8 a"], "cannot be an interface"),
         (["interface", "msg", "Message", "int8 a", "---", "int8 b"], "one `---` too many"),
@@ -235,10 +242,35 @@ def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
     assert "Bo" in (tmp_path / "other/setup.py").read_text()
 
 
-def test_interfaces_only_is_for_cmake(tmp_path, monkeypatch):
+def test_a_package_of_interfaces_has_one_to_begin_with(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["scaffold", "package", "demo_interfaces", "--interfaces-only"]) == 0
-    assert (tmp_path / "demo_interfaces/CMakeLists.txt").is_file()
+    package = ["scaffold", "package", "--interfaces", "demo_msgs"]
+    assert main([*package, "--dry-run"]) == 0
+    assert "+++ b/demo_msgs/msg/Example.msg" in capsys.readouterr().out
+    assert not (tmp_path / "demo_msgs").exists()
+    assert main(package) == 0
+    assert (tmp_path / "demo_msgs/CMakeLists.txt").is_file()
+    parse_package(tmp_path / "demo_msgs").validate()
+    assert main(["check", "demo_msgs"]) == 0
+    assert "no problems in 1 file" in capsys.readouterr().out
+    # none is added to others, so that the command can be run again
+    (tmp_path / "demo_msgs/msg/Example.msg").rename(tmp_path / "demo_msgs/msg/Drive.msg")
+    assert main(package) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("word", ["drive", "x/Drive", "../Drive", "srv/../Drive", "msg/", "a b"])
+def test_interfaces_to_begin_with_have_names(word, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "--interfaces", "demo_msgs", word]) == 2
+    assert "Error: " in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_interfaces_to_begin_with_are_for_packages_of_interfaces(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo", "Drive"]) == 2
+    assert "go with --interfaces" in capsys.readouterr().err
 
 
 def test_a_launch_file_that_cannot_be_edited_leaves_the_rest(package, capsys):

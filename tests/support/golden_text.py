@@ -9,6 +9,7 @@ expects nothing, and status 0. Besides idlc there are a few commands that make w
     append PATH TEXT    a line more in a file         remove PATH        one file less
     fifo PATH           a named pipe                  link PATH TARGET   a symbolic link
     break STAGE         let a stage of idlc fail      list DIR           print the files in DIR
+    graph [PATH]        let idlc see the nodes of a file, or have no rclpy
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import NamedTuple
 
 from idlc import __version__
 from idlc.cli.main import main
+from tests.support.recorded_graph import RecordedGraph, end, take_the_place
 
 EXPECTED = ("stdout", "stderr", "exit")
 _SECTION = re.compile(r"^-- (.+) --\n", re.MULTILINE)
@@ -29,7 +31,7 @@ _SECTION = re.compile(r"^-- (.+) --\n", re.MULTILINE)
 STAGES = {
     "parse": "idlc.syntax.parse.parse",
     "link": "idlc.model.link.link",
-    "check": "idlc.checks.check",
+    "check": "idlc.checks.registry.check",
     "render": "idlc.emit.render.render_package",
 }
 
@@ -81,6 +83,8 @@ def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
             status = main(words)
         elif name == "break":
             monkeypatch.setattr(STAGES[words[0]], _fail)
+        elif name == "graph":
+            take_the_place(monkeypatch, _graph(words[0]) if words else None)
         else:
             _PREPARATIONS[name](*words)
     out, err = capsys.readouterr()
@@ -91,6 +95,12 @@ def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
 def _normal(text: str) -> str:
     """Return an output without what changes with idlc itself: its version, its support files."""
     return re.sub(r"→ \d+ files", "→ <n> files", text.replace(__version__, "<version>"))
+
+
+def _graph(path: str) -> RecordedGraph:
+    """Return the graph of a file with a line for each end: node, role, name, type, hash."""
+    lines = Path(path).read_text(encoding="utf-8").splitlines()
+    return RecordedGraph(end(*line.split()) for line in lines)
 
 
 def _fail(*_):

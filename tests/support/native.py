@@ -1,5 +1,6 @@
 """Prefixes that hold the libraries that idlc writes, and nothing else of a package."""
 
+import sys
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
@@ -9,8 +10,21 @@ from idlc.disk.scope import Scope
 from idlc.driver.stages import models_of
 from idlc.native.layouts import LAYOUTS
 from idlc.native.library import MACHINES, libraries
+from tests.support.paths import PROGRAMS
+from tests.support.tools import run, tool
 
+#: The namespace of the second side of a bridge.
+FAR = "/far"
 INDEX = "share/ament_index/resource_index/packages"
+
+
+def built(folder, machine="x86_64"):
+    """Return the program of native_ask.cpp, built for a machine with ROS 2's own headers."""
+    include = Path(sys.prefix, "include")
+    folders = [include, *(path for path in include.glob("r*") if path.name != "rcl")]
+    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", *(f"-I{path}" for path in folders)]
+    run(tool("g++", machine), *options, PROGRAMS / "native_ask.cpp", "-o", folder / "ask", "-ldl")
+    return folder / "ask"
 
 
 def model_of(folder):
@@ -33,3 +47,9 @@ def install(model, prefix, machine="x86_64", layout=LAYOUTS["jazzy"]):
         paths.append(Path(prefix, "lib", name))
         paths[-1].write_bytes(content)
     return paths
+
+
+def both_ways(names):
+    """Return the topics that native_bridge.py is to carry between peer.py on both sides."""
+    there = [(name, f"/one/{name}", f"{FAR}/one/{name}", "kept") for name in names]
+    return [*there, *((name, f"{FAR}/two/{name}", f"/two/{name}", "kept") for name in names)]

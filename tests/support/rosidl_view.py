@@ -4,7 +4,7 @@ A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `te
 `bytes_hex`.
 """
 
-from idlc import checks
+from idlc.checks import registry
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
@@ -47,7 +47,7 @@ def compile_case(case) -> tuple[Model | None, Report]:
     name = ir.TypeName(case["pkg"], case["kind"], case["name"])
     interface = lower(parse(Source(f"{case['name']}.{case['kind']}", text)), name, report)
     model = link(case["pkg"], [interface], Siblings(case), report)
-    checks.check(model, report)
+    registry.check(model, report)
     return model, report
 
 

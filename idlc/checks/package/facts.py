@@ -15,6 +15,7 @@ class Statement(msgspec.Struct, frozen=True):
     tag: str
     text: str
     span: Span
+    attributes: Mapping[str, str] = {}
 
 
 class Output(msgspec.Struct, frozen=True):

@@ -5,32 +5,38 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 from idlc.diagnostics.source import Source, Span
 
 
 @lru_cache(maxsize=256)
-def _parsed(text: str) -> ast.Module | None:
+def parsed(text: str) -> ast.Module | None:
+    """Return the syntax of a file; `None` if it is not Python."""
     try:
         return ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 
 
-def _span(source: Source, node: ast.AST) -> Span:
-    """Return where a node begins, to the end of it or of its line; ast counts bytes."""
+def start_of(source: Source, node: ast.AST) -> int:
+    """Return where a node begins; ast counts bytes."""
     line = getattr(node, "lineno", 1)
     start = source.line_starts[min(line, len(source.line_starts)) - 1]
     before = source.text[start:].encode("utf-8")[: getattr(node, "col_offset", 0)]
-    begin = start + len(before.decode("utf-8", "ignore"))
+    return start + len(before.decode("utf-8", "ignore"))
+
+
+def _span(source: Source, node: ast.AST) -> Span:
+    """Return where a node begins, to the end of it or of its line."""
+    begin = start_of(source, node)
     text = ast.get_source_segment(source.text, node) or ""
     return Span(source, begin, begin + max(len(text.split("\n")[0]), 1))
 
 
 def imported_packages(source: Source) -> Iterator[tuple[str, Span]]:
     """Yield the first part of each absolute import, with its place."""
-    tree = _parsed(source.text)
+    tree = parsed(source.text)
     for node in ast.walk(tree) if tree else ():
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -40,8 +46,8 @@ def imported_packages(source: Source) -> Iterator[tuple[str, Span]]:
 
 
 def defines(source: Source, name: str) -> bool:
-    """Tell whether a file gives a meaning to a name at its top level."""
-    tree = _parsed(source.text)
+    """Return whether a file gives a meaning to a name at its top level."""
+    tree = parsed(source.text)
     if tree is None:
         return True
     for node in tree.body:
@@ -78,7 +84,7 @@ class Setup(NamedTuple):
 
 def read_setup(source: Source) -> Setup:
     """Return what a setup.py says."""
-    tree = _parsed(source.text)
+    tree = parsed(source.text)
     if tree is None:
         return Setup()
     known = {
@@ -88,9 +94,7 @@ def read_setup(source: Source) -> Setup:
         for target in node.targets
         if isinstance(target, ast.Name)
     }
-    call = next(
-        (one for one in ast.walk(tree) if isinstance(one, ast.Call) and _is_setup(one)), None
-    )
+    call = next((one for one in ast.walk(tree) if is_setup(one)), None)
     arguments = {one.arg: one.value for one in call.keywords} if call else {}
     name = list(_texts(source, arguments["name"], known)) if "name" in arguments else []
     data = arguments.get("data_files")
@@ -101,8 +105,9 @@ def read_setup(source: Source) -> Setup:
     )
 
 
-def _is_setup(call: ast.Call) -> bool:
-    function = call.func
+def is_setup(node: ast.AST) -> TypeGuard[ast.Call]:
+    """Return whether a piece of syntax is a call of setuptools' function."""
+    function = node.func if isinstance(node, ast.Call) else None
     name = function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
     return name == "setup"
 

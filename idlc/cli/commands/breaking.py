@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from typing import TYPE_CHECKING
-
 import click
 
 from idlc.cli import options
-
-if TYPE_CHECKING:
-    from idlc.diagnostics.report import Report
-    from idlc.driver.breaking import Verdict
 
 EPILOG = """\
 Example:
@@ -38,8 +31,15 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock",
-    help="The version to compare with: a folder, a git revision, or the type hashes in a lock.",
+    metavar="DIR|git:REF|idlc.lock|graph",
+    help="The version to compare with: a folder, a git revision, the type hashes in a lock, or "
+    "what the nodes of the running ROS 2 graph use (a folder of that name is ./graph).",
+)
+@click.option(
+    "--timeout",
+    metavar="SECONDS",
+    type=click.FloatRange(min=0, min_open=True),
+    help="How long to wait for news from the graph, and for its nodes' answers.  [default: 5]",
 )
 @click.option(
     "--level",
@@ -55,6 +55,7 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 def command(
     paths: tuple[str, ...],
     against: str | None,
+    timeout: float | None,
     levels: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
@@ -65,67 +66,13 @@ def command(
 
     wire: bytes recorded before are read wrongly or not at all. hash: endpoints of both versions
     do not talk. source: code fails. behaviour: the same code does something else.
+
+    Against the graph, it reports the types of which running nodes have several versions, or
+    another one than the files here or the installed packages.
     """
-    import datetime
+    from idlc.cli.breaking_run import BreakingWishes, compare
 
-    from idlc.cli import output
-    from idlc.diagnostics.report import Report
-    from idlc.disk import command_settings, pyproject
-    from idlc.disk.scope import scope
-    from idlc.driver.breaking import BreakingOptions, breaking
-
-    report = Report()
-    settings = pyproject.load(report)
-    against = against or command_settings.against(settings, report)
-    allowed = command_settings.allowances(settings, report)
-    if against is None and not report.had_errors:
-        raise click.UsageError("give --against DIR, git:REF or idlc.lock")
-    verdict = None
-    if against is not None and not report.had_errors:
-        wanted = BreakingOptions(
-            paths=paths or settings.paths or (".",),
-            against=against,
-            scope=scope(settings, package, include, exclude),
-            levels=levels or LEVELS,
-            allowed=allowed,
-            allowed_in=settings.source.path if settings.source else "",
-            today=datetime.datetime.now().astimezone().date().isoformat(),
-        )
-        verdict = breaking(wanted, report)
-    _show(report, verdict, style)
-    return output.status(report)
-
-
-def _show(report: Report, verdict: Verdict | None, style: str) -> None:
-    from idlc.cli import output, reports
-    from idlc.diagnostics.formats.github import notice
-    from idlc.driver.check import Checked
-
-    if style == "json":
-        output.show(report, style, sys.stdout)
-        facts = verdict._asdict() if verdict else {}
-        output.fact(sys.stdout, "summary", **output.counts(report), **facts)
-    elif style == "text":
-        output.show(report, style, sys.stdout)
-        if verdict:
-            sys.stdout.write(f"{_summary(verdict)}\n")
-    else:
-        reports.write(report, style, Checked(()), sys.stdout, command="breaking")
-        if style == "github" and verdict:
-            sys.stdout.write(notice("idlc breaking", _summary(verdict)))
-
-
-def _summary(verdict: Verdict) -> str:
-    from idlc.diagnostics.report import first_few
-
-    parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
-    text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
-    if verdict.allowed:
-        text += f"; allowed: {verdict.allowed}"
-    if verdict.added:
-        text += f"; added: {first_few(verdict.added, 5)}"
-    if verdict.part is None:
-        return f"{text}; the versions are the same"
-    if verdict.next_version:
-        return f"{text}; the next version after {verdict.version} is {verdict.next_version}"
-    return f"{text}; raise the {verdict.part} version"
+    typed = BreakingWishes(
+        paths, against, timeout, levels or LEVELS, package, include, exclude, style
+    )
+    return compare(typed)

@@ -28,6 +28,12 @@ Example:
 @click.option("--fix", is_flag=True, help="Fix what can be fixed without harm.")
 @click.option("--strict", is_flag=True, help="Fail on warnings as well.")
 @click.option("--statistics", is_flag=True, help="Show only how often each rule was broken.")
+@click.option(
+    "--prefix",
+    metavar="DIR",
+    type=click.Path(),
+    help="Look at what is installed in a folder instead: whether C++ tools can load it.",
+)
 @options.package
 @options.include
 @options.exclude
@@ -39,6 +45,7 @@ def command(
     fix: bool,
     strict: bool,
     statistics: bool,
+    prefix: str | None,
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
@@ -54,5 +61,9 @@ def command(
     from idlc.cli.check_run import Wishes, check_paths
 
     options.check_rules(select, ignore)
-    wishes = Wishes(select, ignore, fix, strict, package, include, exclude, style, statistics)
+    if prefix is not None and (paths or fix):
+        raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
+    wishes = Wishes(
+        select, ignore, fix, strict, package, include, exclude, style, statistics, prefix
+    )
     return check_paths(paths, wishes)

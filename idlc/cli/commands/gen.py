@@ -29,6 +29,13 @@ All options can be kept in pyproject.toml:
 @click.command("gen", epilog=EPILOG)
 @click.argument("paths", metavar="PATH|PACKAGE|TYPE...", nargs=-1, type=click.Path())
 @click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
+@click.option(
+    "--ament",
+    metavar="PREFIX",
+    type=click.Path(),
+    default="",
+    help="Install into a prefix, complete for ROS 2 and its C++ tools.",
+)
 @options.package
 @options.include
 @options.exclude
@@ -45,7 +52,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
     PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
     packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
 
-    OUT is the package for one package. Several are written to OUT/NAME each.
+    OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
+    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`.
     """
     from idlc.cli import gen_run, output
     from idlc.diagnostics.report import Report
@@ -60,8 +68,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
         return output.status(report)
     words = (given.pop("package"), given.pop("include"), given.pop("exclude"))
     wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
-    if not wanted.paths or not wanted.out:
-        missing = "-o OUT" if wanted.paths else "PATH"
+    if not wanted.paths or not (wanted.out or wanted.ament):
+        missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
     if wanted.check and (watch or wanted.force):
         raise click.UsageError(

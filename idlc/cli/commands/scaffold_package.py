@@ -9,10 +9,11 @@ import click
 from idlc.cli.commands.scaffold import common, finish
 
 EPILOG = """\
-Example:
+Examples:
 
 \b
   idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com
+  idlc scaffold package --interfaces my_msgs Drive srv/Ask
 """
 BUILD_TYPES = ("ament_python", "ament_cmake")
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -20,21 +21,34 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 
 @click.command("package", epilog=EPILOG)
 @click.argument("name", metavar="NAME")
+@click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
 @click.option("--description", default="", help="What the package is for, in a sentence.")
 @click.option("--maintainer", help="Who answers for it; git's user.name if not given.")
 @click.option("--email", help="The maintainer's address; git's user.email if not given.")
 @click.option("--license", "licence", type=click.Choice(LICENSES), default=LICENSES[0])
-@click.option("--interfaces-only", is_flag=True, help="Only interfaces, for nodes in any language.")
+@click.option(
+    "--interfaces",
+    "--interfaces-only",
+    "interfaces_only",
+    is_flag=True,
+    help="Only interfaces, which CMake builds for nodes in any language, and pip for Python. "
+    "INTERFACE names those to begin with, such as `Drive` or `srv/Ask`.",
+)
 @click.option(
     "--build-type",
     type=click.Choice(BUILD_TYPES),
     help="ament_python is for nodes in Python and their interfaces; ament_cmake compiles "
-    "interfaces for C++ as well, and goes with --interfaces-only.",
+    "interfaces for C++ as well, and goes with --interfaces.",
 )
 @click.option("-C", "--folder", metavar="DIR", default=".", help="Where to make it.")
 @common
 def command(
-    name: str, interfaces_only: bool, build_type: str | None, folder: str, **given: Any
+    name: str,
+    starters: tuple[str, ...],
+    interfaces_only: bool,
+    build_type: str | None,
+    folder: str,
+    **given: Any,
 ) -> int:
     """Write a package that builds with colcon and installs with pip.
 
@@ -43,17 +57,22 @@ def command(
     from idlc.cli.program import program
     from idlc.diagnostics.report import Report
     from idlc.disk.revision import setting
-    from idlc.driver import scaffold
+    from idlc.driver.scaffold import Settings
+    from idlc.driver.scaffold_package import package
+    from idlc.scaffold.new_interface import starter
     from idlc.scaffold.new_package import Package, check_name
 
     if build_type == "ament_cmake" and not interfaces_only:
-        raise click.UsageError("--build-type ament_cmake goes with --interfaces-only")
+        raise click.UsageError("--build-type ament_cmake goes with --interfaces")
     if interfaces_only and build_type == "ament_python":
         raise click.UsageError(
-            "--interfaces-only is for ament_cmake; ament_python packages can have interfaces, too"
+            "--interfaces is for ament_cmake; ament_python packages can have interfaces, too"
         )
+    if starters and not interfaces_only:
+        raise click.UsageError("interfaces to begin with go with --interfaces")
     try:
         check_name(name)
+        examples = dict(map(starter, (starters or ("Example",)) if interfaces_only else ()))
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
@@ -65,7 +84,7 @@ def command(
         given["licence"],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
-    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
-    result = scaffold.package(wanted, folder, settings, report)
+    shared = {key: given[key] for key in ("dry_run", "force", "include", "templates")}
+    result = package(wanted, folder, Settings(**shared), report, examples)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
     return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

@@ -22,6 +22,11 @@ from idlc.disk.read import absolute, is_file, is_folder
 class Target:
     """A package folder, existing or not; `name` is how messages call it."""
 
+    #: Where the lock is, below the folder; empty, or with a slash at its end.
+    home = ""
+    #: Where the package's modules are, in the same words.
+    modules = ""
+
     def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
         self.name = name
         self.package = package
@@ -41,10 +46,11 @@ class Target:
     @cached_property
     def lock(self) -> Lock | None:
         """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
-        return load(self._path, self.name, Report() if self._force else self.report)
+        report = Report() if self._force else self.report
+        return load(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
 
     def usable(self) -> bool:
-        """Whether this is or can become a folder; reports IDL612."""
+        """Return whether this is or can become a folder; reports IDL612."""
         for path in (self._path, *self._path.parents):
             if is_folder(path):
                 return True
@@ -57,7 +63,7 @@ class Target:
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Whether what is here is what compiling the inputs would write."""
+        """Return whether what is here is what compiling the inputs would write."""
         found = up_to_date.unchanged(
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
@@ -79,20 +85,25 @@ class Target:
         return environment.runs_nodes() or any(map(environment.python_folders, needed))
 
     def _finds(self, package: str, kind: str) -> bool:
-        """Whether a package can be imported, found without importing, or lies next to this one."""
+        """Return whether a package lies next to this one or could be imported; imports nothing."""
         inside = f"{kind}/__init__.py"
-        return is_file(self._path.parent / package / inside) or any(
+        beside = (self._path / self.modules).parent
+        return is_file(beside / package / inside) or any(
             is_file(place / inside) for place in environment.python_folders(package)
         )
 
-    def plan(self, files: Mapping[str, str], *, check: bool = False) -> Plan | None:
+    def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.
 
         With `check` the changes are only to be looked at, and edited files are among them.
         """
-        content = {path: text.encode("utf-8") for path, text in files.items()}
-        owned = transaction.owned(self._path, self.lock)
-        return plan(self._path, self.name, content, owned, self.report, force=check or self._force)
+        content = {
+            path: text.encode("utf-8") if isinstance(text, str) else text
+            for path, text in files.items()
+        }
+        owned = transaction.owned(self._path / self.home, self.lock)
+        force = check or self._force
+        return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
         """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
@@ -104,7 +115,7 @@ class Target:
         if self.lock is None:
             if self.report.had_errors:
                 return
-            message = f"there is no {FILE} in `{self.name}`, so nothing can be compared"
+            message = f"there is no {self.home}{FILE} in `{self.name}`, so nothing can be compared"
             self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
             return
         why = _reasons(self.lock, record) or "idlc itself changed"
@@ -112,9 +123,8 @@ class Target:
             self.report.add(self._drifted(change, self.lock, why))
         # a dependency found elsewhere that compiles to the same is no drift
         if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
-            self.report.add(
-                codes.DRIFT.of(f"{self.name}/{FILE}", f"`{self.name}/{FILE}` is out of date: {why}")
-            )
+            path = f"{self.name}/{self.home}{FILE}"
+            self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}"))
 
     def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
         path = f"{self.name}/{change.path}"

@@ -71,7 +71,7 @@ def _unlock(handle: int | None) -> None:
 
 
 def _is(handle: int | None, place: Path) -> bool:
-    """Whether a handle is still that of the folder of this name, or there is none."""
+    """Return whether a handle is still that of the folder of this name, or there is none."""
     try:
         return handle is None or os.path.samestat(os.fstat(handle), place.stat())
     except OSError:

@@ -54,7 +54,7 @@ def _abandoned(out: Path) -> list[Path]:
 
 
 def _in_use(stage: Path) -> bool:
-    """Whether the process that made a staging folder may still be running."""
+    """Return whether the process that made a staging folder may still be running."""
     number = stage.name.removeprefix(STAGE)
     if not number.isdigit() or int(number) == os.getpid():
         return False
@@ -76,24 +76,24 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
     """
     if not plan.changes and plan.record == new_lock:
         with contextlib.suppress(OSError):  # a package that cannot be written may be right
-            os.utime(plan.out / lock_file.FILE)
-        sweep(plan.out)
+            os.utime(plan.out / plan.home / lock_file.FILE)
+        sweep(plan.out / plan.home)
         return True
-    change = Change(lock_file.FILE, plan.record, new_lock)
-    return _carry_out(plan.out, (*plan.changes, change), new_lock, name, report)
+    change = Change(plan.home + lock_file.FILE, plan.record, new_lock)
+    whole = plan._replace(changes=(*plan.changes, change))
+    return _carry_out(whole, new_lock, name, report)
 
 
-def _carry_out(
-    out: Path, changes: tuple[Change, ...], journal: bytes, name: str, report: Report
-) -> bool:
+def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
     """Make all changes or none; report IDL612 and return `False` on a failure."""
+    out = plan.out
     with alone(out):
         try:
-            transaction = _Transaction(out)
+            transaction = _Transaction(out, plan.home)
         except OSError as error:
             report.add(_failure(name, error))
             return False
-        left, changed = _left(out, changes)
+        left, changed = _left(out, plan.changes)
         if changed is not None:
             transaction.undo()
             report.add(_meanwhile(name, changed))
@@ -109,7 +109,7 @@ def _carry_out(
             message = f"cannot write `{where}`: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(where, message, hint=_outcome(torn, name)))
             return False
-        sweep(out)
+        sweep(out / plan.home)
     return True
 
 
@@ -143,7 +143,7 @@ def apply_changes(plan: Plan, name: str, report: Report, journal: bytes = b"") -
     """Make changes in a folder that has no lock; report IDL612 and return `False` on a failure."""
     if not plan.changes:
         return True
-    return _carry_out(plan.out, plan.changes, journal, name, report)
+    return _carry_out(plan, journal, name, report)
 
 
 def _outcome(torn: list[str], name: str) -> str:
@@ -169,9 +169,9 @@ def _remove(stage: Path) -> None:
 class _Transaction:
     """Moves staged files into place and remembers how to go back."""
 
-    def __init__(self, out: Path) -> None:
+    def __init__(self, out: Path, home: str) -> None:
         self._out = out
-        self._stage = out / f"{STAGE}{os.getpid()}"
+        self._stage = out / home / f"{STAGE}{os.getpid()}"
         self._made: list[Path] = []
         self._done: list[tuple[str, bytes | None]] = []
         self._there: set[str] = set()

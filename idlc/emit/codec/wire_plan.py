@@ -1,4 +1,4 @@
-"""The layout of a structure on the wire, nested structures inlined (spec section 8).
+"""The layout of a structure on the wire, nested structures inlined (language 8).
 
 In: a structure and all others by name. Out: a tuple of steps in wire order, each with the local
 variable that holds its owner. Knows sizes and alignments; knows no Python text.

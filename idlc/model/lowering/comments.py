@@ -1,4 +1,4 @@
-"""Comment lines → condensed comment and unit (spec section 1.4)."""
+"""Comment lines → condensed comment and unit (language 1.4)."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Problem(msgspec.Struct, frozen=True):
 
 
 def problem(comment: Comment) -> Problem | None:
-    """Return what is wrong with a comment or its unit (spec 1.4, 1.5), or `None`."""
+    """Return what is wrong with a comment or its unit (language 1.4, 1.5), or `None`."""
     if comment.unit is not None and "\n" in comment.unit:
         return Problem(
             codes.UNIT_ACROSS_LINES,

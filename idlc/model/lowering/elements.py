@@ -27,7 +27,7 @@ def elements(inside: str) -> list[tuple[str, int]] | Fault:
 
 
 def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
-    """Split as rosidl's scanner does, wrong turns included (spec section 4)."""
+    """Split as rosidl's scanner does, wrong turns included (language 4)."""
     found: list[tuple[str, int]] = []
     ends = {quote: _Ends(inside, quote) for quote in QUOTES}
     at = 0
@@ -39,7 +39,7 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
         for quote in QUOTES:
             if inside.startswith(quote, at):
                 quoted = True
-                end = ends[quote].behind(at)
+                end = ends[quote].after(at)
                 if end == -1:
                     message = f"no {quote} that ends this element"
                     hint = (
@@ -76,10 +76,10 @@ class _Ends:
     def __init__(self, text: str, quote: str) -> None:
         self._text = text
         self._quote = quote
-        #: place -> the closing quote, the place behind the last escaped one, the place before that
+        #: place -> the closing quote, the place after the last escaped one, the place before that
         self._known: dict[int, tuple[int, int, int]] = {}
 
-    def behind(self, start: int) -> int:
+    def after(self, start: int) -> int:
         """Return the length of the text quoted at `start`; -1 if nothing ends it."""
         path = [start]
         while path[-1] not in self._known:

@@ -93,7 +93,7 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 
 
 def _has_near_separator(file: tree.File, expected: int) -> bool:
-    """Tell whether some line was meant as a separator and is reported as such.
+    """Return whether some line was meant as a separator and is reported as such.
 
     What comes after the `expected` sections is not looked at any more.
     """
@@ -104,7 +104,7 @@ def _has_near_separator(file: tree.File, expected: int) -> bool:
 
 
 def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir.Message]:
-    """Drop constants that rosidl's parser gives to an earlier section (spec section 3).
+    """Drop constants that rosidl's parser gives to an earlier section (language 3).
 
     It looks constants up by equality, so one that repeats an earlier section's type, name, value
     and comment ends up there, and is missing from its own.
@@ -127,7 +127,7 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
 
 
 def _moved(constant: ir.Constant, span: Span) -> Diagnostic:
-    return codes.CONSTANT_MOVED.at(
+    return codes.REPEATED_SECTION_CONSTANT.at(
         span,
         f"ROS 2 gives `{constant.name}` to the earlier section only, because it is the same there",
         hint="give it another name or comment",

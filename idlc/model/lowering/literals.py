@@ -1,4 +1,4 @@
-"""Value text + type → the value, or what is wrong with the text (spec sections 3 and 4).
+"""Value text + type → the value, or what is wrong with the text (language 3 and 4).
 
 Lives in the model, not in the syntax, because only the type says what a literal means.
 """
@@ -57,7 +57,7 @@ def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
     if isinstance(value, Text):
         return ir.Default(value.value, value.value)
     if isinstance(value, float) and not math.isfinite(value):
-        # the .idl holds the bare word, whose sign its parser loses (spec section 3)
+        # the .idl holds the bare word, whose sign its parser loses (language 3)
         return ir.Default(value, str(abs(value)))
     return ir.Default(value, str(value))
 

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Any
 
 from . import c
+from .abi import abi
 from .descriptions import ARRAY, NESTED, SCALAR, Field, load
 
 #: Type id in descriptions -> (type id in introspection, C type of one element).
@@ -55,7 +56,16 @@ def element_type(field: Field) -> Any:
 def _c_type(field: Field) -> Any:
     if field.shape == SCALAR:
         return element_type(field)
-    return element_type(field) * field.capacity if field.shape == ARRAY else c.Sequence
+    if field.shape == ARRAY:
+        return element_type(field) * field.capacity
+    return _sequence_type(field)
+
+
+def _sequence_type(field: Field) -> Any:
+    if field.base == NESTED:
+        return c.Sequence
+    size = abi().strings if element_type(field) is c.String else abi().sequence
+    return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
 
 
 def placed_fields(name: str) -> list[tuple[Field, int]]:

@@ -17,16 +17,46 @@ from typing import Any, NamedTuple
 
 from . import c
 
-_LIBRARIES = ("libfastcdr.so.2", "libfastcdr.2.dylib")
 _CDR = "_ZN8eprosima7fastcdr3Cdr"
 _NEW_BUFFER = "_ZN8eprosima7fastcdr10FastBufferC1EPcm"
-_NEW_CDR = f"{_CDR}C1ERNS0_10FastBufferENS1_10EndiannessENS0_10CdrVersionE"
-_LITTLE_ENDIAN, _XCDR_V1 = 1, 2
+_NEW_CDR = f"{_CDR}C1ERNS0_10FastBufferENS1_10EndiannessE"
+_LITTLE_ENDIAN = 1
+
+
+class _Names(NamedTuple):
+    """How a version of Fast CDR calls what is needed of it."""
+
+    libraries: tuple[str, ...]
+    new: str
+    plain: int  #: what plain CDR is called when a Cdr is made
+    append: str
+    position: str
+    begin: str
+
+
+_VERSIONS = (
+    _Names(
+        ("libfastcdr.so.2", "libfastcdr.2.dylib"),
+        f"{_NEW_CDR}NS0_10CdrVersionE",
+        2,
+        f"{_CDR}15serialize_arrayEPKcm",
+        f"{_CDR}20get_current_positionEv",
+        f"{_CDR}18get_buffer_pointerEv",
+    ),
+    _Names(  # ROS 2 Humble
+        ("libfastcdr.so.1", "libfastcdr.1.dylib"),
+        f"{_NEW_CDR}NS1_7CdrTypeE",
+        1,
+        f"{_CDR}14serializeArrayEPKcm",
+        f"{_CDR}18getCurrentPositionEv",
+        f"{_CDR}16getBufferPointerEv",
+    ),
+)
 #: Generous room for the C++ objects (200 and 40 bytes in Fast CDR 2.2).
 _OBJECT_SIZE = 4096
 _WORDS = 64
 _ADVICE = (
-    "idlc's type support for Fast DDS was made for Fast CDR 2.x. Build the interface package "
+    "idlc's type support for Fast DDS knows Fast CDR 1 and 2. Build the interface package "
     "with colcon instead, or use another middleware (RMW_IMPLEMENTATION=rmw_cyclonedds_cpp)"
 )
 
@@ -38,16 +68,16 @@ class FastCdr(NamedTuple):
     end: int
 
 
-def _load() -> ctypes.CDLL:
+def _load() -> tuple[ctypes.CDLL, _Names]:
     """Return the Fast CDR that the middleware has already loaded, never another one."""
-    for name in _LIBRARIES:
+    names = [(name, version) for version in _VERSIONS for name in version.libraries]
+    for name, version in names:
         try:
-            return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY)
+            return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY), version
         except OSError:
             continue
-    raise ImportError(
-        f"the middleware has not loaded {' or '.join(_LIBRARIES)}. {_ADVICE}"
-    )
+    tried = " or ".join(name for name, _ in names)
+    raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
 
 
 def _words(cdr: int) -> list[int]:
@@ -64,19 +94,17 @@ def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int 
 @cache
 def fast_cdr() -> FastCdr:
     """Return how to use the loaded Fast CDR; raises ImportError if that cannot be found out."""
-    library = _load()
+    library, names = _load()
 
     def method(name: str, result: Any, *arguments: Any) -> Any:
         return PYFUNCTYPE(result, *arguments)((name, library))
 
     try:
         new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
-        new_cdr = method(_NEW_CDR, None, c_void_p, c_void_p, c_int, c_int)
-        append = method(
-            f"{_CDR}15serialize_arrayEPKcm", c_void_p, c_void_p, c_void_p, c_size_t
-        )
-        position_of = method(f"{_CDR}20get_current_positionEv", c_void_p, c_void_p)
-        begin_of = method(f"{_CDR}18get_buffer_pointerEv", c_void_p, c_void_p)
+        new_cdr = method(names.new, None, c_void_p, c_void_p, c_int, c_int)
+        append = method(names.append, c_void_p, c_void_p, c_void_p, c_size_t)
+        position_of = method(names.position, c_void_p, c_void_p)
+        begin_of = method(names.begin, c_void_p, c_void_p)
     except AttributeError as error:
         raise ImportError(f"this Fast CDR is unknown: {error}. {_ADVICE}") from error
 
@@ -85,7 +113,7 @@ def fast_cdr() -> FastCdr:
     buffer, cdr = (ctypes.create_string_buffer(_OBJECT_SIZE) for _ in range(2))
     here = ctypes.addressof(cdr)
     new_buffer(buffer, begin, size)
-    new_cdr(cdr, buffer, _LITTLE_ENDIAN, _XCDR_V1)
+    new_cdr(cdr, buffer, _LITTLE_ENDIAN, names.plain)
     indices = set()
     for text in (b"\1\2\3", b"\4\5"):
         append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))

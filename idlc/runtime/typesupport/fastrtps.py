@@ -175,6 +175,8 @@ class _Callbacks(ctypes.Structure):
         ("get_serialized_size", c_void_p),
         ("max_serialized_size", c_void_p),
         ("key_callbacks", c_void_p),
+        # what later versions read: three words so far, zero for "none of it"
+        ("later", c_void_p * 9),
     )
 
 

@@ -10,24 +10,26 @@ from __future__ import annotations
 import ctypes
 from ctypes import c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import c, memory
+from .abi import abi
 from .c_layout import element_type, introspection_id, placed_fields, structure
 from .descriptions import ARRAY, BOUNDED_SEQUENCE, NESTED, SCALAR, Field, about
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
 
-class Member(ctypes.Structure):
-    """`rosidl_typesupport_introspection_c__MessageMember`."""
-
-    _fields_ = (
+@cache
+def _member_type() -> Any:
+    """Return `rosidl_typesupport_introspection_c__MessageMember` of this ROS 2."""
+    layout = abi()
+    fields = (
         ("name", c_char_p),
         ("type_id", c_uint8),
         ("string_upper_bound", c_size_t),
         ("members", c_void_p),
-        ("is_key", c_bool),
+        ("flags", c_uint8 * (layout.is_array - 32)),  # whether it is a key
         ("is_array", c_bool),
         ("array_size", c_size_t),
         ("is_upper_bound", c_bool),
@@ -39,22 +41,25 @@ class Member(ctypes.Structure):
         ("fetch_function", c_void_p),
         ("assign_function", c_void_p),
         ("resize_function", c_void_p),
+        ("later", c_uint8 * (layout.member - 112)),  # whether it is a buffer
     )
+    return type("MessageMember", (ctypes.Structure,), {"_fields_": fields})
 
 
-class Members(ctypes.Structure):
-    """`rosidl_typesupport_introspection_c__MessageMembers`."""
-
-    _fields_ = (
+@cache
+def _members_type() -> Any:
+    """Return `rosidl_typesupport_introspection_c__MessageMembers` of this ROS 2."""
+    fields = (
         ("namespace", c_char_p),
         ("name", c_char_p),
         ("count", c_uint32),
         ("size_of", c_size_t),
-        ("has_any_key_member", c_bool),
+        ("flags", c_uint8 * (abi().members - 32)),  # whether there is a key
         ("members", c_void_p),
         ("init_function", c_void_p),
         ("fini_function", c_void_p),
     )
+    return type("MessageMembers", (ctypes.Structure,), {"_fields_": fields})
 
 
 class Library(NamedTuple):
@@ -82,9 +87,9 @@ def library() -> Library:
     )
 
 
-def _member(field: Field, offset: int, functional: bool) -> Member:
+def _member(field: Field, offset: int, functional: bool) -> Any:
     """Return how a field is told to the middleware."""
-    member = Member(
+    member = _member_type()(
         name=field.name.encode(),
         type_id=introspection_id(field),
         string_upper_bound=field.string_capacity,
@@ -108,7 +113,7 @@ def _member(field: Field, offset: int, functional: bool) -> Member:
     return member
 
 
-def members(name: str, functional: bool) -> Members:
+def members(name: str, functional: bool) -> Any:
     """Return a message's members."""
     placed = placed_fields(name)
     table = [_member(field, offset, functional) for field, offset in placed]
@@ -116,12 +121,12 @@ def members(name: str, functional: bool) -> Members:
     finish = memory.elements(size, memory.content(name)).finish if functional else None
     package, kind, short = name.split("/")
     return c.keep(
-        Members(
+        _members_type()(
             namespace=f"{package}__{kind}".encode(),
             name=short.encode(),
             count=len(table),
             size_of=size,
-            members=c.sequence(table, Member).data,
+            members=c.sequence(table, _member_type()).data,
             fini_function=finish,
         )
     )

@@ -3,8 +3,8 @@
 The generated codec checks and encodes a message; here its bytes are moved into the
 structure that rosidl's C generator would make for the type, and the other way. Byte
 order is the machine's. Both sides align numbers to their size, so most of a message
-moves in a few large runs. What is allocated comes from rosidl_runtime_c, whose
-allocator the middleware uses as well.
+moves in a few large runs. What is allocated comes from rosidl's allocator, which the
+middleware uses as well.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, Protocol
 from . import c
 from .c_layout import element_type, placed_fields
 from .descriptions import ARRAY, NESTED, SCALAR, Field
+from .memory import allocator
 
 _HEADER = 4
 _COUNT = Struct("=I")
@@ -53,11 +54,11 @@ def _put(out: bytearray, data: bytes | memoryview, align: int) -> None:
 
 
 class _Runtime(NamedTuple):
-    """rosidl_runtime_c; `init` does for any sequence, counted in bytes."""
+    """Functions of rosidl_runtime_c, and the one that gives zeroed memory."""
 
     assign: Any
     assign_wide: Any
-    init: Any
+    zeroed: Any
 
 
 @cache
@@ -70,7 +71,7 @@ def _runtime() -> _Runtime:
     return _Runtime(
         function("String__assignn", c_bool, c_void_p, c_char_p, c_size_t),
         function("U16String__assignn", c_bool, c_void_p, c_void_p, c_size_t),
-        function("uint8__Sequence__init", c_bool, c_void_p, c_size_t),
+        PYFUNCTYPE(c_void_p, c_size_t, c_size_t, c_void_p)(allocator().zeroed),
     )
 
 
@@ -172,7 +173,7 @@ class Many:
     def fill(self, cursor: Cursor, base: int) -> None:  # noqa: D102
         count = cursor.count()
         if count:
-            data = allocate(base + self.offset, count, self.stride, zero=not self.align)
+            data = allocate(base + self.offset, count, self.stride)
             self.content(count).fill(cursor, data)
 
     def drain(self, base: int, out: bytearray) -> None:  # noqa: D102
@@ -192,15 +193,18 @@ def _data_and_size(address: int) -> tuple[int, int]:
     return c.WORDS[address >> 3], c.WORDS[(address >> 3) + 1]
 
 
-def allocate(sequence: int, count: int, stride: int, *, zero: bool) -> int:
-    """Give an empty sequence `count` elements and return the address of the first."""
-    _demand(_runtime().init(sequence, count * stride))
+def allocate(sequence: int, count: int, stride: int) -> int:
+    """Give an empty sequence `count` elements, all zero; return the address of the first.
+
+    No function of rosidl_runtime_c does it: each knows one kind of sequence, and there are
+    kinds of different sizes.
+    """
+    data = _runtime().zeroed(count, stride, None)
+    _demand(bool(data))
     word = sequence >> 3
-    data = c.WORDS[word]
-    if zero:
-        ctypes.memset(data, 0, count * stride)
+    c.WORDS[word] = data
     c.WORDS[word + 1] = c.WORDS[word + 2] = count
-    return data
+    return int(data)
 
 
 def _element_steps(field: Field) -> list[Step]:

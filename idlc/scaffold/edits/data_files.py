@@ -6,6 +6,9 @@ from collections.abc import Iterable
 
 import libcst as cst
 
+from idlc.checks.package.libraries import edits_for
+from idlc.diagnostics.edits import apply
+from idlc.diagnostics.source import Source
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
 from idlc.scaffold.edits.python_text import appended, constants, parsed, quoted, string
 from idlc.scaffold.edits.setup_py import setup_calls, strings
@@ -37,6 +40,11 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     changed = module.deep_replace(listed[0], appended(listed[0], new))
     assert isinstance(changed, cst.Module)
     return Edited(changed.code)
+
+
+def add_libraries(text: str) -> str:
+    """Return a setup.py that makes and installs libraries for C++ tools, if it can be told to."""
+    return apply(text, edits_for(Source("setup.py", text)))[0]
 
 
 def add_packages(text: str, names: Iterable[str]) -> Outcome:

@@ -432,6 +432,26 @@ def tells_its_type_description():
     print(json.dumps(plain(future.result())))
 
 
+def serves_without_events():
+    """Call a service where ROS 2 has no package that its events need, as Humble."""
+    from std_srvs.srv import SetBool
+
+    def answer(request, response):
+        response.success, response.message = request.data, "done"
+        return response
+
+    node, _ = node_and_string()
+    # rclpy's own services need it before
+    importlib.import_module("std_srvs._idlc.typesupport").has_hashes = lambda: False
+    sys.modules["service_msgs"] = sys.modules["service_msgs.msg"] = None
+    node.create_service(SetBool, "service", answer)
+    client = node.create_client(SetBool, "service")
+    assert client.wait_for_service(PATIENCE)
+    future = client.call_async(SetBool.Request(data=True))
+    rclpy.spin_until_future_complete(node, future, timeout_sec=PATIENCE)
+    assert future.result() == SetBool.Response(success=True, message="done")
+
+
 def says_what_to_do(case):
     """Print the error of a surrounding that type support cannot work in."""
     utilities = importlib.import_module("rclpy.utilities")
@@ -449,9 +469,11 @@ def says_what_to_do(case):
     elif case == "layout":
         fastcdr._find = lambda *_: None
     elif case == "symbol":
-        fastcdr._NEW_CDR = "no_such_symbol"
+        fastcdr._VERSIONS = [one._replace(new="no_such_symbol") for one in fastcdr._VERSIONS]
     elif case == "fast cdr":
-        fastcdr._LIBRARIES = ("libfastcdr.so.1",)
+        fastcdr._VERSIONS = (fastcdr._VERSIONS[1],)
+    elif case == "tables":
+        importlib.import_module("std_msgs._idlc.typesupport.abi")._TABLES = ((40, 128, 33),)
     elif case == "library":
         introspection.IDENTIFIER = "rosidl_typesupport_elsewhere_c"
     print(raises(ImportError, serialize_message, String("text")))

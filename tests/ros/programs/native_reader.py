@@ -103,15 +103,6 @@ def table(handle, identifier):
     }
 
 
-def without_memory(table):
-    """Return a table without what is different in C++, where idlc has no structures."""
-    rows = [
-        {**row, "offset": 0, "nested": row["nested"] and without_memory(row["nested"])}
-        for row in table["members"]
-    ]
-    return {**table, "size": 0, "members": rows}
-
-
 def unescaped(text):
     """Return what rosidl's texts stand for: its generator writes bytes as Python shows them."""
     return str(text).encode().decode("unicode_escape").encode("latin-1").decode()
@@ -173,7 +164,7 @@ def look_at(whose, name):
     every = (top, c, fast, cpp)
     told = {
         "c": table(c, C),
-        "cpp": without_memory(table(cpp, CPP)),
+        "cpp": table(cpp, CPP),
         "called": [text.decode() for text in called],
         "identifiers": [Handle.from_address(one).identifier.decode() for one in every],
         "about": about(top, meaning),

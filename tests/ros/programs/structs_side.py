@@ -8,6 +8,7 @@ import ctypes
 import gc
 import importlib
 import json
+import os
 import sys
 import zlib
 from ctypes import PYFUNCTYPE, c_bool, c_void_p, py_object
@@ -124,6 +125,8 @@ def main(file, official, *names):
 
 
 if __name__ == "__main__":
+    if "TABLES" in os.environ:  # of another version of ROS 2, instead of the installed ones
+        ctypes.CDLL(os.environ["TABLES"])
     # loads the middleware, and with it Fast CDR
     importlib.import_module("rclpy.utilities").get_rmw_implementation_identifier()
     main(*sys.argv[1:])

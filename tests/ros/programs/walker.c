@@ -4,6 +4,9 @@
  *
  * All of it happens in a thread of its own, while the thread that asked for it waits with Python's
  * lock in its hand. So a function that needs that lock is found out at once: nothing comes back.
+ *
+ * OTHER_VERSION: with the tables of another version of ROS 2 than the installed one; it has KEYS
+ * from Jazzy on, BUFFERS from Lyrical on.
  */
 #define _GNU_SOURCE
 #include <pthread.h>
@@ -18,8 +21,45 @@
 #include "rosidl_typesupport_introspection_c/field_types.h"
 #include "rosidl_typesupport_introspection_c/message_introspection.h"
 
+#ifdef OTHER_VERSION
+typedef struct {
+  const char *name_;
+  uint8_t type_id_;
+  size_t string_upper_bound_;
+  const rosidl_message_type_support_t *members_;
+#ifdef KEYS
+  bool is_key_;
+#endif
+  bool is_array_;
+  size_t array_size_;
+  bool is_upper_bound_;
+  uint32_t offset_;
+  const void *default_value_;
+  size_t (*size_function)(const void *);
+  const void *(*get_const_function)(const void *, size_t);
+  void *(*get_function)(void *, size_t);
+  void (*fetch_function)(const void *, size_t, void *);
+  void (*assign_function)(void *, size_t, const void *);
+  bool (*resize_function)(void *, size_t);
+#ifdef BUFFERS
+  bool is_rosidl_buffer_;
+#endif
+} Member;
+
+typedef struct {
+  const char *message_namespace_, *message_name_;
+  uint32_t member_count_;
+  size_t size_of_;
+#ifdef KEYS
+  bool has_any_key_member_;
+#endif
+  const Member *members_;
+  void (*init_function)(void *, int), (*fini_function)(void *);
+} Members;
+#else
 typedef rosidl_typesupport_introspection_c__MessageMembers Members;
 typedef rosidl_typesupport_introspection_c__MessageMember Member;
+#endif
 
 enum { BLOCKED = -1, WRONG = 0, DONE = 1, PATIENCE = 20 };
 

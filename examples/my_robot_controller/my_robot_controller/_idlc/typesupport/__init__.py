@@ -13,6 +13,7 @@ from typing import Any
 
 from ..names import wire_name
 from . import c, services
+from .abi import has_hashes
 from .descriptions import load
 from .extension import OF_RCL, extension
 
@@ -87,8 +88,19 @@ def _message(cls: Any) -> c.MessageSupport:
     return _road().message(cls, name)  # type: ignore[no-any-return]
 
 
+@cache
+def _base() -> Any:
+    """Return the class that messages derive from since ROS 2 Lyrical, None before."""
+    try:
+        return import_module("rosidl_pycommon.interface_base_classes").BaseMessage
+    except (ImportError, AttributeError):
+        return None
+
+
 def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
+    if _base() is not None:
+        _base().register(cls)
     built = extension(cls, _name(cls))
     if built:
         _give(cls, built.message())
@@ -100,12 +112,14 @@ def import_message(cls: Any) -> None:
 
 def import_service(cls: Any) -> None:
     """Give `type(cls)`, and those of its messages, the capsules that rclpy reads."""
-    request, response, happened = map(_handle, (cls.Request, cls.Response, cls.Event))
+    request, response = map(_handle, (cls.Request, cls.Response))
+    # ROS 2 Humble knows no events, and has no package that they need
+    happened = _handle(cls.Event) if has_hashes() else 0
     built = extension(cls, _name(cls))
     if built:
         _give(cls, {_SUPPORT: built.service()})
         return
-    event = services.event(cls, happened)
+    event = services.event(cls, happened) if happened else services.Event()
     support = services.service(_name(cls), request, response, event, _road())
     _give(cls, {_SUPPORT: c.capsule(support)})
 

@@ -43,6 +43,12 @@ class Sequence(ctypes.Structure):
     _fields_ = (("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t))
 
 
+class FlaggedSequence(ctypes.Structure):
+    """A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before."""
+
+    _fields_ = (*Sequence._fields_, ("flags", c_uint64))
+
+
 class FieldType(ctypes.Structure):
     """`rosidl_runtime_c__type_description__FieldType`."""
 

@@ -43,7 +43,7 @@ def elements(size: int, content: int) -> Functions:
 
 def functions(size: int, content: int, converter: object) -> Functions:
     """Return new functions; they live as long as the process."""
-    allocate, deallocate = _allocator()
+    allocate, deallocate = allocator()
     made = native.functions(
         "structs",
         {
@@ -69,13 +69,20 @@ class _Allocator(ctypes.Structure):
     )
 
 
+class Allocator(NamedTuple):
+    """Addresses of the functions that give zeroed memory, and take memory back."""
+
+    zeroed: int
+    free: int
+
+
 @cache
-def _allocator() -> tuple[int, int]:
-    """Return the functions that give zeroed memory and take it, as all of rosidl does."""
+def allocator() -> Allocator:
+    """Return the allocator that all of rosidl uses."""
     default = c.load_library("librcutils.so").rcutils_get_default_allocator
     default.restype = _Allocator
-    allocator = default()
-    return allocator.zero_allocate, allocator.deallocate
+    made = default()
+    return Allocator(made.zero_allocate, made.deallocate)
 
 
 # What must be freed in a structure is told by a table of words: how many entries, and for

@@ -5,21 +5,25 @@ from glob import glob
 from setuptools import find_packages, setup
 
 package_name = 'demo'
+index = ['resource/' + package_name]  # ROS 2 finds the package by it
 
 try:
     from idlc.build import compile_interfaces
 except ImportError:
-    pass  # what was compiled last is installed
+    compiled = {}  # what was compiled last is installed, without libraries for C++ tools
+    if glob('resource/rosidl_interfaces/*'):
+        index = []  # `ros2 bag record` would stop at it
 else:
-    compile_interfaces(package_name)
+    compiled = compile_interfaces(package_name)
 
 setup(
+    **compiled,
     name=package_name,
     version='0.1.0',
     packages=find_packages(exclude=['test']),
     package_data={'': ['idlc.lock', 'py.typed']},
     data_files=[
-        ('share/ament_index/resource_index/packages', ['resource/' + package_name]),
+        ('share/ament_index/resource_index/packages', index),
         (
             'share/ament_index/resource_index/rosidl_interfaces',
             glob('resource/rosidl_interfaces/*'),

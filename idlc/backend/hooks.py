@@ -1,0 +1,166 @@
+"""One run of a hook: read what the package declares, compile, have hatchling write the archive.
+
+A problem ends the process with a report, as frontends expect it; they would show an exception with
+its traceback.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from idlc.cli import output
+from idlc.cli.exit_status import ended
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.disk import pyproject
+from idlc.disk.distribution import Distribution
+from idlc.disk.enclosing_package import MANIFEST
+from idlc.disk.read import reason
+
+if TYPE_CHECKING:
+    from hatchling.builders.plugin.interface import BuilderInterface
+
+    from idlc.backend.content import Content
+
+#: What a workspace or an earlier build left in the folder.
+_NO_SOURCES = ["/build", "/dist", "/install", "/log"]
+#: What is needed even if version control ignores it.
+_SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
+
+
+def finished(build: Callable[[Report], str | None]) -> str:
+    """Return the name of the archive that was built; end the process after a problem."""
+    built: list[str] = []
+
+    def command() -> int:
+        report = Report()
+        if importlib.util.find_spec("hatchling") is None:
+            sys.stderr.write(
+                "Error: hatchling, which writes archives for idlc.backend, is not installed: "
+                "`pip install hatchling`, or build without --no-build-isolation\n"
+            )
+            return 2
+        try:
+            built.extend(filter(None, [build(report)]))
+        except OSError as error:
+            message = f"cannot write the archive: {reason(error)}"
+            report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
+        output.show(report, "text", sys.stderr)
+        output.notes(report, sys.stderr)
+        return 0 if built else output.status(report) or 1
+
+    status = ended(command)
+    if status:
+        sys.stderr.write("idlc: nothing was built, see above\n")
+        raise SystemExit(status)
+    return built[0]
+
+
+def sdist(directory: str, report: Report) -> str | None:
+    """Write the archive of the working folder, without what version control ignores."""
+    from hatchling.builders.sdist import SdistBuilder
+
+    found = _declared(report)
+    if found is None:
+        return None
+    settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
+    return _written(SdistBuilder(str(Path.cwd()), config=settings), directory, report)
+
+
+def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+    """Compile the package in the working folder into a wheel."""
+    from idlc.backend.content import compiled
+
+    found, distribution = _declared(report), _distribution(settings, report)
+    if found is None or report.had_errors:
+        return None
+    name, project = found
+    with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
+        content = compiled(name, Path(folder) / "classes" / name, distribution, report)
+        if content is None:
+            return None
+        return _packed(name, project, content, Path(folder) / "prefix", directory, report)
+
+
+def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
+    """Return the package's name and its `[project]` table; `None` after a problem."""
+    from idlc.backend import manifest, project_table
+
+    pyproject.load(report)  # which reports what is no TOML
+    if not Path(MANIFEST).is_file():
+        message = f"there is no {MANIFEST} beside pyproject.toml"
+        hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"
+        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
+    if report.had_errors:
+        return None
+    declared = manifest.project(report)
+    project = project_table.completed(declared, report) if declared else {}
+    return None if report.had_errors else (declared["name"], project)
+
+
+def _distribution(settings: Mapping[str, Any], report: Report) -> Distribution | None:
+    """Return the distribution that the frontend was told; report IDL611 for one not known."""
+    from idlc.native.layouts import LAYOUTS
+
+    wanted = settings.get("distro")
+    if isinstance(wanted, str) and wanted in LAYOUTS:
+        return Distribution(wanted, f"distro={wanted}")
+    if wanted is None:
+        return None
+    message = f"the setting `distro` is {wanted!r}, which idlc does not know"
+    report.add(codes.BAD_CONFIG.of("", message, hint=f"it is one of {', '.join(LAYOUTS)}"))
+    return None
+
+
+def _packed(
+    name: str,
+    project: dict[str, Any],
+    content: Content,
+    prefix: Path,
+    directory: str,
+    report: Report,
+) -> str | None:
+    """Write the wheel of a compiled package."""
+    from hatchling.builders.wheel import WheelBuilder
+
+    class Builder(WheelBuilder):
+        def get_default_build_data(self) -> dict[str, Any]:
+            platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+            tag = f"py3-none-{platform if content.native else 'any'}"
+            return {**super().get_default_build_data(), "tag": tag}
+
+    for path, data in content.prefix.items():
+        (prefix / path).parent.mkdir(parents=True, exist_ok=True)
+        (prefix / path).write_bytes(data)
+    target = _target(
+        "wheel",
+        **{
+            "bypass-selection": True,
+            "force-include": {str(content.classes): name},
+            "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
+        },
+    )
+    builder = Builder(str(Path.cwd()), config={"project": project, **target})
+    return _written(builder, directory, report)
+
+
+def _target(name: str, **settings: Any) -> dict[str, Any]:
+    """Return hatchling's settings for one kind of archive."""
+    every = {"core-metadata-version": "2.4"}
+    return {"tool": {"hatch": {"build": {"targets": {name: {**every, **settings}}}}}}
+
+
+def _written(builder: BuilderInterface[Any, Any], directory: str, report: Report) -> str | None:
+    """Return the name of an archive, written; report IDL611 for a `[project]` that is wrong."""
+    try:
+        builder.metadata.validate_fields()
+    except (OSError, TypeError, ValueError) as error:
+        report.add(codes.BAD_CONFIG.of(pyproject.FILE, f"{error}"))
+        return None
+    return Path(next(iter(builder.build(directory=directory, versions=["standard"])))).name

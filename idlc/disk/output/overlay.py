@@ -1,0 +1,79 @@
+"""A prefix that ROS 2 and its tools look into, with several packages and files of others in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from idlc.diagnostics.report import Report
+from idlc.disk import environment
+from idlc.disk.enclosing_package import manifest
+from idlc.disk.library import Library
+from idlc.disk.output import transaction
+from idlc.disk.output.folder import Target
+from idlc.disk.output.folder_lock import alone
+from idlc.disk.output.tree import Tree
+from idlc.disk.output.write_plan import Change, Plan
+from idlc.disk.read import read_bytes, shown
+
+#: How the files begin by which shells learn of a prefix, and which all packages in it share.
+MARK = b"# Written by idlc"
+
+
+class Overlay(Target):
+    """A package in a prefix. What idlc wrote of it is recorded in its share folder."""
+
+    def __init__(
+        self, name: str, package: str, home: Path | None, report: Report, *, force: bool = False
+    ) -> None:
+        super().__init__(name, package, report, force=force)
+        declared = manifest(home) if home else None
+        #: The content of its package.xml; `None` if there is none to be copied.
+        self.manifest = read_bytes(declared, shown(declared), report) if declared else None
+        self.home = f"share/{package}/"
+        self.modules = f"{environment.modules_folder()}/{package}/"
+
+    @property
+    def place(self) -> str:
+        """The prefix's path, which shells need where they do not know what they read."""
+        return self._path.as_posix()
+
+    @property
+    def prefixes(self) -> tuple[Path, ...]:
+        """The prefixes in which what is installed here is used."""
+        return (self._path, *environment.ament_prefixes())
+
+    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
+        del beside
+        return alone(self._path)
+
+    def beside(self, package: str) -> Overlay:
+        """Return another package in the prefix."""
+        home = Library((), Report()).home(package)
+        return Overlay(self.name, package, home, self.report, force=self._force)
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Whether nothing is to be done: not to be told from interfaces alone.
+
+        Libraries depend on what else is installed, too.
+        """
+        del inputs, library, vendor_deps
+        return False
+
+    def share(self, files: Mapping[str, str]) -> bool:
+        """Write the files for shells, but not over those of others, which are noted."""
+        tree, changes = Tree(self._path), []
+        for path, text in files.items():
+            old, new = tree.read(path), text.encode("utf-8")
+            if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
+                changes += [] if old == new else [Change(path, old, new)]
+            else:
+                self.report.notes.append(
+                    f"`{self.name}/{path}` is not idlc's: put `{self.name}` into AMENT_PREFIX_PATH"
+                )
+        plan = Plan(self._path, tuple(changes), {})
+        return transaction.apply_changes(plan, self.name, self.report)

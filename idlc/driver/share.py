@@ -1,0 +1,51 @@
+"""What rosidl would install of a package besides its modules, by the paths in a prefix."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics.report import Report
+from idlc.driver.libraries import Libraries
+from idlc.export.idl import idl
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+
+_INDEX = "share/ament_index/resource_index"
+#: The list of the packages that have interfaces, each a file with their names.
+INTERFACES = f"{_INDEX}/rosidl_interfaces"
+
+
+def shared(
+    model: Model, manifest: str | bytes, libraries: Libraries, report: Report
+) -> dict[str, str | bytes]:
+    """Return libraries, package.xml, interfaces and entries in the index, in the order to write.
+
+    What leads to others comes after these.
+    """
+    name = model.package
+    found: dict[str, str | bytes] = {**libraries.files, f"share/{name}/package.xml": manifest}
+    interfaces = {}
+    for own in model.own:
+        key = f"{own.name.kind}/{own.name.name}"
+        interfaces[f"{key}.{own.name.kind}"] = own.source.text if own.source else ""
+        interfaces[f"{key}.idl"] = idl(own)
+        described = model.describer.installed(str(own.name))
+        found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
+    found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
+    found[f"{_INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
+    found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
+    if libraries.missing:
+        report.notes.append(
+            f"`{name}` is not entered in the index of ROS 2, because recorders stop at packages "
+            f"without a library: {libraries.missing}"
+        )
+    else:
+        found[f"{_INDEX}/packages/{name}"] = ""
+    return found
+
+
+def dependencies(model: Model) -> list[str]:
+    """Return the packages whose interfaces a model has besides its own."""
+    return sorted({one.package for one in model.interfaces} - {model.package})

@@ -1,0 +1,192 @@
+"""The reference documents say what is: commands, settings, the API of generated classes, links.
+
+`IDLC_REFRESH=docs/command-line pytest tests/project/test_documents.py` writes that page anew,
+and fails.
+"""
+
+import re
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from idlc.breaking.allow import Allowance
+from idlc.cli.main import main
+from idlc.diagnostics.codes import CODES
+from idlc.disk.pyproject import Config
+from tests.support import command_line_page, programs, refresh
+from tests.support.paths import DOCS, ROOT
+
+SETTINGS = (DOCS / "settings.md").read_text(encoding="utf-8")
+API = (DOCS / "generated-api.md").read_text(encoding="utf-8")
+
+
+# the command line
+
+
+def test_the_commands_are_as_their_help_says():
+    text = command_line_page.PAGE.read_text(encoding="utf-8")
+    current = command_line_page.written(text)
+    if refresh.wanted("docs/command-line"):
+        command_line_page.PAGE.write_text(current, encoding="utf-8")
+        refresh.refreshed()
+    assert current == text
+
+
+# settings
+
+
+@pytest.fixture
+def complaints(tmp_path, monkeypatch, capsys):
+    """Return a function from the text of a pyproject.toml to what idlc says about it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / ".git").mkdir()
+    (tmp_path / "demo" / "msg").mkdir(parents=True)
+    (tmp_path / "demo" / "msg" / "Drive.msg").write_text("float64 speed\n", encoding="utf-8")
+
+    def said(text: str) -> str:
+        (tmp_path / "pyproject.toml").write_text(text, encoding="utf-8")
+        main(["check", "demo"])
+        main(["breaking", "demo"])
+        printed = "".join(capsys.readouterr())
+        return printed if "IDL611" in printed else ""
+
+    return said
+
+
+def table(name: str) -> dict[str, tuple[str, str]]:
+    """Return the documented settings of a table: their types and defaults."""
+    section = SETTINGS.partition(f"\n## [{name}]\n")[2].partition("\n## ")[0]
+    row = re.compile(r"^\| `([a-z-]+)` \| ([^|]+) \| ([^|]*) \| .* \|.*\|$", re.MULTILINE)
+    rows = row.findall(section)
+    return {key: (type_, default) for key, type_, default in rows}
+
+
+def test_the_examples_of_settings_are_right(complaints):
+    examples = re.findall(r"```toml\n(.*?)```", SETTINGS, re.DOTALL)
+    assert len(examples) == 4
+    for example in examples:
+        assert complaints(example) == ""
+
+
+@pytest.mark.parametrize("name", re.findall(r"(?m)^## \[(.*)\]$", SETTINGS))
+def test_these_are_the_settings(name, complaints):
+    listed = re.search(r"the settings are (.*)\n", complaints(f"[{name}]\nqwertyuiop = 1\n"))
+    assert listed is not None
+    below = re.findall(rf"(?m)^## \[{name}\.(\w+)\]$", SETTINGS)
+    assert set(re.findall(r"`([a-z-]+)`", listed[1])) == {*table(name), *below}
+    for key, (type_, _) in table(name).items():
+        assert f"`{key}` in [{name}] must be {type_}" in complaints(f"[{name}]\n{key} = 1.5\n")
+
+
+def test_the_defaults_of_settings():
+    for key, (_, default) in table("tool.idlc").items():
+        value = getattr(Config(), key.replace("-", "_"))
+        assert default == ("false" if value is False else "none")
+        assert not value
+    (listed,) = re.findall(r"Only if it is selected idlc gives (.*?)\.\n", SETTINGS, re.DOTALL)
+    assert set(re.findall(r"IDL\d+", listed)) == {
+        code.id for code in CODES.values() if not code.default
+    }
+
+
+def test_the_keys_of_an_allowance():
+    keys = re.findall(r"^\| `(\w+)` \| [^|]+ \| [^|]+ \|$", SETTINGS, re.MULTILINE)
+    assert keys == ["at", "reason", "until", "code"]
+    assert set(keys) == set(Allowance._fields)
+
+
+def test_the_variables_of_the_environment():
+    read = re.compile(r"environ(?:\.get\(|\[)\"([A-Z_]+)\"")
+    found = {
+        name
+        for path in (ROOT / "idlc").rglob("*.py")
+        for name in read.findall(path.read_text(encoding="utf-8"))
+        if not path.name.startswith("typesupport")
+    }
+    listed = SETTINGS.partition("\n## In the environment\n")[2]
+    assert found == set(re.findall(r"`([A-Z_]{3,})`", listed))
+
+
+# the API of generated classes
+
+
+@pytest.fixture(scope="module")
+def generated(tmp_path_factory) -> Path:
+    """Return the folder in which the files of docs/generated-api.md were compiled."""
+    folder = tmp_path_factory.mktemp("api")
+    files = re.findall(r"^```(demo_msgs/\S+)\n(.*?)^```$", API, re.MULTILINE | re.DOTALL)
+    assert len(files) == 3
+    for path, text in files:
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
+    (line,) = re.findall(r"^idlc (gen .*)$", API, re.MULTILINE)
+    programs.run(sys.executable, "-m", "idlc", *line.split(), cwd=folder)
+    return folder / "out"
+
+
+def test_the_examples_of_the_api(generated):
+    blocks = re.findall(r"^```python\n(.*?)^```$", API, re.MULTILINE | re.DOTALL)
+    assert len(blocks) >= 8
+    programs.run(sys.executable, "-c", "\n".join(blocks), cwd=generated)
+
+
+def test_every_public_name_is_documented(generated):
+    """What a class offers is on the page, or in the examples' own files."""
+    code = (
+        "from demo_msgs.msg import Drive\n"
+        "from demo_msgs.srv import Add\n"
+        "from demo_msgs.action import Count\n"
+        "for kind in (Drive, Add, Count, Count.Impl):\n"
+        "    print(*(name for name in dir(kind) if name[0] != '_'))\n"
+    )
+    names = set(programs.run(sys.executable, "-c", code, cwd=generated).split())
+    assert len(names) > 20
+    assert {name for name in names if not re.search(rf"\b{name}\b", API)} == set()
+
+
+# links and names
+
+
+def anchors(path: Path) -> set[str]:
+    """Return what GitHub calls the headings of a document."""
+    heads = re.findall(r"(?m)^#+ (.*)$", path.read_text(encoding="utf-8"))
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+def links(path: Path) -> list[str]:
+    """Return what the text of a document, which is not code, links to."""
+    text = path.read_text(encoding="utf-8")
+    text = re.sub(r"^(```+).*?^\1$|`[^`\n]+`", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"\]\(([^)\s]+)\)", text)
+
+
+PAGES = [ROOT / "README.md", ROOT / "SECURITY.md", *sorted(DOCS.rglob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
+def test_links_lead_somewhere(page):
+    for target in links(page):
+        path, _, anchor = target.partition("#")
+        if ":" not in path:
+            there = (page.parent / path).resolve() if path else page
+            assert there.exists(), target
+            assert not anchor or anchor in anchors(there), target
+
+
+def test_the_index_lists_every_page():
+    linked = {(DOCS / link.partition("#")[0]).resolve() for link in links(DOCS / "index.md")}
+    assert set(DOCS.rglob("*.md")) - {DOCS / "index.md"} <= linked
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="not in a repository")
+def test_what_is_generated_is_marked():
+    git = partial(programs.run, "git", cwd=ROOT)
+    paths = git("ls-files", "examples", "golden", "idlc", "templates").splitlines()
+    marks = git("check-attr", "linguist-generated", "--", *paths).splitlines()
+    marked = {line.split(": ")[0] for line in marks if line.endswith(": set")}
+    generated = {path for path in paths if "/_idlc/" in path or path.endswith("/idlc.lock")}
+    assert len(generated) > 30
+    assert generated <= marked
+    assert not any(path.startswith(("idlc/", "templates/")) for path in marked)
