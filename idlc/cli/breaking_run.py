@@ -1,4 +1,4 @@
-"""What `idlc breaking` does, without the reading of its options."""
+"""The body of `idlc breaking`: what it says, and its exit status."""
 
 from __future__ import annotations
 

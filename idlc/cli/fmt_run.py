@@ -1,4 +1,4 @@
-"""What `idlc fmt` does, without the reading of its options."""
+"""The body of `idlc fmt`, free of click."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ class Naming(msgspec.Struct, frozen=True):
 
 
 def shadows(structure: ir.Message) -> bool:
-    """Whether the class needs a builtin whose name a field has, or the interface."""
+    """Return whether the class needs a builtin whose name a field has, or the interface."""
     hidden = any(pynames.field(field.name) in BUILTINS for field in structure.fields)
     return hidden or _hides_not_implemented(structure)
 

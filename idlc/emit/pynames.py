@@ -96,7 +96,7 @@ def field(name: str) -> FieldName:
 
 
 def hides_method(name: str) -> bool:
-    """Whether a message class offers a method of a field's name."""
+    """Return whether a message class offers a method of a field's name."""
     return name in METHODS
 
 

@@ -46,7 +46,7 @@ def _without(fields: set[str], slots: Any) -> Any:
 
 
 def _holds_numbers(owner: Any) -> bool:
-    """Whether a field may hold a `numpy.ndarray`, which `==` compares element by element."""
+    """Return whether a field may hold a `numpy.ndarray`, compared element by element."""
     return any(isinstance(owner.__dict__[name], property) for name in _fields(owner))
 
 

@@ -201,8 +201,8 @@ def _is_even(block: _Column) -> bool:
 
 def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
     """Return the column of the row nearest to one, the row above first; 0 if there is none."""
-    behind = bisect(anchors, (at, 0))
-    close = anchors[max(behind - 1, 0) : behind + 1]
+    after = bisect(anchors, (at, 0))
+    close = anchors[max(after - 1, 0) : after + 1]
     return min(close, key=lambda anchor: abs(anchor[0] - at), default=(0, 0))[1]
 
 

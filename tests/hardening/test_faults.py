@@ -1,4 +1,4 @@
-"""Whatever happens to a run: each file is whole, a failed run changes nothing, the next one mends.
+"""Whatever happens to a run: each file is whole, a failed run changes nothing, the next one works.
 
 The faults are real where they can be (a process that is killed, a kernel that refuses, another
 user) and are committed at every write that a run makes, found by Python's audit events.

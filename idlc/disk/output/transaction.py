@@ -153,7 +153,7 @@ def _outcome(torn: list[str], name: str) -> str:
 
 
 def sweep(out: Path) -> None:
-    """Remove what killed runs left behind."""
+    """Remove what killed runs left."""
     for stage in _abandoned(out):
         _remove(stage)
 

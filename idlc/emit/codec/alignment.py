@@ -15,7 +15,7 @@ class Alignment(msgspec.Struct, frozen=True):
     residue: int = 0
 
     def knows(self, align: int) -> bool:
-        """Whether the padding to a multiple of `align` is known."""
+        """Return whether the padding to a multiple of `align` is known."""
         return self.modulus >= align
 
     def padding(self, align: int) -> int:
@@ -23,7 +23,7 @@ class Alignment(msgspec.Struct, frozen=True):
         return (4 - self.residue) % align
 
     def is_at(self, align: int) -> bool:
-        """Whether this is known to be a multiple of `align`."""
+        """Return whether this is known to be a multiple of `align`."""
         return self.knows(align) and self.padding(align) == 0
 
     def after(self, size: int) -> Alignment:

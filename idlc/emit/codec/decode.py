@@ -1,7 +1,7 @@
 """From a layout to the statements that read it.
 
 Numbers that follow each other are read by one precompiled Struct. A Struct and an index check
-their own bounds; a slice that ends behind the buffer's end is shorter, and whatever is read next,
+their own bounds; a slice that ends after the buffer's end is shorter, and whatever is read next,
 or a check at the end, fails. Before structures are made, their least size is compared with the
 bytes that are left: nothing is allocated that the buffer does not hold. Any failure is explained
 afterwards, by the runtime.
@@ -24,7 +24,7 @@ UNENDED = (Line('raise ValueError("text without end")'),)
 
 
 def is_bulk(steps: tuple[wire_plan.Step, ...]) -> bool:
-    """Whether a structure holds numeric buffers, which are read through a memoryview."""
+    """Return whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
         isinstance(step, wire_plan.Numbers)
         or (isinstance(step, wire_plan.Block) and step.is_large)

@@ -126,7 +126,7 @@ class Running(Emitter):
         return self.here.text()
 
     def buffer(self, count: str, align: int, size: int, source: str) -> str:
-        """Return the slice of `count` elements, and go behind it.
+        """Return the slice of `count` elements, and move after it.
 
         It is shorter if the buffer is, which whatever is read next notices.
         """

@@ -116,7 +116,7 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
 
 
 def _interferes(statement: Statement, waiting: list[Put]) -> bool:
-    """Whether a statement must not run before the parts that wait to be put."""
+    """Return whether a statement must not run before the parts that wait to be put."""
     match statement:
         case Note(target):
             return any(target in put.reads for put in waiting)

@@ -237,13 +237,13 @@ def smallest(body: tuple[Step, ...]) -> int:
 
 
 def is_many(step: Items) -> bool:
-    """Whether there may be so many elements that preparing for them is worth its cost."""
+    """Return whether there may be so many elements that preparing for them is worth its cost."""
     most = step.bound if step.size is None else step.size
     return most is None or most > FEW
 
 
 def is_text(body: tuple[Step, ...]) -> bool:
-    """Whether steps are strings and structures of them, with nothing between but single bytes."""
+    """Return whether steps are strings, and structures of them, with only single bytes between."""
     for step in body:
         match step:
             case Text(wide=False) | Number(size=1) | Enter():
