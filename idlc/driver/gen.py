@@ -9,13 +9,11 @@ from idlc.diagnostics.report import Report
 from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
-from idlc.disk.output.overlay import Overlay
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.gen_result import Generated, generated, up_to_date, with_needs
 from idlc.driver.gen_vendored import planned
-from idlc.driver.overlay import enter
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import ir
 
@@ -55,7 +53,9 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
         return ()
     with found[0].alone(beside=options.vendor_deps or len(found) > 1):
         done = _made(dict(zip(found, given, strict=True)), options, report)
-        if isinstance(found[0], Overlay) and done and not options.check:
+        if options.ament and done and not options.check:
+            from idlc.driver.overlay import enter
+
             enter(found[0])
         return done
 
@@ -66,6 +66,8 @@ def _targets(
     """Return the folder that each package is written to."""
     if not options.ament:
         return targets(given, options.out, report, force=options.force)
+    from idlc.disk.output.overlay import Overlay  # imported only where one is written
+
     prefix = options.ament.rstrip("/") or "/"
     homes = (
         (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
