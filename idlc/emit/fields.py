@@ -82,7 +82,7 @@ def support(type_: ir.FieldType) -> str:
 def numeric_class(type_: ir.Sequence | ir.Array) -> str:
     """Return the descriptor class of a numeric array."""
     assert isinstance(type_.element, ir.Primitive)
-    name = pynames.numpy(type_.element.name)
+    name = ir.PRIMITIVES[type_.element.name].dtype
     stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
     return stem + ("Sequence" if isinstance(type_, ir.Sequence) else "Array")
 
@@ -239,7 +239,7 @@ def _fresh_numbers(field: ir.Field) -> Node:
     if isinstance(field.type, ir.Sequence):
         code = f'"{field.type.element.info.code}"'
         return call("_array", code, *([tuple_of(*values)] if values else []))
-    dtype = f"_arrays.{pynames.numpy(field.type.element.name).upper()}"
+    dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
     if values is None:
         return call("_arrays.zeros", str(field.type.size), dtype)
     return call("_arrays.array", tuple_of(*values), dtype)
@@ -256,7 +256,7 @@ def _numbers(field: ir.Field, name: str) -> _Shape:
         annotation = f"_idlc.{kind} = _idlc.{kind}()"
         stored = call("_idlc.to_array", code, name, f'"{name}"')
     else:
-        dtype = f"_arrays.{pynames.numpy(field.type.element.name).upper()}"
+        dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
         values = "_arrays.Values"
         annotation = f"_arrays.{kind} = _arrays.{kind}({field.type.size})"
         stored = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')

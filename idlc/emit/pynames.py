@@ -105,11 +105,6 @@ def slot(name: str) -> SlotName:
     return SlotName(slot_name(name))
 
 
-def numpy(primitive: str) -> str:
-    """Return the dtype of a numeric primitive."""
-    return "uint8" if primitive == "char" else primitive
-
-
 class Locals:
     """The local variables of one function: each name is given once."""
 

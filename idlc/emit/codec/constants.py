@@ -9,6 +9,7 @@ from typing import NamedTuple
 from idlc.emit import pynames
 from idlc.emit.codec import wire_plan
 from idlc.emit.python_lines import Group, Node, call
+from idlc.model import ir
 
 
 class Mark(NamedTuple):
@@ -115,7 +116,7 @@ class Tables:
         return self._array("array_of", "array_reader", step, "reading")
 
     def _array(self, stem: str, function: str, step: wire_plan.Block, *more: str) -> str:
-        dtype = pynames.numpy(step.primitive)
+        dtype = ir.PRIMITIVES[step.primitive].dtype
         expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
         return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
 

@@ -95,7 +95,7 @@ class Numbers(msgspec.Struct, frozen=True):
     @property
     def numpy(self) -> str:
         """What numpy calls an element."""
-        return pynames.numpy(self.primitive)
+        return ir.PRIMITIVES[self.primitive].dtype
 
     @property
     def code(self) -> str:
