@@ -52,7 +52,7 @@ def compiled(
     made = Report()
     gen(GenOptions(paths=(".",), out=str(classes), scope=where), made)
     # who builds a package need not be able to import it
-    report.extend(one for one in made if one.code != codes.NOT_IMPORTABLE.id)
+    report.extend(one for one in made if one.code != codes.DEPENDENCY_NOT_IMPORTABLE.id)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
     if report.had_errors or manifest is None:
         return None

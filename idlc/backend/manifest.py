@@ -10,8 +10,7 @@ from typing import Any
 from idlc.checks.package.facts import Statement
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk.enclosing_package import MANIFEST, declared_name
-from idlc.disk.manifest_statements import statements
+from idlc.disk.enclosing_package import MANIFEST, declared_name, statements
 from idlc.emit.pynames import why_not_package
 
 #: What every generated package needs of others on PyPI. The packages of ROS 2 that it imports are
@@ -32,7 +31,7 @@ def project(report: Report) -> dict[str, Any]:
         return {}
     if why := why_not_package(name):
         hint = "change `<name>`, and its uses in other packages"
-        report.add(codes.UNIMPORTABLE.of(MANIFEST, f"`{name}` {why}", hint=hint))
+        report.add(codes.UNIMPORTABLE_PACKAGE.of(MANIFEST, f"`{name}` {why}", hint=hint))
         return {}
     said = statements(path, MANIFEST, report)
     version = None if report.had_errors else _version(said, report)

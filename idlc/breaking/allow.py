@@ -25,7 +25,7 @@ class Allowance(NamedTuple):
     code: str | None = None
 
     def covers(self, change: Change) -> bool:
-        """Tell whether a change, or the one that it follows from, is meant."""
+        """Return whether a change, or the one that it follows from, is meant."""
         if self.code not in (None, change.code.id):
             return False
         names = [change.subject, change.subject.partition(".")[0], change.cause]

@@ -69,7 +69,7 @@ def _renamed(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
 
 def _retyped(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
     return Change(
-        codes.CONSTANT_RETYPED,
+        codes.CONSTANT_TYPE_CHANGED,
         sides.subject(new.name),
         f"constant `{new.name}` was `{spell(old.type)}` and is `{spell(new.type)}` now",
         frozenset({"source"}),
@@ -81,7 +81,7 @@ def _retyped(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
 
 def _value(sides: Sides, old: ir.Constant, new: ir.Constant) -> Change:
     return Change(
-        codes.CONSTANT_VALUE,
+        codes.CONSTANT_VALUE_CHANGED,
         sides.subject(new.name),
         f"constant `{new.name}` was {spell_value(old.value)} and is {spell_value(new.value)} now",
         frozenset({"behaviour"}),

@@ -113,12 +113,12 @@ def _all_removed(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
         place = places[field.name]
         followed = bisect_right(kept, place)
         beside = pairing.kept[followed][1] if followed < len(kept) else end
-        yield _removed(sides, field, beside, is_behind=last < place)
+        yield _removed(sides, field, beside, is_last=last < place)
 
 
-def _removed(sides: Sides, field: ir.Field, beside: ir.Field | None, *, is_behind: bool) -> Change:
-    """Return the change; `is_behind` is whether no field stands behind it that stayed."""
-    levels: set[Level] = {"hash", "source"} if is_behind else {"hash", "source", "wire"}
+def _removed(sides: Sides, field: ir.Field, beside: ir.Field | None, *, is_last: bool) -> Change:
+    """Return the change; `is_last` is whether no field that stayed comes after it."""
+    levels: set[Level] = {"hash", "source"} if is_last else {"hash", "source", "wire"}
     return Change(
         codes.FIELD_REMOVED,
         sides.subject(field.name),
@@ -154,13 +154,13 @@ def _all_added(sides: Sides, pairing: Pairing[ir.Field]) -> Iterator[Change]:
     places = _places(sides.new.fields)
     last = max((places[new.name] for _, new in (*pairing.kept, *pairing.renamed)), default=-1)
     for field in pairing.added:
-        yield _added(sides, field, is_behind=last < places[field.name])
+        yield _added(sides, field, is_last=last < places[field.name])
 
 
-def _added(sides: Sides, field: ir.Field, *, is_behind: bool) -> Change:
-    """Return the change; `is_behind` is whether no field stands behind it that stayed."""
+def _added(sides: Sides, field: ir.Field, *, is_last: bool) -> Change:
+    """Return the change; `is_last` is whether no field that stayed comes after it."""
     levels: set[Level] = {"wire", "hash"}
-    if not is_behind:
+    if not is_last:
         levels.add("source")  # positional arguments and patterns mean other fields now
     return Change(
         codes.FIELD_ADDED,
@@ -207,7 +207,7 @@ def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     if native(old.type) == native(new.type):
         levels -= {"source"}
     return Change(
-        codes.FIELD_BOUND if only_bounds else codes.FIELD_TYPE,
+        codes.FIELD_BOUND_CHANGED if only_bounds else codes.FIELD_TYPE_CHANGED,
         sides.subject(new.name),
         f"field `{new.name}` was `{spell(old.type, package)}` "
         f"and is `{spell(new.type, package)}` now",
@@ -228,7 +228,7 @@ def _used_type(sides: Sides, old: ir.Field, new: ir.Field, target: str) -> Itera
         levels.add("wire")
     if levels:
         yield Change(
-            codes.USED_TYPE,
+            codes.USED_TYPE_CHANGED,
             sides.subject(new.name),
             f"`{target}`, the type of field `{new.name}`, changed",
             frozenset(levels),
@@ -255,7 +255,7 @@ def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
             f"and is {spell_value(new.default.value)} now"
         )
     return Change(
-        codes.FIELD_DEFAULT,
+        codes.FIELD_DEFAULT_CHANGED,
         sides.subject(new.name),
         what,
         frozenset(levels),

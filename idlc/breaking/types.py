@@ -49,7 +49,7 @@ def native(type_: ir.FieldType) -> object:
 
 
 def tighter(old: ir.FieldType, new: ir.FieldType) -> bool:
-    """Tell whether text that was allowed is too long now."""
+    """Return whether text that was allowed is too long now."""
     before, after = ir.element_of(old), ir.element_of(new)
     if not isinstance(before, ir.String) or not isinstance(after, ir.String):
         return False

@@ -122,7 +122,7 @@ def _told_once(
 def _changes(sides: Sides) -> Iterator[Change]:
     """Yield what changed; not that a type changed which it holds, as that is told of that type."""
     for change in (*field_changes(sides), *constant_changes(sides)):
-        if change.code is not codes.USED_TYPE:
+        if change.code is not codes.USED_TYPE_CHANGED:
             yield change
 
 

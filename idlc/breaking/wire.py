@@ -34,7 +34,7 @@ class _MisreadError(Exception):
 
 
 def reads_alike(old: ir.Message, new: ir.Message, before: Messages, after: Messages) -> bool:
-    """Tell whether every value of `old`, as bytes, is read by `new` as what it was.
+    """Return whether every value of `old`, as bytes, is read by `new` as what it was.
 
     A field of the same name must get the same value, any other the value that stands in its
     place; missing fields at the end do no harm, additional ones do.
@@ -50,7 +50,7 @@ def reads_alike(old: ir.Message, new: ir.Message, before: Messages, after: Messa
 def type_reads_alike(
     old: ir.FieldType, new: ir.FieldType, before: Messages, after: Messages, *, at_end: bool
 ) -> bool:
-    """Tell whether a field of one type, the last one or not, is read as it was by another."""
+    """Return whether a field of one type, the last one or not, is read as it was by another."""
     runs = _Runs(tuple(leaves(old, "", before)), tuple(leaves(new, "", after)))
     starts = {_Place(at) for at in range(8)}
     try:
@@ -82,9 +82,9 @@ class _Follower:
         self._known: dict[Hashable, set[_Place]] = {}
 
     def follow(self, runs: _Runs, starts: Iterable[_Place], *, at_end: bool) -> set[_Place]:
-        """Return the places behind two runs; raise _MisreadError if a value is not what it was.
+        """Return the places after two runs; raise _MisreadError if a value is not what it was.
 
-        `at_end` says that nothing is read behind them.
+        `at_end` says that nothing is read after them.
         """
         states = {(0, place) for place in starts}
         last = max((at for at, leaf in enumerate(runs.new) if leaf.type is not None), default=0)
@@ -118,7 +118,7 @@ class _Follower:
         raise _MisreadError
 
     def _read(self, old: Leaf, new: Leaf, start: int, *, at_end: bool) -> set[_Place]:
-        """Return the places behind one value that both versions read at the same position."""
+        """Return the places after one value that both versions read at the same position."""
         match old.type, new.type:
             case ir.Primitive(), ir.Primitive() if _primitive_alike(old.type.name, new.type.name):
                 return {_Place((start + old.least) % 8)}
@@ -147,7 +147,7 @@ class _Follower:
     def _sequence(
         self, old: ir.Sequence, new: ir.Sequence, start: int, *, at_end: bool
     ) -> set[_Place]:
-        """Return the places behind any number of elements that the old bound allows."""
+        """Return the places after any number of elements that the old bound allows."""
         runs = self._elements(old.element, new.element)
         ends = {_Place(start)}
         if at_end and all(leaf.type is None for leaf in runs.new):
@@ -175,7 +175,7 @@ class _Follower:
 
 
 def _behind(rest: Iterable[Leaf], place: _Place, *, at_end: bool) -> _Place:
-    """Return the place behind old values that the new version does not read."""
+    """Return the place after old values that the new version does not read."""
     at = place.at
     for leaf in rest:
         if leaf.size is None and not at_end:
@@ -194,5 +194,5 @@ def _primitive_alike(old: str, new: str) -> bool:
 
 
 def _fits(old: int | None, new: int | None) -> bool:
-    """Tell whether every length within one bound is within another."""
+    """Return whether every length within one bound is within another."""
     return new is None or (old is not None and old <= new)

@@ -33,7 +33,7 @@ class Remark(msgspec.Struct, frozen=True):
     edit: Edit | None
 
     def silences(self, found: Diagnostic) -> bool:
-        """Tell whether a problem is what the remark is about."""
+        """Return whether a problem is what the remark is about."""
         if found.code != self.code or found.severity is Severity.ERROR or not self.reason:
             return False
         if found.span is None:
@@ -77,13 +77,13 @@ def _unused(remark: Remark) -> Diagnostic:
 
 
 def switched_off(found: Diagnostic, selection: Selection) -> bool:
-    """Tell whether an unused remark is about a rule that was not asked."""
+    """Return whether an unused remark is about a rule that was not asked."""
     if found.code != codes.UNUSED_IGNORE.id or found.span is None:
         return False
     known = codes.find(found.span.text)
     if known is None or known.severity is Severity.ERROR:
         return False
-    return not selection.has(known.id)
+    return not selection.has(known)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:

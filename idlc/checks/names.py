@@ -14,7 +14,7 @@ def package_name(model: Model, report: Report) -> None:
     if not names.is_package_name(model.package):
         where = model.own[0].source if model.own else None
         report.add(
-            codes.PACKAGE_NAME.of(
+            codes.INVALID_PACKAGE_NAME.of(
                 where.path if where else model.package,
                 f"`{model.package}` cannot be a package name",
                 hint=names.PACKAGE_HINT,
@@ -34,7 +34,7 @@ def interface_names(model: Model, report: Report) -> None:
         else:
             hint = f"call it `{like}.{kind}`" if names.is_message_name(like) else names.MESSAGE_HINT
         report.add(
-            codes.INTERFACE_NAME.of(
+            codes.INVALID_INTERFACE_NAME.of(
                 interface.source.path if interface.source else str(interface.name),
                 f"`{name}` cannot be the name of a .{kind} file",
                 hint=hint,
@@ -84,7 +84,7 @@ def unique_modules(model: Model, report: Report) -> None:
         earlier = first.setdefault((name.kind, names.snake_case(name.name)), name)
         if earlier is not name and interface.source:
             report.add(
-                codes.SAME_MODULE.of(
+                codes.SAME_PYTHON_MODULE.of(
                     interface.source.path,
                     f"rosidl puts `{name.name}` and `{earlier.name}` into one Python module, "
                     f"`_{names.snake_case(name.name)}`, where one of them is lost",

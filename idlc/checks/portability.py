@@ -90,7 +90,7 @@ def nested_bounds(model: Model, report: Report) -> None:
             bound = element.bound if isinstance(element, ir.String) else None
             if bound is not None and element is not field.type and field.type_span:
                 report.add(
-                    codes.NESTED_BOUND.at(
+                    codes.UNENFORCED_BOUND.at(
                         field.type_span,
                         f"no middleware enforces that each text has at most {bound} characters",
                         hint="check the length in code; the bound still is part of the type hash",

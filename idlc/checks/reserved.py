@@ -53,7 +53,7 @@ def field_names(model: Model, report: Report) -> None:
             if (what := _python_clash(field, message)) is not None:
                 text = f"`{field.name}` is {what}; the Python code that rosidl generates fails"
                 hint = "rename it if colcon may ever build this package; idlc's Python copes"
-                report.add(codes.BREAKS_PYTHON.at(field.name_span, text, hint=hint))
+                report.add(codes.BREAKS_ROSIDL_PYTHON.at(field.name_span, text, hint=hint))
             if (native := _native_clash(field.name)) is not None:
                 code, text = native
                 report.add(code.at(field.name_span, text, hint=_RENAME))
@@ -95,7 +95,7 @@ def interface_names(model: Model, report: Report) -> None:
         path = interface.source.path if interface.source else str(name)
         if keyword.iskeyword(name.name):
             text = f"`{name.name}` is a Python keyword; the Python code that rosidl generates fails"
-            report.add(codes.BREAKS_PYTHON.of(path, text, hint="rename the file"))
+            report.add(codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the file"))
         if name.kind == "srv" and name.name.endswith("_Goal"):
             text = f"a service called `{name.name}` breaks the C code that rosidl generates"
             report.add(codes.BREAKS_C.of(path, text, hint="rename the file"))
@@ -106,7 +106,7 @@ def package_name(model: Model, report: Report) -> None:
     path = model.own[0].source.path if model.own and model.own[0].source else model.package
     if keyword.iskeyword(model.package):
         text = f"package `{model.package}` is a Python keyword; no import statement can name it"
-        report.add(codes.BREAKS_PYTHON.of(path, text, hint="rename the package"))
+        report.add(codes.BREAKS_ROSIDL_PYTHON.of(path, text, hint="rename the package"))
     if model.package in _CPP or model.package == "msg":
         text = f"package `{model.package}` breaks the C++ code that rosidl generates"
         report.add(codes.BREAKS_CPP.of(path, text, hint="rename the package"))
@@ -125,7 +125,7 @@ def derived_suffixes(model: Model, report: Report) -> None:
                     f"a field of type `{name}` breaks the Python and C code that rosidl generates"
                 )
                 report.add(
-                    codes.BREAKS_PYTHON.at(field.type_span, text, hint="rename that message")
+                    codes.BREAKS_ROSIDL_PYTHON.at(field.type_span, text, hint="rename that message")
                 )
             elif name.endswith("_Request"):
                 text = f"a field of type `{name}` breaks the C code that rosidl generates"

@@ -70,7 +70,7 @@ def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
         name = waiting[-1]
         message = parts[name] if name in parts else model.interfaces[name]
         assert isinstance(message, ir.Message)
-        held = _held(message)
+        held = message.references
         missing = [one for one in held if one not in found]
         if missing:
             waiting += missing
@@ -80,8 +80,3 @@ def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
             len(message.wire_fields) + sum(found[one].fields for one in held),
             1 + max((found[one].depth for one in held), default=0),
         )
-
-
-def _held(message: ir.Message) -> list[ir.TypeName]:
-    elements = (ir.element_of(field.type) for field in message.fields)
-    return [element.target for element in elements if isinstance(element, ir.Ref)]

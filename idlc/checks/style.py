@@ -104,7 +104,7 @@ def missing_units(model: Model, report: Report) -> None:
 
 
 def _says(comment: Iterable[str], unit: str) -> bool:
-    """Tell whether a comment names a unit without the brackets."""
+    """Return whether a comment names a unit without the brackets."""
     return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
 
 
@@ -134,7 +134,7 @@ def constant_prefixes(model: Model, report: Report) -> None:
             alone = firsts[first] == 1 and len(whole) > 1 and first not in names
             if alone and constant.name_span:
                 report.add(
-                    codes.CONSTANT_PREFIX.at(
+                    codes.CONSTANT_WITHOUT_PREFIX.at(
                         constant.name_span,
                         f"`{constant.name}` does not say what it is a value of",
                         hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",

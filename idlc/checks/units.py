@@ -135,7 +135,7 @@ def is_known_by(name: str, unit: str) -> bool:
 
 
 def is_unit(text: str) -> bool:
-    """Tell whether a text is a unit that one meets, of REP 103 or not."""
+    """Return whether a text is a unit that one meets, of REP 103 or not."""
     known = {*QUANTITIES.values(), *_USUAL, *_USUAL.values(), "rad/s^2", "m^2", "m^3", "T", "lx"}
     return text in known
 

@@ -43,7 +43,7 @@ def _number(value: float, element: ir.Element, span: Span) -> list[Diagnostic]:
     if not math.isfinite(value):
         message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
         hint = "use a large finite number, or set the value in code"
-        return [codes.NON_FINITE.at(span, message, hint=hint)]
+        return [codes.NON_FINITE_VALUE.at(span, message, hint=hint)]
     if element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
         message = f"`{span.text}` is beyond what a float32 holds"
         return [codes.FLOAT32_RANGE.at(span, message, hint="use float64")]
@@ -86,4 +86,4 @@ def _rest_of_line(span: Span) -> str:
 
 def _breaks_python(span: Span, what: str) -> Diagnostic:
     message = f"{what} breaks the Python code that rosidl generates"
-    return codes.BREAKS_PYTHON.at(span, message, hint="remove it, and set the value in code")
+    return codes.BREAKS_ROSIDL_PYTHON.at(span, message, hint="remove it, and set the value in code")

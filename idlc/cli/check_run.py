@@ -1,4 +1,4 @@
-"""What `idlc check` does, without the reading of its options."""
+"""The body of `idlc check`, free of click."""
 
 from __future__ import annotations
 

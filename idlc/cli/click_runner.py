@@ -1,4 +1,4 @@
-"""Running a command with its options, which click reads."""
+"""Run a command with the options that click read."""
 
 from __future__ import annotations
 

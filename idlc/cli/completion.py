@@ -7,8 +7,6 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-_KINDS = {"publisher": "msg", "subscriber": "msg", "service": "srv", "client": "srv"}
-
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer packages."""
@@ -31,11 +29,17 @@ def types_and_paths(
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
     from idlc.driver import completion
-    from idlc.model.ir import KINDS
+    from idlc.scaffold.roles import ROLES
 
-    wanted = _KINDS.get(option.name or "", "action")
-    kinds = [kind for kind in KINDS if kind == wanted]
+    kinds = [role.kind for role in ROLES if role.name == option.name and role.kind]
     return completion.types(word, _include(context), kinds, bare="own")
+
+
+def templates(_: click.Context, __: click.Parameter, word: str) -> list[str]:
+    """Offer the templates that a user can replace."""
+    from idlc.scaffold.templates import names
+
+    return [name for name in names() if name.startswith(word)]
 
 
 def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionItem[str]]:
@@ -49,7 +53,7 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
 
 def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:
     """Offer what a list of rules can go on with."""
-    from idlc.checks.select import CATEGORIES
+    from idlc.diagnostics.codes import CATEGORIES
 
     before, comma, last = word.rpartition(",")
     groups = [CompletionItem(name) for name in ("all", *CATEGORIES) if name.startswith(last)]

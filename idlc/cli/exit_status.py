@@ -61,7 +61,7 @@ def _internal(error: Exception) -> int:
         traceback.print_exception(type(error), error, error.__traceback__)
     report = Report()
     report.add(
-        codes.INTERNAL.of(
+        codes.INTERNAL_ERROR.of(
             subject,
             f"idlc failed{where}: {type(cause).__name__}: {cause}",
             hint="this is a bug in idlc, please report it; IDLC_DEBUG=1 shows where it happened",

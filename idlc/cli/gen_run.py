@@ -9,7 +9,8 @@ from idlc.diagnostics.formats.terminal import counted, summary
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
 from idlc.disk.pyproject import Config
-from idlc.driver.gen import Generated, GenOptions, gen
+from idlc.driver.gen import GenOptions, gen
+from idlc.driver.gen_result import Generated
 
 
 def completed(wanted: GenOptions, settings: Config) -> GenOptions:
@@ -43,7 +44,7 @@ def once(wanted: GenOptions, style: str) -> int:
 
 
 def _line(package: Generated, check: bool) -> str:
-    """Return what is said of a package: what it is, and what was done if that is not all of it."""
+    """Return the line about a package: what it is, and what was done if only a part was written."""
     done = []
     if check:
         done.append("up to date")

@@ -8,9 +8,10 @@ from typing import Any, TypeVar
 import click
 
 from idlc.cli import completion
+from idlc.diagnostics.formats import DOCUMENTS
 
 FORMATS = ("text", "json")
-REPORT_FORMATS = (*FORMATS, "github", "sarif", "junit", "gitlab")
+REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -110,12 +111,12 @@ def report_style(command: Command) -> Command:
 
 def check_rules(*lists: str | None) -> None:
     """Refuse lists of rules that name one that there is not."""
-    from idlc.checks.select import CATEGORIES, is_selector
+    from idlc.checks.select import is_selector
 
     for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
-                from idlc.diagnostics.codes import CODES
+                from idlc.diagnostics.codes import CATEGORIES, CODES
                 from idlc.diagnostics.suggest import did_you_mean
 
                 hint = did_you_mean(word, (*CATEGORIES, *(one.slug for one in CODES.values())))

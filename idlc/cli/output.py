@@ -12,7 +12,7 @@ from idlc.diagnostics.visible import one_line
 
 
 def colours(stream: TextIO) -> bool:
-    """Whether to colour what goes to a stream: on a terminal, unless the user says otherwise."""
+    """Return whether to colour a stream: if it is a terminal, unless the user says otherwise."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from idlc import __version__
 from idlc.cli import output
+from idlc.diagnostics.formats import Run, document
 from idlc.diagnostics.formats.terminal import MANY, counted, statistics, summary
 from idlc.diagnostics.report import Report
 
@@ -45,19 +46,5 @@ def write(
             facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
             facts |= {"distros": list(checked.distros)} if checked.distros else {}
             output.fact(stream, "summary", **output.counts(report), **facts)
-        case "github":
-            from idlc.diagnostics.formats import github
-
-            stream.writelines(github.lines(report))
-        case "sarif":
-            from idlc.diagnostics.formats import sarif
-
-            stream.write(sarif.document(report, __version__, command))
-        case "junit":
-            from idlc.diagnostics.formats import junit
-
-            stream.write(junit.document(report, files))
-        case "gitlab":
-            from idlc.diagnostics.formats import gitlab
-
-            stream.write(gitlab.document(report))
+        case _:
+            stream.write(document(style, report, Run(command, __version__, files)))

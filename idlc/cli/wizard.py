@@ -7,40 +7,39 @@ from typing import TypeVar
 
 import click
 
-from idlc.scaffold import spec
+from idlc.model import ir
+from idlc.scaffold import qos, spec
+from idlc.scaffold.roles import ROLES
+from idlc.scaffold.roles.role import Endpoint, Role
 
-_KINDS: dict[str, tuple[spec.Role, str]] = {
-    "publish": ("publisher", "Message, such as std_msgs/String"),
-    "subscribe": ("subscriber", "Message, such as std_msgs/String"),
-    "serve": ("service", "Service, such as std_srvs/SetBool"),
-    "call": ("client", "Service, such as std_srvs/SetBool"),
-    "act": ("action_server", "Action, such as Countdown"),
-    "send goals": ("action_client", "Action, such as Countdown"),
-}
-_NAMES = {"msg": "Topic", "srv": "Name of the service", "action": "Name of the action"}
 DONE = "done"
+PARAMETER = "parameter"
+#: For each kind of interface: the question for the type, and that for the name.
+_QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
+    "msg": ("Message type, such as std_msgs/String", "Topic"),
+    "srv": ("Service type, such as std_srvs/SetBool", "Service name"),
+    "action": ("Action type, such as Countdown", "Action name"),
+}
 
 Answer = TypeVar("Answer")
 #: Raises ValueError for an interface that there is not.
-CheckType = Callable[[spec.Role, str], None]
+CheckType = Callable[[Role, str], None]
 
 
 def ask(name: str, check_type: CheckType) -> spec.Node:
     """Return the node that the answers describe; every wrong answer is asked for again at once."""
-    click.echo(f"What is {name} to do?")
-    choices = click.Choice([*_KINDS, "timer", "parameter", DONE])
-    endpoints: list[spec.Endpoint] = []
-    timers: list[float] = []
+    click.echo(f"What should {name} do?")
+    roles = {role.answer: role for role in ROLES}
+    choices = click.Choice([*roles, PARAMETER, DONE])
+    endpoints: list[Endpoint] = []
     parameters: list[spec.Parameter] = []
-    while (chosen := click.prompt("It is to", type=choices, default=DONE)) != DONE:
-        if chosen == "timer":
-            timers.append(_answer("Every how many seconds", spec.period, "1.0"))
-        elif chosen == "parameter":
-            parameters.append(_answer("NAME:TYPE=DEFAULT", spec.parameter))
+    while (chosen := click.prompt(f"Add ({DONE} to finish)", type=choices, default=DONE)) != DONE:
+        if chosen == PARAMETER:
+            parameters.append(_answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter))
         else:
-            endpoints.append(_endpoint(*_KINDS[chosen], check_type))
-    lifecycle = click.confirm("Is it a lifecycle node", default=False)
-    return spec.Node(name, "", tuple(endpoints), tuple(timers), tuple(parameters), lifecycle)
+            endpoints.append(_endpoint(roles[chosen], check_type))
+    lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
+    return spec.Node(name, "", spec.in_order(endpoints), tuple(parameters), lifecycle)
 
 
 def _answer(
@@ -58,21 +57,29 @@ def _answer(
     return answer
 
 
-def _endpoint(role: spec.Role, question: str, check_type: CheckType) -> spec.Endpoint:
+def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
+    """Ask for what the value of the role's option says."""
+
     def known(text: str) -> str:
         check_type(role, text)
         return text
 
-    type_ = _answer(question, known)
-    endpoint = _answer(
-        _NAMES[spec.ROLES[role]], lambda name: spec.endpoint(role, f"{type_}:{name}")
+    def checked(value: str) -> str:
+        spec.endpoint(role, value)
+        return value
+
+    value = ""
+    if role.kind:
+        type_question, name_question = _QUESTIONS[role.kind]
+        type_ = _answer(type_question, known)
+        value = _answer(name_question, lambda name: checked(f"{type_}:{name}"))
+    question = role.question
+    if question and not (question.separator and question.separator in value):
+        head = f"{value}{question.separator}"
+        value = _answer(question.text, lambda answer: checked(f"{head}{answer}"), question.default)
+    if role.kind != "msg":
+        return spec.endpoint(role, value)
+    preset = click.prompt(
+        "Quality of service", type=click.Choice(qos.NAMES), default=qos.DEFAULT.name
     )
-    if role == "publisher" and endpoint.rate is None:
-        text = f"{type_}:{endpoint.topic}"
-        endpoint = _answer(
-            "How often a second", lambda rate: spec.endpoint(role, f"{text}@{rate}"), "1"
-        )
-    if spec.ROLES[role] == "msg":
-        qos = click.prompt("Quality of service", type=click.Choice(spec.QOS), default=spec.QOS[0])
-        endpoint = endpoint._replace(qos=qos)
-    return endpoint
+    return spec.endpoint(role, value, preset)

@@ -1,7 +1,6 @@
-"""Every code that idlc can report: stable, never renumbered, never reused.
+"""Every code that idlc can report, with all its facts: stable, never renumbered, never reused.
 
-1xx syntax, 2xx names and references, 3xx types, bounds and values, 4xx advice, 5xx breaking
-changes, 6xx files and projects, 9xx idlc itself. `explain/<id>.md` holds each one's page.
+A code's constant is called like its slug, and `explain/<id>.md` is its page.
 """
 
 from __future__ import annotations
@@ -14,13 +13,35 @@ from idlc.diagnostics.source import Span
 ERROR = Severity.ERROR
 WARNING = Severity.WARNING
 
+CORRECTNESS = "correctness"
+PORTABILITY = "portability"
+STYLE = "style"
+PACKAGE = "package"
+#: By which users choose warnings.
+CATEGORIES = (CORRECTNESS, PORTABILITY, STYLE, PACKAGE)
+
 
 class Code(msgspec.Struct, frozen=True):
-    """A kind of problem: its stable id, its short name and how bad it is."""
+    """A kind of problem: its stable id, its short name, how bad it is and who asks for it.
+
+    `default` is whether `idlc check` shows it unless told otherwise: off is what asks how much a
+    team writes and what it calls things, and what works as well as its alternative.
+    `usage` is whether it blames the call or its surroundings, not an interface: exit status 2.
+    """
 
     id: str
     slug: str
     severity: Severity
+    category: str = CORRECTNESS
+    default: bool = True
+    usage: bool = False
+
+    @property
+    def kind(self) -> str:
+        """How bad it is and who asks for it, in words."""
+        if self.severity is ERROR:
+            return "error"
+        return f"warning, {self.category}{'' if self.default else ', off by default'}"
 
     def at(
         self, span: Span, message: str, *, hint: str | None = None, labels: tuple[Label, ...] = ()
@@ -67,20 +88,20 @@ REPEATED_OPTIONAL = Code("IDL113", "repeated-optional", ERROR)
 # names and references
 UNKNOWN_TYPE = Code("IDL201", "unknown-type", ERROR)
 UNKNOWN_PACKAGE = Code("IDL202", "unknown-package", ERROR)
-FIELD_NAME = Code("IDL203", "invalid-field-name", ERROR)
-CONSTANT_NAME = Code("IDL204", "invalid-constant-name", ERROR)
-TYPE_NAME = Code("IDL205", "invalid-type-name", ERROR)
-INTERFACE_NAME = Code("IDL206", "invalid-interface-name", ERROR)
-PACKAGE_NAME = Code("IDL207", "invalid-package-name", ERROR)
+INVALID_FIELD_NAME = Code("IDL203", "invalid-field-name", ERROR)
+INVALID_CONSTANT_NAME = Code("IDL204", "invalid-constant-name", ERROR)
+INVALID_TYPE_NAME = Code("IDL205", "invalid-type-name", ERROR)
+INVALID_INTERFACE_NAME = Code("IDL206", "invalid-interface-name", ERROR)
+INVALID_PACKAGE_NAME = Code("IDL207", "invalid-package-name", ERROR)
 DUPLICATE_FIELD = Code("IDL208", "duplicate-field", ERROR)
 DUPLICATE_CONSTANT = Code("IDL209", "duplicate-constant", ERROR)
 RECURSIVE_TYPE = Code("IDL210", "recursive-type", ERROR)
 ROS1_TYPE = Code("IDL211", "ros1-type", ERROR)
 PACKAGE_CIRCLE = Code("IDL212", "package-circle", ERROR)
-BREAKS_PYTHON = Code("IDL220", "breaks-rosidl-python", WARNING)
-BREAKS_C = Code("IDL221", "breaks-c", WARNING)
-BREAKS_CPP = Code("IDL222", "breaks-cpp", WARNING)
-SAME_MODULE = Code("IDL223", "same-python-module", WARNING)
+BREAKS_ROSIDL_PYTHON = Code("IDL220", "breaks-rosidl-python", WARNING, PORTABILITY)
+BREAKS_C = Code("IDL221", "breaks-c", WARNING, PORTABILITY)
+BREAKS_CPP = Code("IDL222", "breaks-cpp", WARNING, PORTABILITY)
+SAME_PYTHON_MODULE = Code("IDL223", "same-python-module", WARNING, PORTABILITY)
 
 # types, bounds and values
 BAD_BOUND = Code("IDL301", "bad-bound", ERROR)
@@ -89,47 +110,47 @@ CONSTANT_TYPE = Code("IDL303", "constant-type", ERROR)
 BAD_VALUE = Code("IDL304", "bad-value", ERROR)
 OUT_OF_RANGE = Code("IDL305", "out-of-range", ERROR)
 STRING_TOO_LONG = Code("IDL306", "string-too-long", ERROR)
-MESSAGE_DEFAULT = Code("IDL307", "default-on-message", ERROR)
+DEFAULT_ON_MESSAGE = Code("IDL307", "default-on-message", ERROR)
 ARRAY_VALUE = Code("IDL308", "array-value", ERROR)
 ARRAY_LENGTH = Code("IDL309", "array-length", ERROR)
-NON_FINITE = Code("IDL310", "non-finite-value", WARNING)
+NON_FINITE_VALUE = Code("IDL310", "non-finite-value", WARNING)
 MANGLED_TEXT = Code("IDL311", "mangled-text", WARNING)
-WSTRING_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
-CONSTANT_MOVED = Code("IDL313", "repeated-section-constant", WARNING)
+WSTRING_SEQUENCE_BOUND = Code("IDL312", "wstring-sequence-bound", WARNING)
+REPEATED_SECTION_CONSTANT = Code("IDL313", "repeated-section-constant", WARNING)
 FLOAT32_RANGE = Code("IDL314", "float32-range", WARNING)
 ODD_TEXT = Code("IDL315", "odd-text", WARNING)
 
 # style
-STAMPED_WITHOUT_HEADER = Code("IDL401", "stamped-without-header", WARNING)
-UNDOCUMENTED_INTERFACE = Code("IDL402", "undocumented-interface", WARNING)
-UNDOCUMENTED_FIELD = Code("IDL403", "undocumented-field", WARNING)
-MISSING_UNIT = Code("IDL404", "missing-unit", WARNING)
-UNUSUAL_UNIT = Code("IDL405", "unusual-unit", WARNING)
-CONSTANT_PREFIX = Code("IDL406", "constant-without-prefix", WARNING)
-REDUNDANT_SUFFIX = Code("IDL407", "redundant-suffix", WARNING)
+STAMPED_WITHOUT_HEADER = Code("IDL401", "stamped-without-header", WARNING, STYLE)
+UNDOCUMENTED_INTERFACE = Code("IDL402", "undocumented-interface", WARNING, STYLE, default=False)
+UNDOCUMENTED_FIELD = Code("IDL403", "undocumented-field", WARNING, STYLE, default=False)
+MISSING_UNIT = Code("IDL404", "missing-unit", WARNING, STYLE, default=False)
+UNUSUAL_UNIT = Code("IDL405", "unusual-unit", WARNING, STYLE)
+CONSTANT_WITHOUT_PREFIX = Code("IDL406", "constant-without-prefix", WARNING, STYLE, default=False)
+REDUNDANT_SUFFIX = Code("IDL407", "redundant-suffix", WARNING, STYLE, default=False)
 
 # surprises of ROS 2's pipeline
 SEVERAL_UNITS = Code("IDL411", "several-units", WARNING)
 
 # portability
-WIDE_STRING = Code("IDL421", "wide-string", WARNING)
-CHAR_TYPE = Code("IDL422", "char-type", WARNING)
-NESTED_BOUND = Code("IDL423", "unenforced-bound", WARNING)
-REMOVED_STANDARD_TYPE = Code("IDL424", "removed-standard-type", WARNING)
-CHANGED_STANDARD_TYPE = Code("IDL425", "changed-standard-type", WARNING)
+WIDE_STRING = Code("IDL421", "wide-string", WARNING, PORTABILITY)
+CHAR_TYPE = Code("IDL422", "char-type", WARNING, PORTABILITY, default=False)
+UNENFORCED_BOUND = Code("IDL423", "unenforced-bound", WARNING, PORTABILITY)
+REMOVED_STANDARD_TYPE = Code("IDL424", "removed-standard-type", WARNING, PORTABILITY)
+CHANGED_STANDARD_TYPE = Code("IDL425", "changed-standard-type", WARNING, PORTABILITY)
 
 # the package around the interfaces
-MISSING_DEPENDENCY = Code("IDL451", "missing-dependency", WARNING)
-UNUSED_DEPENDENCY = Code("IDL452", "unused-dependency", WARNING)
-NO_INTERFACE_GROUP = Code("IDL453", "not-in-interface-group", WARNING)
-NO_GENERATORS = Code("IDL454", "no-interface-generators", WARNING)
-NOT_INSTALLED = Code("IDL455", "interfaces-not-installed", WARNING)
-NO_RESOURCE_MARKER = Code("IDL456", "no-resource-marker", WARNING)
-BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING)
-NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING)
-UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING)
-STALE_OUTPUT = Code("IDL460", "stale-generated-code", WARNING)
-NO_LIBRARY = Code("IDL461", "no-library-installed", WARNING)
+MISSING_DEPENDENCY = Code("IDL451", "missing-dependency", WARNING, PACKAGE)
+UNUSED_DEPENDENCY = Code("IDL452", "unused-dependency", WARNING, PACKAGE)
+NOT_IN_INTERFACE_GROUP = Code("IDL453", "not-in-interface-group", WARNING, PACKAGE)
+NO_INTERFACE_GENERATORS = Code("IDL454", "no-interface-generators", WARNING, PACKAGE)
+INTERFACES_NOT_INSTALLED = Code("IDL455", "interfaces-not-installed", WARNING, PACKAGE)
+NO_RESOURCE_MARKER = Code("IDL456", "no-resource-marker", WARNING, PACKAGE)
+BAD_ENTRY_POINT = Code("IDL457", "bad-entry-point", WARNING, PACKAGE)
+NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING, PACKAGE)
+UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING, PACKAGE)
+STALE_GENERATED_CODE = Code("IDL460", "stale-generated-code", WARNING, PACKAGE)
+NO_LIBRARY_INSTALLED = Code("IDL461", "no-library-installed", WARNING, PACKAGE)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)
@@ -142,15 +163,15 @@ FIELD_REMOVED = Code("IDL503", "field-removed", ERROR)
 FIELD_RENAMED = Code("IDL504", "field-renamed", ERROR)
 FIELD_ADDED = Code("IDL505", "field-added", ERROR)
 FIELD_MOVED = Code("IDL506", "field-moved", ERROR)
-FIELD_TYPE = Code("IDL507", "field-type-changed", ERROR)
-FIELD_BOUND = Code("IDL508", "field-bound-changed", ERROR)
-FIELD_DEFAULT = Code("IDL509", "field-default-changed", ERROR)
+FIELD_TYPE_CHANGED = Code("IDL507", "field-type-changed", ERROR)
+FIELD_BOUND_CHANGED = Code("IDL508", "field-bound-changed", ERROR)
+FIELD_DEFAULT_CHANGED = Code("IDL509", "field-default-changed", ERROR)
 CONSTANT_REMOVED = Code("IDL510", "constant-removed", ERROR)
 CONSTANT_RENAMED = Code("IDL511", "constant-renamed", ERROR)
-CONSTANT_RETYPED = Code("IDL512", "constant-type-changed", ERROR)
-CONSTANT_VALUE = Code("IDL513", "constant-value-changed", ERROR)
+CONSTANT_TYPE_CHANGED = Code("IDL512", "constant-type-changed", ERROR)
+CONSTANT_VALUE_CHANGED = Code("IDL513", "constant-value-changed", ERROR)
 UNIT_CHANGED = Code("IDL514", "unit-changed", ERROR)
-USED_TYPE = Code("IDL515", "used-type-changed", ERROR)
+USED_TYPE_CHANGED = Code("IDL515", "used-type-changed", ERROR)
 HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
@@ -160,64 +181,45 @@ SEVERAL_TYPES = Code("IDL531", "several-types", ERROR)
 
 # files and projects
 UNREADABLE = Code("IDL601", "unreadable", ERROR)
-NO_SUCH_PATH = Code("IDL602", "no-such-path", ERROR)
+NO_SUCH_PATH = Code("IDL602", "no-such-path", ERROR, usage=True)
 NOT_TEXT = Code("IDL603", "not-text", ERROR)
 TOO_LARGE = Code("IDL604", "too-large", ERROR)
-NOT_AN_INTERFACE = Code("IDL605", "not-an-interface", ERROR)
-NO_INTERFACES = Code("IDL606", "no-interfaces", ERROR)
-UNIMPORTABLE = Code("IDL607", "unimportable-package", ERROR)
-SEVERAL_PACKAGES = Code("IDL608", "several-packages", ERROR)
+NOT_AN_INTERFACE = Code("IDL605", "not-an-interface", ERROR, usage=True)
+NO_INTERFACES = Code("IDL606", "no-interfaces", ERROR, usage=True)
+UNIMPORTABLE_PACKAGE = Code("IDL607", "unimportable-package", ERROR, usage=True)
+SEVERAL_PACKAGES = Code("IDL608", "several-packages", ERROR, usage=True)
 DUPLICATE_INTERFACE = Code("IDL609", "duplicate-interface", ERROR)
-BAD_PACKAGE_XML = Code("IDL610", "bad-package-xml", ERROR)
-BAD_CONFIG = Code("IDL611", "bad-config", ERROR)
-CANNOT_WRITE = Code("IDL612", "cannot-write", ERROR)
+BAD_PACKAGE_XML = Code("IDL610", "bad-package-xml", ERROR, usage=True)
+BAD_CONFIG = Code("IDL611", "bad-config", ERROR, usage=True)
+CANNOT_WRITE = Code("IDL612", "cannot-write", ERROR, usage=True)
 EDITED_FILE = Code("IDL613", "edited-file", ERROR)
 FOREIGN_FILE = Code("IDL614", "foreign-file", ERROR)
-BAD_LOCK = Code("IDL615", "bad-lock", ERROR)
+BAD_LOCK = Code("IDL615", "bad-lock", ERROR, usage=True)
 DRIFT = Code("IDL616", "drift", ERROR)
-NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING)
-NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR)
-STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR)
+DEPENDENCY_NOT_IMPORTABLE = Code("IDL617", "dependency-not-importable", WARNING, PACKAGE)
+NO_SUCH_TYPE = Code("IDL618", "no-such-type", ERROR, usage=True)
+STRUCTURE_TOO_LARGE = Code("IDL619", "structure-too-large", ERROR, usage=True)
 EXISTING_FILE = Code("IDL620", "existing-file", ERROR)
 CANNOT_EDIT = Code("IDL621", "cannot-edit", ERROR)
 UNREAD_FILE = Code("IDL622", "unread-file", WARNING)
-NO_TYPE_HASHES = Code("IDL623", "no-type-hashes", ERROR)
-NO_REVISION = Code("IDL630", "no-such-revision", ERROR)
-DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR)
+BROKEN_TEMPLATE = Code("IDL623", "broken-template", ERROR, usage=True)
+NO_TYPE_HASHES = Code("IDL624", "no-type-hashes", ERROR, usage=True)
+NO_SUCH_REVISION = Code("IDL630", "no-such-revision", ERROR, usage=True)
+DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR, usage=True)
 UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
-NO_RCLPY = Code("IDL640", "no-rclpy", ERROR)
-EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR)
+NO_RCLPY = Code("IDL640", "no-rclpy", ERROR, usage=True)
+EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR, usage=True)
 
 # idlc itself
-INTERNAL = Code("IDL901", "internal-error", ERROR)
-
-#: Codes that blame the call or its surroundings rather than an interface file: exit status 2.
-USAGE: frozenset[str] = frozenset(
-    code.id
-    for code in (
-        NO_SUCH_PATH,
-        NOT_AN_INTERFACE,
-        NO_INTERFACES,
-        UNIMPORTABLE,
-        SEVERAL_PACKAGES,
-        BAD_PACKAGE_XML,
-        BAD_CONFIG,
-        CANNOT_WRITE,
-        BAD_LOCK,
-        NO_SUCH_TYPE,
-        STRUCTURE_TOO_LARGE,
-        NO_TYPE_HASHES,
-        NO_REVISION,
-        DUPLICATE_PACKAGE,
-        NO_RCLPY,
-        EMPTY_GRAPH,
-    )
-)
+INTERNAL_ERROR = Code("IDL901", "internal-error", ERROR)
 
 #: All codes by id.
 CODES: dict[str, Code] = {
     code.id: code for code in tuple(globals().values()) if isinstance(code, Code)
 }
+
+#: Ids of the codes that mean exit status 2.
+USAGE = frozenset(code.id for code in CODES.values() if code.usage)
 
 _BY_WORD = {
     word: code for code in CODES.values() for word in (code.id.lower(), code.id[3:], code.slug)

@@ -64,7 +64,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def breaks(self) -> str:
-        """What it breaks, in words, such as `breaks: wire, hash`; empty if that is not said."""
+        """What it breaks, in words, such as `breaks: wire, hash`; empty if it does not say."""
         return f"breaks: {', '.join(self.levels)}" if self.levels else ""
 
     @property

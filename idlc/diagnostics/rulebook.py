@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections.abc import Iterator
 from itertools import groupby
+from operator import attrgetter
 
 from idlc.diagnostics.code_pages import page
-from idlc.diagnostics.codes import CODES
-from idlc.diagnostics.report import Severity
+from idlc.diagnostics.codes import CATEGORIES, CODES, Code
 
-_GROUPS = {
-    "1": "Syntax",
-    "2": "Names and references",
-    "3": "Types, bounds and values",
-    "40": "Style",
-    "41": "Surprises of ROS 2's pipeline",
-    "42": "Portability",
-    "45": "The package around",
-    "49": "Remarks that silence others",
-    "5": "Breaking changes",
-    "6": "Files and projects",
-    "9": "idlc itself",
+#: Headings of the list of codes, each from its number on.
+_HEADINGS = {
+    100: "Syntax",
+    200: "Names and references",
+    300: "Types, bounds and values",
+    400: "Style",
+    410: "Surprises of ROS 2's pipeline",
+    420: "Portability",
+    450: "The package around",
+    490: "Remarks that silence others",
+    500: "Breaking changes",
+    600: "Files and projects",
+    900: "idlc itself",
 }
 
-_HEAD = """\
+_HEAD = f"""\
 # Rules
 
 What idlc can say, and what to do about it. This file is what `idlc explain --all` prints.
@@ -40,7 +42,7 @@ ignore = ["wide-string"]
 "msg/legacy/*" = ["style"]
 ```
 
-The categories are correctness, portability, style and package. In a file,
+The categories are {", ".join(CATEGORIES[:-1])} and {CATEGORIES[-1]}. In a file,
 `# idlc: ignore[IDL405] why` silences one warning: after a definition on that line, on a line of
 its own for the next definition, at the head for the whole file. The reason is mandatory. Beside a
 unit write `ignore(IDL405)`, because ROS 2 takes text in square brackets for the unit.
@@ -54,30 +56,33 @@ def document() -> str:
 
 def _parts() -> Iterator[str]:
     yield _HEAD
-    for group, ids in groupby(sorted(CODES), _group):
-        yield f"## {group}\n"
-        yield from map(_section, ids)
+    for heading, codes in _by_heading():
+        yield f"## {heading}\n"
+        yield from map(_section, codes)
 
 
 def overview() -> Iterator[str]:
     """Yield the lines of a list of all codes, by group."""
     width = max(len(code.slug) for code in CODES.values())
-    for group, ids in groupby(sorted(CODES), _group):
-        yield f"{group}"
-        for code in map(CODES.__getitem__, ids):
-            yield f"  {code.id}  {code.slug:{width}}  {code.severity.name.lower()}"
+    for heading, codes in _by_heading():
+        yield heading
+        yield from (f"  {code.id}  {code.slug:{width}}  {code.kind}" for code in codes)
         yield ""
     yield "`idlc explain IDL201` or `idlc explain unknown-type` shows a page."
 
 
-def _group(code: str) -> str:
-    digits = code.removeprefix("IDL")
-    return _GROUPS.get(digits[:2]) or _GROUPS.get(digits[:1]) or _GROUPS["45"]
+def _by_heading() -> Iterator[tuple[str, Iterator[Code]]]:
+    codes = sorted(CODES.values(), key=attrgetter("id"))
+    return groupby(codes, _heading)
 
 
-def _section(code: str) -> str:
+def _heading(code: Code) -> str:
+    starts = [*_HEADINGS]
+    return _HEADINGS[starts[bisect(starts, int(code.id[3:])) - 1]]
+
+
+def _section(code: Code) -> str:
     """Return a page with its headings two levels down, and how bad it is."""
-    kind = "error" if CODES[code].severity is Severity.ERROR else "warning"
-    title, _, body = (page(code) or f"# {code} {CODES[code].slug}\n").partition("\n")
+    title, _, body = (page(code.id) or f"# {code.id} {code.slug}\n").partition("\n")
     body = re.sub(r"(?m)^## (.*)$", r"**\1**", body)
-    return f"##{title} ({kind})\n{body}"
+    return f"##{title} ({code.kind})\n{body}"

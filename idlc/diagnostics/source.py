@@ -40,7 +40,7 @@ class Source:
         return line, offset - self.line_starts[line - 1] + 1
 
     def line_starts_after(self, offset: int) -> int:
-        """Return where the line behind the one at `offset` starts; the text's end at the last."""
+        """Return where the line after the one at `offset` starts; the text's end at the last."""
         line = bisect_right(self.line_starts, offset)
         return self.line_starts[line] if line < len(self.line_starts) else len(self.text)
 

@@ -1,4 +1,4 @@
-"""Which package files belong to: the nearest package.xml, and the name in it."""
+"""Which package files belong to: the nearest package.xml, and what it says."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import contextlib
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.parsers import expat
 
+from idlc.checks.package import package_xml
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
-from idlc.disk.read import is_file, is_folder, read_bytes
+from idlc.disk.read import is_file, is_folder, read_bytes, read_source
 
 if TYPE_CHECKING:
+    from idlc.checks.package.facts import Statement
     from idlc.diagnostics.report import Diagnostic
 
 MANIFEST = "package.xml"
@@ -32,7 +33,7 @@ def manifest(folder: Path) -> Path | None:
 
 
 def _is_repository(folder: Path) -> bool:
-    """Whether a folder is the top of a git repository, of a submodule or a worktree too."""
+    """Return whether a folder is the top of a git repository, of a submodule or a worktree too."""
     return is_folder(folder / ".git") or is_file(folder / ".git")
 
 
@@ -42,8 +43,8 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
     if data is None:
         return None
     try:
-        declared = _text_of(data, "name")
-    except (expat.ExpatError, ValueError, LookupError) as error:  # an unknown encoding
+        declared = next(iter(package_xml.read(data).texts("name")), "")
+    except package_xml.NotXmlError as error:
         report.add(_broken(data, name, error))
         return None
     if not declared:
@@ -61,43 +62,23 @@ def declared_name(path: Path, name: str, report: Report) -> str | None:
 def declared_version(path: Path) -> str:
     """Return the version in a package.xml; empty if it has none or cannot be read."""
     data = read_bytes(path, path.as_posix(), Report())
-    with contextlib.suppress(expat.ExpatError, ValueError, LookupError):
-        return _text_of(data or b"", "version")
+    with contextlib.suppress(package_xml.NotXmlError):
+        return next(iter(package_xml.read(data or b"").texts("version")), "")
     return ""
 
 
-def _text_of(data: bytes, tag: str) -> str:
-    """Return the text of an element right below the root of a package.xml."""
-    found: list[str] = []
-    stack: list[str] = []
-    parser = expat.ParserCreate()
-    parser.buffer_text = True
-
-    def start(name: str, _: dict[str, str]) -> None:
-        stack.append(name)
-
-    def end(_: str) -> None:
-        stack.pop()
-
-    def text(content: str) -> None:
-        if stack == ["package", tag]:
-            found.append(content)
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = text
-    parser.Parse(data, True)
-    return "".join(found).strip()
-
-
-def _broken(
-    data: bytes, name: str, error: expat.ExpatError | ValueError | LookupError
-) -> Diagnostic:
-    message = f"not well-formed XML: {str(error).partition(':')[0]}"
+def _broken(data: bytes, name: str, error: package_xml.NotXmlError) -> Diagnostic:
+    message = f"not well-formed XML: {error}"
     hint = "fix the file, or give --package NAME"
-    if not isinstance(error, expat.ExpatError):
+    if not error.line:
         return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
     source = Source(name, data.decode("utf-8", errors="replace"))
-    line = min(error.lineno, len(source.line_starts))
-    start = min(source.line_starts[line - 1] + error.offset, len(source.text))
+    line = min(error.line, len(source.line_starts))
+    start = min(source.line_starts[line - 1] + error.column, len(source.text))
     return codes.BAD_PACKAGE_XML.at(Span(source, start, start + 1), message, hint=hint)
+
+
+def statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
+    """Return what a package.xml says, in order; empty for a file that cannot be read as XML."""
+    source = read_source(path, name, report)
+    return () if source is None else package_xml.statements(source)

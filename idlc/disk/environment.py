@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -40,4 +39,8 @@ def python_folders(package: str) -> list[Path]:
 def machine() -> str:
     """Return the processor that programs here are for, such as `x86_64`; empty if not on Linux."""
     whole = sys.maxsize > 1 << 32  # a 32-bit Python on a 64-bit kernel
-    return platform.machine() if sys.platform == "linux" and whole else ""
+    if sys.platform != "linux" or not whole:
+        return ""
+    import platform  # slow to import, for what few runs ask
+
+    return platform.machine()

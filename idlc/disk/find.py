@@ -55,7 +55,7 @@ class InterfaceFile(msgspec.Struct, frozen=True):
 
 
 def is_path(text: str) -> bool:
-    """Whether a word on the command line means a path rather than a type or package."""
+    """Return whether a word on the command line means a path rather than a type or package."""
     named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
     return not named or os.path.lexists(text)
 

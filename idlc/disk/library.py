@@ -50,12 +50,12 @@ class Folder:
         """Every package at any depth, by name; made only when the direct look-up fails."""
         from idlc.diagnostics.report import Report
 
-        unheard = Report()
+        ignored = Report()
         found: dict[str, list[Path]] = {}
-        files = (path for path in walk(self._path, unheard) if path.suffix in KINDS)
+        files = (path for path in walk(self._path, ignored) if path.suffix in KINDS)
         for root in sorted({root_of(str(file.parent)) for file in files}):
             declared = manifest(root)
-            name = declared_name(declared, "", unheard) if declared else None
+            name = declared_name(declared, "", ignored) if declared else None
             found.setdefault(name or root.name, []).append(root)
         return found
 

@@ -34,10 +34,10 @@ def names() -> list[str]:
 
 
 def _packages(paths: Sequence[str]) -> dict[str, tuple[Path, ...]]:
-    """Return folders by package; what is wrong with files is said when they are compiled."""
-    unheard = Report()
-    where = scope(pyproject.load(unheard))
+    """Return folders by package; problems of files are reported when they are compiled."""
+    ignored = Report()
+    where = scope(pyproject.load(ignored))
     found: dict[str, tuple[Path, ...]] = {}
-    for one in inputs.packages(find(paths, unheard, where.exclude), where, unheard):
+    for one in inputs.packages(find(paths, ignored, where.exclude), where, ignored):
         found.setdefault(one.package, one.folders)
     return found

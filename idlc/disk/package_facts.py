@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idlc.checks.package.facts import Facts, Output
+from idlc.checks.package.package_xml import statements
 from idlc.diagnostics.report import Report
 from idlc.disk.enclosing_package import manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.inputs import Inputs
-from idlc.disk.manifest_statements import read_statements
 from idlc.disk.output import lock_file
 from idlc.disk.read import decode, read_bytes, read_source, shown
 
@@ -38,21 +38,13 @@ def facts(
     `known` tells the names of ROS packages; it is asked only for a package with Python code.
     """
     path = manifest(next(iter(given.folders), given.home))
-    unheard = Report()
-    source = read_source(path, shown(path), unheard) if path else None
-    if path is None or source is None or not (said := read_statements(source)):
+    source = read_source(path, shown(path), Report()) if path else None
+    if path is None or source is None or not (said := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))
-    locks = [file for file in files if file.name == lock_file.FILE]
-    generated = {
-        file.parent / path
-        for file in locks
-        if (known_lock := lock_file.load(file.parent, "", Report()))
-        for path in known_lock.outputs
-    }
-    cmake = folder / "CMakeLists.txt"
-    makes = read_bytes(cmake, "", unheard) if cmake.is_file() else None
+    locks = _locks(files)
+    generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
     modules = dict(_modules(folder, files, generated))
     return Facts(
         name=given.package,
@@ -62,20 +54,32 @@ def facts(
         modules=modules,
         setup_py=_optional(folder / "setup.py"),
         setup_cfg=_optional(folder / "setup.cfg"),
-        generates=_generates(makes or b""),
+        generates=_generates(folder / "CMakeLists.txt"),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=bool(given.files)
-        and {one.file.path.resolve() for one in given.files}
-        >= {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)},
+        whole=_whole(given, files, exclude),
         marker=(folder / "resource" / given.package).is_file(),
-        outputs=tuple(filter(None, map(_output, locks))),
+        outputs=tuple(Output(shown(at), one.package, one.inputs) for at, one in locks.items()),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
     )
 
 
-def _generates(cmake: bytes) -> bool:
+def _locks(files: Iterable[Path]) -> dict[Path, lock_file.Lock]:
+    """Return the records of generated code that can be read, by their files."""
+    found = [file for file in files if file.name == lock_file.FILE]
+    loaded = ((file, lock_file.load(file.parent, "", Report())) for file in found)
+    return {file: lock for file, lock in loaded if lock}
+
+
+def _whole(given: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
+    """Return whether a package has no interface files but those given."""
+    there = {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)}
+    return bool(given.files) and there <= {one.file.path.resolve() for one in given.files}
+
+
+def _generates(cmake: Path) -> bool:
     """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    code = re.sub(rb"#[^\n]*", b"", cmake)
+    data = read_bytes(cmake, "", Report()) if cmake.is_file() else None
+    code = re.sub(rb"#[^\n]*", b"", data or b"")
     calls = re.findall(rb"rosidl_generate_interfaces\s*\(([^()]*)", code)
     return any(b"SKIP_INSTALL" not in call.split() for call in calls)
 
@@ -118,11 +122,6 @@ def _modules(
 
 def _optional(path: Path) -> Source | None:
     """Return a file's text, `None` if it is not there or no text, which others complain about."""
-    unheard = Report()
-    data = read_bytes(path, shown(path), unheard) if path.is_file() else None
-    return None if data is None else decode(data, shown(path), unheard)
-
-
-def _output(path: Path) -> Output | None:
-    known = lock_file.load(path.parent, "", Report())
-    return Output(shown(path), known.package, known.inputs) if known else None
+    ignored = Report()
+    data = read_bytes(path, shown(path), ignored) if path.is_file() else None
+    return None if data is None else decode(data, shown(path), ignored)

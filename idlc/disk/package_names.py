@@ -99,5 +99,5 @@ def accept_name(name: str, origin: str, report: Report) -> bool:
     if not what:
         return True
     hint = "choose another name with --package NAME"
-    report.add(codes.UNIMPORTABLE.of("", f"`{name}` (from {origin}) {what}", hint=hint))
+    report.add(codes.UNIMPORTABLE_PACKAGE.of("", f"`{name}` (from {origin}) {what}", hint=hint))
     return False

@@ -17,8 +17,8 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source, Span
-from idlc.diagnostics.suggest import did_you_mean
 from idlc.disk.read import decode, is_file, read_bytes, shown
+from idlc.disk.settings_table import Place, Switch, Table, Text, TextOrTexts, Texts, read_table
 from idlc.model.distro import BY_NAME, listed, unknown_distro
 
 if TYPE_CHECKING:
@@ -27,11 +27,26 @@ if TYPE_CHECKING:
 FILE = "pyproject.toml"
 
 
+class Settings(msgspec.Struct, frozen=True, rename="kebab"):
+    """`[tool.idlc]` as it is written; `idlc.disk.command_settings` reads the tables of commands."""
+
+    paths: Texts = ()
+    include: Texts = ()
+    exclude: Texts = ()
+    out: Text = ""
+    package: Text = ""
+    vendor_deps: Switch = False
+    distro: TextOrTexts = ()
+    templates: Text = ""
+    breaking: Table = {}
+    check: Table = {}
+
+
 class Config(msgspec.Struct, frozen=True):
     """The settings found; what is absent is empty or `None`. Paths are as one would type them.
 
-    `tables` holds the tables of single commands, which are checked by `idlc.disk.command_settings`;
-    `source` is the file, `folder` where it lies; `exclude` is relative to that.
+    `tables` holds the tables of single commands; `source` is the file, `folder` where it lies;
+    `exclude` is relative to that.
     """
 
     paths: tuple[str, ...] = ()
@@ -41,22 +56,10 @@ class Config(msgspec.Struct, frozen=True):
     exclude: tuple[str, ...] = ()
     vendor_deps: bool = False
     distro: tuple[str, ...] = ()
+    templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
-
-
-_SHAPES = {
-    "paths": "a list of strings",
-    "include": "a list of strings",
-    "exclude": "a list of strings",
-    "out": "a string",
-    "package": "a string",
-    "vendor-deps": "true or false",
-    "distro": "a string or a list of strings",
-    "breaking": "a table",
-    "check": "a table",
-}
 
 
 def load(report: Report) -> Config:
@@ -104,58 +107,35 @@ def _broken(source: Source, message: str) -> Diagnostic:
 
 def _checked(table: object, source: Source, folder: Path, report: Report) -> Config:
     """Return the settings in a table; report each that is unknown or of the wrong type."""
+    place = Place(source, "tool.idlc", "[tool.idlc]")
     if not isinstance(table, dict):
-        report.add(wrong(source, "idlc", "`tool.idlc` must be a table", None))
+        place.wrong("idlc", "`tool.idlc` must be a table", report)
         return Config()
-    found: dict[str, Any] = {}
-    for key, value in table.items():
-        if key not in _SHAPES:
-            report.add(wrong(source, key, f"unknown setting `{key}` in [tool.idlc]", _close(key)))
-        elif not _fits(value, _SHAPES[key]):
-            report.add(wrong(source, key, f"`{key}` in [tool.idlc] must be {_SHAPES[key]}", None))
-        else:
-            found[key] = value
+    found = read_table(table, Settings, place, report)
+    assert found is not None
     return Config(
-        paths=tuple(_typed(folder, path) for path in found.get("paths", ())),
-        out=_typed(folder, found["out"]) if "out" in found else None,
-        package=found.get("package"),
-        include=tuple(_typed(folder, path) for path in found.get("include", ())),
-        exclude=tuple(found.get("exclude", ())),
-        vendor_deps=found.get("vendor-deps", False),
-        distro=_distros(found.get("distro", ""), source, report),
-        tables={key: value for key, value in found.items() if _SHAPES[key] == "a table"},
+        paths=tuple(_typed(folder, path) for path in found.paths),
+        out=_typed(folder, found.out) if found.out else None,
+        package=found.package or None,
+        include=tuple(_typed(folder, path) for path in found.include),
+        exclude=found.exclude,
+        vendor_deps=found.vendor_deps,
+        distro=_distros(found.distro, place, report),
+        templates=_typed(folder, found.templates) if found.templates else None,
+        tables={"breaking": found.breaking, "check": found.check},
         source=source,
         folder=folder,
     )
 
 
-def _fits(value: object, shape: str) -> bool:
-    match shape:
-        case "a list of strings":
-            return isinstance(value, list) and all(isinstance(item, str) for item in value)
-        case "a string":
-            return isinstance(value, str)
-        case "a string or a list of strings":
-            return _fits(value, "a string") or _fits(value, "a list of strings")
-        case "a table":
-            return isinstance(value, dict)
-        case _:
-            return isinstance(value, bool)
-
-
-def _distros(value: str | list[str], source: Source, report: Report) -> tuple[str, ...]:
+def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tuple[str, ...]:
     """Return the names of distributions; report those that are unknown."""
     names = listed(value) if isinstance(value, str) else value
     for name in names:
         if name and name not in BY_NAME:
-            message = f"`distro` in [tool.idlc] has `{name}`, which is no distribution"
-            report.add(wrong(source, "distro", message, unknown_distro(name)))
+            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
+            place.wrong("distro", message, report, unknown_distro(name))
     return tuple(name for name in names if name in BY_NAME)
-
-
-def _close(key: str) -> str:
-    settings = ", ".join(f"`{known}`" for known in _SHAPES)
-    return did_you_mean(str(key), _SHAPES) or f"the settings are {settings}"
 
 
 def _typed(folder: Path, path: str) -> str:
@@ -165,11 +145,3 @@ def _typed(folder: Path, path: str) -> str:
         return Path(os.path.relpath(whole)).as_posix() if folder != Path.cwd() else path
     except ValueError:
         return whole.as_posix()
-
-
-def wrong(source: Source, key: str, message: str, hint: str | None = None) -> Diagnostic:
-    """Return the problem with a setting, at the place where it stands."""
-    place = re.search(rf"(?m)^[ \t]*[\"']?({re.escape(key)})[\"']?[ \t]*=", source.text)
-    if place is None:
-        return codes.BAD_CONFIG.of(source.path, message, hint=hint)
-    return codes.BAD_CONFIG.at(Span(source, *place.span(1)), message, hint=hint)

@@ -41,12 +41,12 @@ def absolute(path: str | Path) -> Path:
 
 
 def is_file(path: str | Path) -> bool:
-    """Whether a path leads to a regular file; a path that cannot be looked at does not."""
+    """Return whether a path leads to a regular file; a path that cannot be looked at does not."""
     return os.path.isfile(path)  # noqa: PTH113 - Path.is_file() raises
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a path leads to a folder; a path that cannot be looked at does not."""
+    """Return whether a path leads to a folder; a path that cannot be looked at does not."""
     return os.path.isdir(path)  # noqa: PTH112 - Path.is_dir() raises
 
 

@@ -60,7 +60,7 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
     if not top or not commit:
         what = "no such revision" if top else "not in a git repository"
         hint = "in CI, fetch it first; a shallow clone lacks older revisions" if top else None
-        report.add(codes.NO_REVISION.of(path, f"{what}: `git:{name}`", hint=hint))
+        report.add(codes.NO_SUCH_REVISION.of(path, f"{what}: `git:{name}`", hint=hint))
         yield None
         return
     with TemporaryDirectory(prefix="idlc-") as place:

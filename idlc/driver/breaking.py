@@ -22,9 +22,8 @@ from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk import inputs
-from idlc.disk.enclosing_package import manifest
+from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import InterfaceFile, find, look, nothing_in
-from idlc.disk.manifest_statements import statements
 from idlc.disk.output import lock_file
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out, is_revision
@@ -198,5 +197,5 @@ def _version(given: tuple[inputs.Inputs, ...], report: Report) -> str | None:
     if len(given) != 1 or not given[0].folders:
         return None
     path = manifest(given[0].folders[0])
-    said = statements(path, path.as_posix(), report) if path else ()
-    return next((one.text for one in said if one.tag == "version"), None)
+    found = statements(path, path.as_posix(), report) if path else ()
+    return next((one.text for one in found if one.tag == "version"), None)

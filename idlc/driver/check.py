@@ -1,4 +1,4 @@
-"""The pipeline of `idlc check`: everything that can be said about files and their packages."""
+"""The pipeline of `idlc check`: every problem of files and of their packages."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.checks.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk import inputs
-from idlc.disk.exclude import Exclusions
 from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
 from idlc.disk.package_facts import facts
@@ -18,7 +18,6 @@ from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage
 
 if TYPE_CHECKING:
-    from idlc.checks.select import Selection
     from idlc.diagnostics.source import Source
     from idlc.model.link import Model
 
@@ -28,7 +27,7 @@ class CheckOptions(msgspec.Struct, frozen=True):
 
     paths: tuple[str, ...]
     scope: Scope = Scope()
-    selection: Selection | None = None
+    selection: Selection = Selection()
     fix: bool = False
 
 
@@ -85,7 +84,8 @@ def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnost
     texts: dict[str, Source] = {}
     for distro in scope.distros:
         found[distro.name] = Report()
-        alone = msgspec.structs.replace(scope, distros=(distro,))
+        narrowed = msgspec.structs.replace(scope, distros=(distro,))
+        alone = msgspec.structs.replace(options, scope=narrowed)
         texts |= _compiled(packages, alone, found[distro.name])
     files = tuple(file.shown for file in there.files)
     sources = list(texts.values())
@@ -99,42 +99,39 @@ def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnost
     return checked, list(without_overruled(wanted))
 
 
-def _compiled(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Source]:
+def _compiled(
+    packages: Sequence[inputs.Inputs], options: CheckOptions, report: Report
+) -> dict[str, Source]:
     """Report what is wrong for one distribution; return the texts by path."""
-    library = library_for(packages, scope, report)
+    library = library_for(packages, options.scope, report)
     texts: dict[str, Source] = {}
     for given, model in Compiler(library).all(packages, report):
         mine = model.only(given.names)
         texts |= {one.source.path: one.source for one in mine.own if one.source}
-        _advise(given, mine, library, scope.exclude, report)
+        _advise(given, mine, library, options, report)
     return texts
 
 
 def _advise(
-    given: inputs.Inputs, model: Model, library: Library, exclude: Exclusions, report: Report
+    given: inputs.Inputs, model: Model, library: Library, options: CheckOptions, report: Report
 ) -> None:
     """Report what only `check` looks at: style, portability and the package around."""
-    from idlc.checks.lint import lint
-    from idlc.checks.package_rules import check_package
+    from idlc.checks.registry import advise, check_package
 
-    with stage("lint", given.package):
-        lint(model, report)
-    surroundings = facts(given, library.packages, exclude)
+    with stage("advise", given.package):
+        advise(model, report, options.selection)
+    surroundings = facts(given, library.packages, options.scope.exclude)
     if surroundings is not None:
         with stage("check package", given.package):
-            check_package(surroundings, model, report)
+            check_package(surroundings, model, report, options.selection)
 
 
-def _wanted(
-    report: Report, sources: Sequence[Source], selection: Selection | None
-) -> list[Diagnostic]:
+def _wanted(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:
     from idlc.checks.ignores import switched_off, without_ignored
-    from idlc.checks.select import Selection
 
-    chosen = selection or Selection()
-    wanted = [one for one in report if chosen.wants(one)]
+    wanted = [one for one in report if selection.wants(one)]
     return [
         one
         for one in without_ignored(wanted, sources)
-        if chosen.wants(one) and not switched_off(one, chosen)
+        if selection.wants(one) and not switched_off(one, selection)
     ]

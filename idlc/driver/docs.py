@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
 from idlc.disk import inputs
-from idlc.disk.enclosing_package import manifest
+from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import find
-from idlc.disk.manifest_statements import statements
 from idlc.disk.output.site import write
 from idlc.disk.scope import Scope
 from idlc.driver.stages import sound_models, stage
 
 if TYPE_CHECKING:
-    from idlc.site.pages import About
+    from idlc.site.front import About
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
@@ -42,12 +41,12 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
 
 def _about(given: inputs.Inputs) -> About:
     """Return what a package's package.xml says of it."""
-    from idlc.site.pages import About
+    from idlc.site.front import About
 
     path = manifest(given.folders[0]) if given.folders else None
-    said = statements(path, path.as_posix(), Report()) if path else ()
+    found = statements(path, path.as_posix(), Report()) if path else ()
     texts: dict[str, list[str]] = {}
-    for one in said:
+    for one in found:
         texts.setdefault(one.tag, []).append(" ".join(one.text.split()))
     return About(
         version=" ".join(texts.get("version", [])),

@@ -3,28 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.report import Report
 from idlc.disk import inputs
 from idlc.disk.find import is_path
-from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
-from idlc.disk.output.overlay import Overlay
-from idlc.disk.package_names import accept_name
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
-from idlc.driver.gen_package import Package, as_inputs, package_of
-from idlc.driver.overlay import enter
+from idlc.driver.gen_result import Generated, generated, up_to_date, with_needs
+from idlc.driver.gen_vendored import planned
 from idlc.driver.stages import Compiler, library_for
-from idlc.model import derive, ir
-from idlc.model.distro import Distro
+from idlc.model import ir
 from idlc.syntax.tree import OPTIONAL
-
-if TYPE_CHECKING:
-    from idlc.model.link import Model
 
 
 class GenOptions(NamedTuple):
@@ -37,22 +29,6 @@ class GenOptions(NamedTuple):
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
-
-
-class Generated(NamedTuple):
-    """What a run of `idlc gen` did to one package.
-
-    `files` counts all that it consists of; `needs` are packages that it imports
-    and that are not here.
-    """
-
-    package: str
-    out: str
-    interfaces: int
-    files: int
-    written: int = 0
-    removed: int = 0
-    needs: tuple[str, ...] = ()
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
@@ -78,7 +54,9 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
         return ()
     with found[0].alone(beside=options.vendor_deps or len(found) > 1):
         done = _made(dict(zip(found, given, strict=True)), options, report)
-        if isinstance(found[0], Overlay) and done and not options.check:
+        if options.ament and done and not options.check:
+            from idlc.driver.overlay import enter
+
             enter(found[0])
         return done
 
@@ -89,6 +67,8 @@ def _targets(
     """Return the folder that each package is written to."""
     if not options.ament:
         return targets(given, options.out, report, force=options.force)
+    from idlc.disk.output.overlay import Overlay  # imported only where one is written
+
     prefix = options.ament.rstrip("/") or "/"
     homes = (
         (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
@@ -130,25 +110,29 @@ def _made(
     library = library_for(tuple(wanted.values()), options.scope, report)
     if not (options.check or report.had_errors or _may_be_refused(wanted.values(), options)):
         current = [
-            _current(target, given.digests, library, options.vendor_deps)
+            up_to_date(target, given.digests, library, options.vendor_deps)
             for target, given in wanted.items()
         ]
         if all(current):
             done = [one for each in current for one in each]
-            return _with_needs(done, wanted, options.scope.distro, report)
+            return with_needs(done, wanted, options.scope.distro, report)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
     if not report.had_errors and (more := completed(wanted.values(), needed, library)):
         return _made(dict(zip(wanted, more, strict=True)), options, report)
-    packages = [] if report.had_errors else _planned(models, wanted, compiler, options)
+    packages = []
+    if not report.had_errors:
+        packages = planned(
+            models, wanted, compiler, check=options.check, vendor_deps=options.vendor_deps
+        )
     if options.check:
         for one in packages:
             one.target.drift(one.plan, one.lock)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     targets = wanted if packages else ()
-    return _with_needs(map(_generated, packages), targets, options.scope.distro, report)
+    return with_needs(map(generated, packages), targets, options.scope.distro, report)
 
 
 def _may_be_refused(given: Iterable[inputs.Inputs], options: GenOptions) -> bool:
@@ -156,116 +140,3 @@ def _may_be_refused(given: Iterable[inputs.Inputs], options: GenOptions) -> bool
     if options.scope.distro.reads_optional:
         return False
     return any(OPTIONAL.encode() in file.data for one in given for file in one.files)
-
-
-def _planned(
-    models: Sequence[Model],
-    wanted: Mapping[Target, inputs.Inputs],
-    compiler: Compiler,
-    options: GenOptions,
-) -> list[Package]:
-    """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
-    vendor = _Vendor({model.package for model in models}, compiler, options)
-    found: list[Package | None] = []
-    for model, (target, given) in zip(models, wanted.items(), strict=True):
-        names = vendor.add(model, target) if options.vendor_deps else None
-        library, check = compiler.library, options.check
-        found.append(package_of(model, target, given.digests, library, check=check, vendored=names))
-    found += [vendor.packages[name] for name in sorted(vendor.packages)]
-    return [] if None in found else [one for one in found if one]
-
-
-class _Vendor:
-    """The packages that others depend on, whole, to be written beside them."""
-
-    def __init__(self, own: set[str], compiler: Compiler, options: GenOptions) -> None:
-        self._own = own
-        self._compiler = compiler
-        self._options = options
-        self._needed: dict[str, set[str]] = {}
-        #: Each ready to be written, `None` for one that must not be.
-        self.packages: dict[str, Package | None] = {}
-
-    def add(self, model: Model, target: Target) -> list[str]:
-        """Add what a model depends on, and return the names."""
-        names: set[str] = set()
-        waiting = _needed(model) - self._own
-        while waiting:
-            package = waiting.pop()
-            names.add(package)
-            if package not in self.packages:
-                self.packages[package] = self._whole(package, target)
-            waiting |= self._needed[package] - self._own - names
-        return sorted(names)
-
-    def _whole(self, package: str, target: Target) -> Package | None:
-        library, report = self._compiler.library, Report()
-        names = library.interfaces(package)
-        sources = [(name, source) for name in names if (source := library.source(name))]
-        whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(one for one in report if one.severity is Severity.ERROR)
-        self._needed[package] = _needed(whole)
-        if not accept_name(package, "what is depended on", target.report) or report.had_errors:
-            return None
-        beside, digests = target.beside(package), as_inputs(names, library)
-        return package_of(whole, beside, digests, library, check=self._options.check)
-
-
-def _current(
-    target: Target, digests: dict[str, str], library: Library, vendor_deps: bool
-) -> tuple[Generated, ...]:
-    """Return what there is if a run would change nothing; empty otherwise."""
-    if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
-        return ()
-    found = [target]
-    for package in target.lock.vendored:
-        found.append(target.beside(package))
-        names = library.interfaces(package)
-        if not found[-1].unchanged(as_inputs(names, library), library):
-            return ()
-    return tuple(
-        Generated(one.package, one.name, len(one.lock.inputs), len(one.lock.outputs))
-        for one in found
-        if one.lock
-    )
-
-
-def _needed(model: Model) -> set[str]:
-    """Return the packages that a model's generated code may import, its own included."""
-    implied = {package for own in model.own for package in derive.IMPLICIT_PACKAGES[own.name.kind]}
-    return implied | {name.package for name in model.interfaces}
-
-
-def _with_needs(
-    done: Iterable[Generated], targets: Iterable[Target], distro: Distro, report: Report
-) -> tuple[Generated, ...]:
-    """Report IDL617 for generated packages that need others that cannot be imported here.
-
-    Where they are not imported anyway, that is only noted in what is returned.
-    """
-    quiet: dict[str, tuple[str, ...]] = {}
-    for target in targets:
-        missing = target.missing()
-        if not missing:
-            continue
-        if not target.is_at_home():
-            quiet[target.name] = tuple(missing)
-            continue
-        names = ", ".join(f"`{name}`" for name in missing)
-        report.add(
-            codes.NOT_IMPORTABLE.of(
-                target.name,
-                f"`{target.package}` imports {names}, which this Python cannot import",
-                hint=f"{distro.installing(missing)}, or run idlc gen again "
-                "with --vendor-deps, which writes it next to this one",
-            )
-        )
-    return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)
-
-
-def _generated(one: Package) -> Generated:
-    removed = sum(change.new is None for change in one.plan.changes)
-    written = len(one.plan.changes) - removed
-    target = one.target
-    files = len(one.plan.outputs)
-    return Generated(target.package, target.name, len(one.lock.inputs), files, written, removed)

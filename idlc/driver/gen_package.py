@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from symtable import symtable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,10 +10,8 @@ from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.output import lock_file
 from idlc.disk.output.folder import Target
-from idlc.disk.output.overlay import Overlay
 from idlc.disk.output.up_to_date import dependencies
 from idlc.disk.output.write_plan import Plan
-from idlc.driver.overlay import overlaid
 from idlc.driver.stages import derived_names, stage
 from idlc.model import derive, ir
 
@@ -61,7 +59,7 @@ def package_of(
         return None
     with stage("render", model.package):
         modules = {file.path: file.text for file in render_package(model)}
-        files = overlaid(model, modules, target) if isinstance(target, Overlay) else {**modules}
+        files = _with_surroundings(model, modules, target)
     plan = target.plan(files, check=check)
     if plan is None:
         return None
@@ -87,6 +85,17 @@ def package_of(
     )
 
 
+def _with_surroundings(
+    model: Model, modules: Mapping[str, str], target: Target
+) -> dict[str, str | bytes]:
+    """Return the files to write: modules, and in a prefix all that ROS 2 looks for there."""
+    if not target.modules:  # a package folder
+        return {**modules}
+    from idlc.driver.overlay import overlaid
+
+    return overlaid(model, modules, target)
+
+
 def _check_syntax(plan: Plan, target: Target) -> None:
     """Fail on rendered code that Python cannot read, which would be idlc's own fault.
 
@@ -103,11 +112,5 @@ def _check_syntax(plan: Plan, target: Target) -> None:
 
 def _imports(model: Model) -> tuple[str, ...]:
     """Return the modules of other packages that the package's own files refer to."""
-    targets = {
-        element.target
-        for own in model.own
-        for part in derive.sections(own)
-        for field in part.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
+    targets = {target for own in model.own for target in derive.references(own)}
     return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))

@@ -145,8 +145,8 @@ def _add(model: Model, known: dict[Key, Model]) -> Iterator[Key]:
 
 def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
     """Yield the models of interfaces that are installed, or found along -I; broken ones are not."""
-    unheard = Report()
-    library = Library(scope.include, unheard, distro=scope.distro)
+    dropped = Report()
+    library = Library(scope.include, dropped, distro=scope.distro)
     compiler = Compiler(library)
     for name in sorted(set(map(interface_of, names))):
         try:

@@ -7,6 +7,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from idlc.disk.distribution import distribution
+from idlc.disk.output.folder import Target
 from idlc.disk.output.overlay import Overlay
 from idlc.driver.libraries import libraries_of
 from idlc.driver.share import dependencies, shared
@@ -17,11 +18,12 @@ if TYPE_CHECKING:
 _SHELLS = ("sh", "bash", "zsh")
 
 
-def overlaid(model: Model, modules: Mapping[str, str], overlay: Overlay) -> dict[str, str | bytes]:
+def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[str, str | bytes]:
     """Return the files of a package by their paths in the prefix.
 
     They are in the order in which to write them: what leads to others comes after these.
     """
+    assert isinstance(overlay, Overlay)
     manifest = overlay.manifest or _rendered(
         "overlay/package.xml.jinja", name=model.package, depends=dependencies(model)
     )
@@ -30,8 +32,9 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Overlay) -> dict
     return {**placed, **shared(model, manifest, libraries, overlay.report)}
 
 
-def enter(overlay: Overlay) -> bool:
+def enter(overlay: Target) -> bool:
     """Write the files by which a shell learns of the prefix; return whether that went well."""
+    assert isinstance(overlay, Overlay)
     files = {
         f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))
         for shell in _SHELLS
@@ -41,6 +44,6 @@ def enter(overlay: Overlay) -> bool:
 
 
 def _rendered(template: str, **given: object) -> str:
-    from idlc.emit.render import environment
+    from idlc.templating import environment
 
     return environment().get_template(template).render(**given)

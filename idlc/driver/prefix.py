@@ -50,11 +50,11 @@ def check_prefix(folder: str, report: Report) -> Checked:
 
 def _model(one: Installed) -> Model | None:
     """Return what a package's installed interfaces mean; `None` where idlc cannot say."""
-    unheard = Report()
-    files = look((one.share,), unheard).files
-    given = inputs.load(one.package, files, one.prefix / "share" / one.package, unheard)
-    found = list(models_of((given,), Scope(include=(str(one.prefix),)), unheard))
-    return None if unheard.had_errors or not files else found[0][1]
+    dropped = Report()
+    files = look((one.share,), dropped).files
+    given = inputs.load(one.package, files, one.prefix / "share" / one.package, dropped)
+    found = list(models_of((given,), Scope(include=(str(one.prefix),)), dropped))
+    return None if dropped.had_errors or not files else found[0][1]
 
 
 def _problem(one: Installed, name: str, identifier: str, model: Model | None) -> str:

@@ -15,6 +15,9 @@ from idlc.driver.stages import compile_package, derived_names, sound_models, sta
 from idlc.model.distro import Distro, later
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
+    from idlc.disk.library import Library
+    from idlc.model import ir
     from idlc.model.link import Model
 
 
@@ -48,7 +51,7 @@ def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | N
 
 
 def _has_hashes(distro: Distro, report: Report) -> bool:
-    """Return whether a distribution has type hashes and descriptions; report IDL623 otherwise."""
+    """Return whether a distribution has type hashes and descriptions; report IDL624 otherwise."""
     if not distro.has_hashes:
         first = next(one for one in later(distro) if one.has_hashes)
         message = f"ROS 2 {distro.title} has no type hashes and no type descriptions"
@@ -83,11 +86,8 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
     """Yield the models that a type's or package's name means, and the names that are meant."""
     library, meant = named_types.resolve(text, scope, report)
     for name, interface in meant:
-        source = library.source(interface)
-        model = source and compile_package(
-            interface.package, [(interface, source)], library, report
-        )
-        if not model or report.had_errors:
+        model = _compiled(interface, library, report)
+        if model is None:
             return
         names = [n for own in model.own if own.name == interface for n in derived_names(own)]
         if name == interface:
@@ -95,6 +95,19 @@ def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, lis
         elif str(name) in names:
             yield model, [str(name)]
         else:
-            parts = (one.rpartition("/")[2] for one in names if one != str(interface))
-            hint = f"the parts of `{interface}` are {', '.join(f'`{one}`' for one in parts)}"
-            report.add(codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint))
+            report.add(_no_such_part(text, interface, names))
+
+
+def _compiled(interface: ir.TypeName, library: Library, report: Report) -> Model | None:
+    """Return the model of an interface alone, `None` after an error."""
+    source = library.source(interface)
+    if source is None:
+        return None
+    model = compile_package(interface.package, [(interface, source)], library, report)
+    return None if report.had_errors else model
+
+
+def _no_such_part(text: str, interface: ir.TypeName, names: Sequence[str]) -> Diagnostic:
+    parts = (f"`{one.rpartition('/')[2]}`" for one in names if one != str(interface))
+    hint = f"the parts of `{interface}` are {', '.join(parts)}"
+    return codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint)

@@ -1,27 +1,23 @@
-"""The pipelines of `idlc scaffold`: what to add and to edit, then all of it or nothing."""
+"""What the commands of `idlc scaffold` share: the package around, then all changes or none."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.diagnostics.source import Source
-from idlc.disk import pyproject
-from idlc.disk.enclosing_package import MANIFEST, declared_name, manifest
+from idlc.disk import pyproject, user_templates
+from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
 from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
-from idlc.driver.stages import compile_package, stage
-from idlc.emit.render import support_packages
-from idlc.model import catalog, derive, ir
-from idlc.model.link import Model
-from idlc.scaffold import new_interface as interface_text
-from idlc.scaffold import new_package as package_files
-from idlc.scaffold.edits import cmake, data_files, package_xml
+from idlc.driver.stages import stage
 from idlc.scaffold.edits.outcome import Edited, Outcome
+from idlc.scaffold.template_problems import BrokenTemplateError
+from idlc.scaffold.templates import ENDING, Templates, folders
 
 
 class Settings(NamedTuple):
@@ -31,13 +27,7 @@ class Settings(NamedTuple):
     force: bool = False
     include: tuple[str, ...] = ()
     launch: bool = True
-
-
-def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
-    """Return the library that has a package and what is used in it."""
-    distro = scope(pyproject.load(Report())).distro
-    own = {package: (project.path,)}
-    return Library(settings.include, report, own=own, distro=distro)
+    templates: str | None = None
 
 
 class Result(NamedTuple):
@@ -53,113 +43,24 @@ class Result(NamedTuple):
     following: tuple[str, ...] = ()
 
 
-def package(
-    wanted: package_files.Package,
-    folder: str,
-    settings: Settings,
-    report: Report,
-    starters: Mapping[str, str] | None = None,
-) -> Result | None:
-    """Write a new package below `folder`, with interfaces if it has none yet."""
-    name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
-    project = Project(name, report, force=settings.force)
-    with stage("scaffold", wanted.name):
-        files = package_files.files(wanted)
-    if not any(project.names(kind) for kind in ir.KINDS):
-        files |= starters or {}
-    # what later commands add to stays as it is
-    growing = (*_GROWING, f"launch/{wanted.name}_launch.py")
-    new = {
-        path: text
-        for path, text in files.items()
-        if path not in growing or settings.force or not project.has(path)
-    }
-    return write(project, new, {}, settings, report)
+def templates(settings: Settings, report: Report) -> Templates:
+    """Return idlc's templates, and those of the user's folder instead of them."""
+    folder = settings.templates or pyproject.load(report).templates
+    if folder is None:
+        return Templates()
+    found = Templates(user_templates.read(folder, folders(), ENDING, report))
+    found.check(report)
+    return found
 
 
-#: Files of a new package that are edited later on.
-_GROWING = (
-    *(MANIFEST, "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
-    *("README.md", ".gitattributes", ".gitignore"),
-)
-
-
-def interface(
-    kind: ir.Kind,
-    name: str,
-    fields: Sequence[str],
-    comment: str,
-    settings: Settings,
-    report: Report,
-) -> Result | None:
-    """Write an interface file into the package that the working folder belongs to."""
-    found = find_package(settings, report)
-    if found is None:
-        return None
-    project, own = found
-    path = f"{kind}/{name}.{kind}"
-    text = interface_text.text(kind, fields, comment)
-    full = ir.TypeName(own, kind, name)
-    library = library_around(own, project, settings, report)
-    problems = Report()
-    model = compile_package(own, [(full, Source(project.shown(path), text))], library, problems)
-    report.extend(problems)
-    if report.had_errors:
-        return None
-    needed = set(derive.IMPLICIT_PACKAGES[kind]) | {one.package for one in model.interfaces}
-    absent = set(derive.IMPLICIT_PACKAGES[kind]) - set(catalog.packages(model.distro))
-    depends = sorted(needed - {own} - _reached_only(model) - absent)
-    tests = _test_of_interfaces(project, own)
-    runner = ["python3-pytest"] if tests else []
-    edits = manifest_edit(project, depends, runner, group=True)
-    lists = project.text("CMakeLists.txt")
-    if lists is not None:
-        edits.append(("CMakeLists.txt", cmake.add_dependencies(lists, depends)))
-    setup = project.text("setup.py")
-    if setup is not None and lists is None:
-        kinds = {kind, *(one for one in ir.KINDS if project.names(one))}
-        parts = [*support_packages(), *sorted(kinds)]
-        packages = [own, *(f"{own}.{part}" for part in parts)]
-        wired = data_files.add_libraries(setup)
-        edits.append(("setup.py", data_files.add_packages(wired, packages)))
-    edited = accepted(project, edits, report)
-    if edited is None:
-        return None
-    if lists is None:
-        keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
-        edited |= dict([interface_text.index(own, keys | {path})])
-    result = write(project, {path: text, **tests}, edited, settings, report)
-    after = generation(project, own) if lists is None else ()
-    return result and result._replace(following=after)
-
-
-def generation(project: Project, own: str) -> tuple[str, ...]:
-    """Return the words of the command that compiles the package's interfaces."""
-    if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
-        return ("gen",)
-    return ("gen", project.name, "-o", project.shown(own))
-
-
-def _test_of_interfaces(project: Project, own: str) -> dict[str, str]:
-    """Return the test that `colcon test` runs, for a package that says what idlc generates."""
-    path = "test/test_interfaces.py"
-    if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
-        return {}
-    plain = package_files.Package(own, "", "", "", package_files.LICENSES[0])
-    return {path: package_files.rendered("package/test_interfaces.py.jinja", plain)}
-
-
-def _reached_only(model: Model) -> set[str]:
-    """Return the packages that others depend on, but not the package itself."""
-    direct = {
-        element.target.package
-        for one in model.own
-        for message in derive.sections(one)
-        for field in message.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
-    implied = {p for one in model.own for p in derive.IMPLICIT_PACKAGES[one.name.kind]}
-    return {name.package for name in model.interfaces} - direct - implied
+@contextmanager
+def rendering(subject: str, report: Report) -> Iterator[None]:
+    """Report what is wrong with a user's template within; anything else is idlc's own fault."""
+    with stage("scaffold", subject):
+        try:
+            yield
+        except BrokenTemplateError as error:
+            report.add(error.problem)
 
 
 def find_package(settings: Settings, report: Report) -> tuple[Project, str] | None:
@@ -176,20 +77,26 @@ def find_package(settings: Settings, report: Report) -> tuple[Project, str] | No
     return None if name is None else (Project(folder, report, force=settings.force), name)
 
 
-def manifest_edit(
-    project: Project, depends: Sequence[str], tests: Sequence[str], *, group: bool
-) -> list[tuple[str, Outcome]]:
-    """Return the edit that adds the dependencies that a package.xml lacks."""
-    text = project.text(MANIFEST) or ""
-    return [(MANIFEST, package_xml.add(text, depends=depends, tests=tests, group=group))]
+def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
+    """Return the library that has a package and what is used in it."""
+    distro = scope(pyproject.load(Report())).distro
+    own = {package: (project.path,)}
+    return Library(settings.include, report, own=own, distro=distro)
+
+
+def generation(project: Project, own: str) -> tuple[str, ...]:
+    """Return the words of the command that compiles the package's interfaces."""
+    if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
+        return ("gen",)
+    return ("gen", project.name, "-o", project.shown(own))
 
 
 def accepted(
-    project: Project, edits: Sequence[tuple[str, Outcome]], report: Report
+    project: Project, edits: Mapping[str, Outcome], report: Report
 ) -> dict[str, str] | None:
     """Return the edited texts; report IDL621 for each refusal and return `None`."""
     edited = {}
-    for path, outcome in edits:
+    for path, outcome in edits.items():
         if isinstance(outcome, Edited):
             edited[path] = outcome.text
             continue
@@ -207,8 +114,8 @@ def accepted(
 
 def write(
     project: Project,
-    added: dict[str, str],
-    edited: dict[str, str],
+    added: Mapping[str, str],
+    edited: Mapping[str, str],
     settings: Settings,
     report: Report,
 ) -> Result | None:

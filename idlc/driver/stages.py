@@ -75,13 +75,13 @@ class Compiler:
 
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
         """Return the linked and checked model of a package; every problem is reported."""
-        from idlc.checks import check as run_checks
+        from idlc.checks.registry import check
         from idlc.model.link import link
 
         with stage("link", package):
             model = link(package, own, self.library, report, self._pool)
         with stage("check", package):
-            run_checks(model, report)
+            check(model, report)
         return model
 
     def all(
@@ -141,7 +141,7 @@ def sound_models(
     found, left_out = [], []
     for given, model in models:
         sound = model.sound(broken) if errors else model
-        if any(one.code == codes.PACKAGE_NAME.id for one in errors):
+        if any(one.code == codes.INVALID_PACKAGE_NAME.id for one in errors):
             sound = sound.only(())
         mine = sound.only(given.names).own
         found.append((sound, [name for one in mine for name in derived_names(one)]))

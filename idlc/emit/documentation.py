@@ -1,27 +1,85 @@
-"""Docstrings of generated classes: the file's comments, and what the types do not say."""
+"""Docstrings of generated classes: the file's comments, and what ROS 2 adds.
+
+All text is safe in a docstring (see `literals.prose`).
+"""
 
 from __future__ import annotations
 
+import msgspec
+
 from idlc.emit import literals, pynames
-from idlc.model import ir
+from idlc.model import derive, ir
+from idlc.model.spelling import spell
 
 
-def message(structure: ir.Message, summary: str) -> list[str]:
-    """Return the lines of a message's docstring; `summary` stands in for a missing comment."""
-    lines = [literals.prose(line) for line in structure.comment] or [summary]
+class Section(msgspec.Struct, frozen=True):
+    """A list in a docstring, such as that of the attributes."""
+
+    title: str
+    entries: tuple[str, ...]
+
+
+class Docstring(msgspec.Struct, frozen=True):
+    """A class's docstring: `text` of one or more lines, and lists after it."""
+
+    text: str
+    sections: tuple[Section, ...] = ()
+
+    @property
+    def is_one_line(self) -> bool:
+        """Whether the closing quotes stand on the line of the opening ones."""
+        return not self.sections and "\n" not in self.text
+
+
+def message(structure: ir.Message, purpose: str, entries: tuple[str, ...]) -> Docstring:
+    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries."""
+    lines = [literals.prose(line) for line in structure.comment] or [purpose]
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
     lines += _hidden(structure)
-    described = [c for c in structure.constants if c.comment or c.unit]
-    if structure.fields:
-        lines += ["", "Attributes:"]
-        for field in structure.fields:
-            lines += literals.wrapped(_field(field), 8, 4)
-    if described:
-        lines += ["", "Constants:"]
-        for constant in described:
-            lines += literals.wrapped(_constant(constant), 8, 4)
-    return lines
+    constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
+    sections = (Section("Attributes", entries), Section("Constants", constants))
+    found = tuple(section for section in sections if section.entries)
+    return Docstring(literals.docstring(lines, one_line=not found), found)
+
+
+def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
+    """Return what the messages of a service or action are for, and an action's services."""
+    name = interface.name.name
+    match interface:
+        case ir.Message():
+            return {interface.name: f"{interface.name}."}
+        case ir.Service():
+            return {
+                interface.request.name: f"The request of the service {interface.name}.",
+                interface.response.name: f"The response of the service {interface.name}.",
+                **_event(interface, f"a call of {name}"),
+            }
+        case ir.Action():
+            send, get = derive.services(interface)
+            goal = f"a {name} goal"
+            words = {
+                send.name: f"Starts {goal}",
+                send.request.name: f"Sent by a client to start {goal}",
+                send.response.name: f"Tells a client whether {goal} was accepted, and when",
+                get.name: f"Waits for the result of {goal}",
+                get.request.name: f"Sent by a client to wait for the result of {goal}",
+                get.response.name: f"Tells a client how {goal} ended, and its result",
+                derive.feedback_message(interface).name: f"Published while {goal} is executed",
+            }
+            return {
+                interface.goal.name: f"The goal of the action {interface.name}.",
+                interface.result.name: f"The result of the action {interface.name}.",
+                interface.feedback.name: f"The feedback of the action {interface.name}.",
+                **{one: f"{text}. Added by ROS 2." for one, text in words.items()},
+                **_event(send, f"a call that starts {goal}"),
+                **_event(get, "a call that waits for a result"),
+            }
+
+
+def _event(service: ir.Service, call: str) -> dict[ir.TypeName, str]:
+    text = f"Published about {call}, where services are introspected. Added by ROS 2."
+    return {derive.event(service).name: text}
 
 
 def _hidden(structure: ir.Message) -> list[str]:
@@ -34,47 +92,21 @@ def _hidden(structure: ir.Message) -> list[str]:
         f"Fields hide the methods of the same name ({', '.join(hidden)}): "
         f"`super({name}, message)` still has them, and `super({name}, {name})` those of the class."
     )
-    return ["", *literals.wrapped(text, 0, 0)]
+    return ["", *literals.wrapped(text, 4)]
 
 
-def _field(field: ir.Field) -> str:
-    facts = ", ".join((type_text(field.type), *_limits(field.type)))
-    return f"{pynames.field(field.name)}: {facts}{_rest(field)}"
+def field(described: ir.Field) -> str:
+    """Return a field's entry, on as many lines as it takes."""
+    return _entry(pynames.field(described.name), described)
 
 
 def _constant(constant: ir.Constant) -> str:
-    return f"{constant.name}: {type_text(constant.type)}{_rest(constant)}"
+    return _entry(constant.name, constant)
 
 
-def _rest(described: ir.Field | ir.Constant) -> str:
-    """Return the unit and the comment of a field or constant."""
+def _entry(name: str, described: ir.Field | ir.Constant) -> str:
+    """Return the type, unit and comment of a field or constant."""
     unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
-    words = " ".join(literals.prose(line).strip() for line in described.comment)
-    return f"{unit}. {words}".rstrip()
-
-
-def type_text(type_: ir.FieldType) -> str:
-    """Return a type as interface files spell it."""
-    match type_:
-        case ir.Array(element, size):
-            return f"{type_text(element)}[{size}]"
-        case ir.Sequence(element, bound):
-            return f"{type_text(element)}[{'' if bound is None else f'<={bound}'}]"
-        case ir.String(wide, bound):
-            return ("wstring" if wide else "string") + ("" if bound is None else f"<={bound}")
-        case ir.Ref(target):
-            return f"{target.package}/{target.name}"
-        case ir.Primitive(name):
-            return name
-        case ir.Unknown():
-            raise ValueError("an unknown type cannot be emitted")
-
-
-def _limits(type_: ir.FieldType) -> tuple[str, ...]:
-    """Return the range of an integer in words; what the type itself says is not repeated."""
-    element = ir.element_of(type_)
-    if isinstance(element, ir.Primitive) and element.name != "byte":
-        info = element.info
-        if info.low is not None and info.size < 8:
-            return (f"{info.low} to {info.high}",)
-    return ()
+    words = " ".join(literals.prose(line).strip() for line in described.comment).strip()
+    text = f"{name}: {spell(described.type)}{unit}" + (f". {words}" if words else "")
+    return "\n".join(literals.wrapped(text, 8, hanging=4))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import msgspec
 
-from idlc.emit import literals, pynames
-from idlc.emit.codec.constants import numpy_name
+from idlc.emit import documentation, literals, pynames
 from idlc.emit.python_lines import WIDTH, Group, Node, assign, call, flat, tuple_of
 from idlc.emit.references import References
 from idlc.model import ir
@@ -15,23 +16,56 @@ LISTS = frozenset({"bool", "byte"})
 BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
 
 
-class FieldView(msgspec.Struct, frozen=True):
-    """A field: its line in the class, its parameter, and the lines that store it.
+class FieldView(msgspec.Struct, frozen=True, kw_only=True):
+    """A field, as text; `store` is a statement on as many lines as it takes.
 
-    `doubt` is true, in the constructor, for an argument that is perhaps not of the field's type.
-    A field of numbers has none, because it converts what it is given.
+    `wire_name` and `idl` are what rosidl says of it. The conditions of `doubt` are all true, in
+    the constructor, for an argument that is perhaps not of the field's type; a field of numbers
+    has none, because it converts what it is given.
     """
 
     name: str
-    declaration: str
+    wire_name: str
+    idl: str
+    description: str
+    annotation: str
     parameter: str
-    stores: tuple[str, ...]
-    doubt: str = ""
+    store: str
+    doubt: tuple[str, ...]
+
+
+class Naming(msgspec.Struct, frozen=True):
+    """How a class names what its fields could hide: `self` and what is builtin."""
+
+    receiver: str
+    options: str
+    builtins: str
+    not_implemented: str
+
+    @classmethod
+    def of(cls, structure: ir.Message) -> Naming:
+        """Return the naming of a structure's class; no field can begin with an underscore."""
+        names = {field.name for field in structure.fields}
+        return cls(
+            receiver="_self" if "self" in names else "self",
+            options="_options" if "options" in names else "options",
+            builtins="_builtins." if shadows(structure) else "",
+            not_implemented=(
+                "_builtins.NotImplemented"
+                if _hides_not_implemented(structure)
+                else "NotImplemented"  # as type checkers know it
+            ),
+        )
 
 
 def shadows(structure: ir.Message) -> bool:
-    """Whether a field has the name of a type that annotations need."""
-    return any(pynames.field(field.name) in BUILTINS for field in structure.fields)
+    """Return whether the class needs a builtin whose name a field has, or the interface."""
+    hidden = any(pynames.field(field.name) in BUILTINS for field in structure.fields)
+    return hidden or _hides_not_implemented(structure)
+
+
+def _hides_not_implemented(structure: ir.Message) -> bool:
+    return structure.name.name.partition("_")[0] == "NotImplemented"
 
 
 def support(type_: ir.FieldType) -> str:
@@ -48,7 +82,7 @@ def support(type_: ir.FieldType) -> str:
 def numeric_class(type_: ir.Sequence | ir.Array) -> str:
     """Return the descriptor class of a numeric array."""
     assert isinstance(type_.element, ir.Primitive)
-    name = numpy_name(type_.element.name)
+    name = ir.PRIMITIVES[type_.element.name].dtype
     stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
     return stem + ("Sequence" if isinstance(type_, ir.Sequence) else "Array")
 
@@ -71,47 +105,62 @@ def idl_text(type_: ir.FieldType) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def view(field: ir.Field, references: References, receiver: str, qualify: bool) -> FieldView:
-    """Return the view of a field; `qualify` spells builtin types as attributes.
-
-    `receiver` is what the constructor calls the object.
-    """
+def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
+    """Return the view of a field."""
     name = pynames.field(field.name)
-    slot = f"{receiver}.{pynames.slot(field.name)}"
-    prefix = "_builtins." if qualify else ""
-    needs = support(field.type)
+    slot = f"{naming.receiver}.{pynames.slot(field.name)}"
+    shape = _shape(field, references, naming)
+    return FieldView(
+        name=name,
+        wire_name=field.name,
+        idl=idl_text(field.type),
+        description=documentation.field(field),
+        annotation=shape.annotation + _ignored(name),
+        parameter=shape.parameter,
+        store="\n".join(_store(slot, name, shape)).lstrip(),
+        doubt=shape.doubt,
+    )
+
+
+class _Shape(NamedTuple):
+    """What the fields of a kind have in common: annotations, and how a value gets into the slot.
+
+    `fresh` is the default of a field whose parameter is None without an argument.
+    """
+
+    annotation: str
+    parameter: str
+    stored: Node
+    fresh: Node = ""
+    doubt: tuple[str, ...] = ()
+
+
+def _shape(field: ir.Field, references: References, naming: Naming) -> _Shape:
+    name = pynames.field(field.name)
+    kind = f"{name}.__class__"  # faster than a call, and no field can hide it
     if isinstance(field.type, (ir.Primitive, ir.String)):
-        annotation = prefix + _element(field.type, references)
-        default = _scalar_default(field)
-        return FieldView(
-            name,
-            f"{name}: {annotation}",
-            f"{name}: {annotation} = {default}",
-            tuple(assign(slot, name, 8)),
-            f"{name}.__class__ is not {annotation}",
-        )
-    if needs:
-        return _numeric(field, name, slot)
+        annotation = naming.builtins + _element(field.type, references)
+        parameter = f"{annotation} = {_scalar_default(field)}"
+        return _Shape(annotation, parameter, name, doubt=(f"{kind} is not {annotation}",))
+    if support(field.type):
+        return _numbers(field, name)
     if isinstance(field.type, ir.Ref):
         annotation = _element(field.type, references)
-        fresh = _fresh_message(field.type.target, references)
+        fresh: Node = f"{annotation}()"
         known = "" if field.type.target in references.implied else annotation
     else:
         element = _element(ir.element_of(field.type), references)
-        inner = prefix + element if element in BUILTINS else element
-        annotation = f"{prefix}list[{inner}]"
+        inner = naming.builtins + element if element in BUILTINS else element
+        known = f"{naming.builtins}list"
+        annotation = f"{known}[{inner}]"
         fresh = _fresh_list(field, references)
-        known = f"{prefix}list"
-    doubt = f"{name} is not None"
-    if known:
-        doubt = f"({doubt} and {name}.__class__ is not {known})"
-    return FieldView(
-        name,
-        f"{name}: {annotation}",
-        f"{name}: {annotation} | None = None",
-        tuple(_store(slot, name, fresh, name)),
-        doubt,
-    )
+    doubt = (f"{name} is not None", *([f"{kind} is not {known}"] if known else []))
+    return _Shape(annotation, f"{annotation} | None = None", name, fresh, doubt)
+
+
+def _ignored(name: str) -> str:
+    # type checkers take a field of a method's name for a mistake
+    return "  # type: ignore[assignment]" if pynames.hides_method(name) else ""
 
 
 def _element(element: ir.Element, references: References) -> str:
@@ -126,20 +175,19 @@ def _element(element: ir.Element, references: References) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def _store(slot: str, name: str, fresh: Node, given: Node) -> list[str]:
-    one = f"        {slot} = {flat(fresh)} if {name} is None else {flat(given)}"
-    if len(one) <= 88:
+def _store(slot: str, name: str, shape: _Shape) -> list[str]:
+    """Return the statement that gives a slot its value, indented as in the constructor."""
+    if not shape.fresh:
+        return assign(slot, shape.stored, 8)
+    one = f"        {slot} = {flat(shape.fresh)} if {name} is None else {flat(shape.stored)}"
+    if len(one) <= WIDTH:
         return [one]
     return [
         f"        if {name} is None:",
-        *assign(slot, fresh, 12),
+        *assign(slot, shape.fresh, 12),
         "        else:",
-        *assign(slot, given, 12),
+        *assign(slot, shape.stored, 12),
     ]
-
-
-def _fresh_message(target: ir.TypeName, references: References) -> Node:
-    return f"{references.annotation(target)}()"
 
 
 def _scalar_default(field: ir.Field) -> str:
@@ -191,13 +239,13 @@ def _fresh_numbers(field: ir.Field) -> Node:
     if isinstance(field.type, ir.Sequence):
         code = f'"{field.type.element.info.code}"'
         return call("_array", code, *([tuple_of(*values)] if values else []))
-    dtype = f"_arrays.{numpy_name(field.type.element.name).upper()}"
+    dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
     if values is None:
         return call("_arrays.zeros", str(field.type.size), dtype)
     return call("_arrays.array", tuple_of(*values), dtype)
 
 
-def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
+def _numbers(field: ir.Field, name: str) -> _Shape:
     assert isinstance(field.type, (ir.Sequence, ir.Array))
     assert isinstance(field.type.element, ir.Primitive)
     kind = numeric_class(field.type)
@@ -205,36 +253,14 @@ def _numeric(field: ir.Field, name: str, slot: str) -> FieldView:
     if isinstance(field.type, ir.Sequence):
         code = f'"{field.type.element.info.code}"'
         values = "_idlc.Floats" if kind.startswith("Float") else "_idlc.Integers"
-        declaration = f"{name}: _idlc.{kind} = _idlc.{kind}()"
-        given = call("_idlc.to_array", code, name, f'"{name}"')
+        annotation = f"_idlc.{kind} = _idlc.{kind}()"
+        stored = call("_idlc.to_array", code, name, f'"{name}"')
     else:
-        dtype = f"_arrays.{numpy_name(field.type.element.name).upper()}"
+        dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
         values = "_arrays.Values"
-        declaration = f"{name}: _arrays.{kind} = _arrays.{kind}({field.type.size})"
-        given = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
-    return FieldView(
-        name,
-        declaration,
-        f"{name}: {values} | None = None",
-        tuple(_store(slot, name, fresh, given)),
-    )
-
-
-def comparison(field: ir.Field, receiver: str, references: References) -> str | Group:
-    """Return the expression that tells whether a field is equal in `receiver` and `other`.
-
-    It is a call for what may be an array, what has no type, and what is too long for a line.
-    """
-    slot = pynames.slot(field.name)
-    plain = f"{receiver}.{slot} == other.{slot}"
-    values = isinstance(field.type, (ir.Array, ir.Sequence)) and isinstance(
-        field.type.element, ir.Primitive
-    )
-    element = ir.element_of(field.type)
-    untyped = isinstance(element, ir.Ref) and element.target in references.implied
-    if values or untyped or len(plain) > WIDTH - 16:
-        return call("_idlc.same", f"{receiver}.{slot}", f"other.{slot}")
-    return plain
+        annotation = f"_arrays.{kind} = _arrays.{kind}({field.type.size})"
+        stored = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
+    return _Shape(annotation, f"{values} | None = None", stored, fresh)
 
 
 def default_constant(field: ir.Field) -> list[str]:

@@ -71,33 +71,28 @@ def prose(line: str) -> str:
     return shown.replace('"""', '\\"\\"\\"').rstrip()
 
 
-def docstring(lines: list[str], indent: int) -> list[str]:
-    """Return finished lines (see `prose`) as a docstring, indented."""
-    margin = " " * indent
-    first, *rest = lines or [""]
-    first = first.lstrip()
-    if not rest:
-        # A quote at the end would join the closing quotes.
-        end = '\\"' if first.endswith('"') and not first.endswith('\\"') else None
-        first = first[:-1] + end if end else first
-        return [f'{margin}"""{_safe_start(first)}"""']
-    body = [f"{margin}{line}" if line else "" for line in rest]
-    return [f'{margin}"""{_safe_start(first)}', *body, f'{margin}"""']
+def docstring(lines: list[str], *, one_line: bool) -> str:
+    """Return finished lines (see `prose`) as they stand after the opening quotes of a docstring.
+
+    With `one_line`, the closing quotes follow if there is but one.
+    """
+    first = lines[0].lstrip()
+    if one_line and len(lines) == 1 and first.endswith('"') and not first.endswith('\\"'):
+        first = first[:-1] + '\\"'  # would join the closing quotes
+    if first.startswith('"'):
+        first = "\\" + first
+    return "\n".join([first, *lines[1:]])
 
 
-def _safe_start(line: str) -> str:
-    return "\\" + line if line.startswith('"') else line
-
-
-def wrapped(words: str, indent: int, first: int) -> list[str]:
-    """Return words wrapped for a docstring of class members, hanging by four columns."""
-    if first + len(words) <= WIDTH - 4:
-        return [" " * first + words]
+def wrapped(words: str, indent: int, hanging: int = 0) -> list[str]:
+    """Return words on lines that fit when they are indented, all but the first by `hanging` too."""
+    width = WIDTH - 4 - indent
+    if len(words) <= width:
+        return [words]
     return textwrap.wrap(
         words,
-        WIDTH - 4,
-        initial_indent=" " * first,
-        subsequent_indent=" " * indent,
+        width,
+        subsequent_indent=" " * hanging,
         break_long_words=False,
         break_on_hyphens=False,
     )

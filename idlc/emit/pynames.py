@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import builtins
 import keyword
-import re
 import sys
 from collections.abc import Iterable, Mapping
 from importlib.machinery import BuiltinImporter, FrozenImporter
@@ -23,8 +22,20 @@ Modules: TypeAlias = Mapping[ir.TypeName, ModuleName]
 
 #: Names that the emitted codecs use themselves, or may come to use.
 CODEC_NAMES = frozenset(
-    {"at", "chars", "count", "data", "decode", "encode", "end", "join", "limit", "low"}
-    | {"message", "order", "parts", "put", "raw", "reading", "size", "struct", "to_str", "view"}
+    {"at", "chars", "count", "data", "decode", "encode", "end", "join", "kind", "limit"}
+    | {
+        "low",
+        "message",
+        "order",
+        "parts",
+        "put",
+        "raw",
+        "reading",
+        "size",
+        "struct",
+        "to_str",
+        "view",
+    }
     | {"words"}
 )
 
@@ -45,12 +56,6 @@ _NEEDED = frozenset(("numpy",))
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
 
 
-def natural(name: str) -> list[tuple[int, str]]:
-    """Return a key that sorts numbers in names by their value, as linters do."""
-    parts = re.findall(r"\d+|\D+", name)
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
-
-
 def modules(names: Iterable[ir.TypeName]) -> Modules:
     """Return the module that holds each interface, without its package.
 
@@ -63,6 +68,16 @@ def modules(names: Iterable[ir.TypeName]) -> Modules:
         number = taken[name.kind, module] = taken.get((name.kind, module), 0) + 1
         found[name] = ModuleName(module if number == 1 else f"{module}_{number}")
     return found
+
+
+def codec_module(module: str) -> ModuleName:
+    """Return the module of the codecs of a module; no interface's has two underscores inside."""
+    return ModuleName(f"{module}__codec")
+
+
+def protocol_module(module: str) -> ModuleName:
+    """Return the module of what ROS 2 adds to the service or action of a module."""
+    return ModuleName(f"{module}__protocol")
 
 
 def class_(name: ir.TypeName) -> ClassName:
@@ -81,7 +96,7 @@ def field(name: str) -> FieldName:
 
 
 def hides_method(name: str) -> bool:
-    """Whether a message class offers a method of a field's name."""
+    """Return whether a message class offers a method of a field's name."""
     return name in METHODS
 
 

@@ -7,10 +7,12 @@ own and a trailing comma, which formatters keep.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
 import msgspec
 
+#: Columns in generated packages; who writes other files gives another width.
 WIDTH = 88
 
 
@@ -35,14 +37,15 @@ class Group(msgspec.Struct, frozen=True):
 
 
 class Comprehension(msgspec.Struct, frozen=True):
-    """A list comprehension: what is made of each element, and each `for`."""
+    """A list comprehension: what is made of each element; each `for`'s targets and iterable."""
 
     element: Node
-    loops: tuple[str, ...]
+    loops: tuple[tuple[str, Node], ...]
 
     def flat(self) -> str:
         """Return the comprehension on one line."""
-        return f"[{flat(self.element)} {' '.join(self.loops)}]"
+        loops = (f"for {targets} in {flat(values)}" for targets, values in self.loops)
+        return f"[{flat(self.element)} {' '.join(loops)}]"
 
 
 Node: TypeAlias = str | Group | Comprehension
@@ -63,43 +66,57 @@ def flat(node: Node) -> str:
     return node if isinstance(node, str) else node.flat()
 
 
-def lines(node: Node, indent: int, before: str = "", after: str = "") -> list[str]:
+def lines(node: Node, indent: int, before: str = "", after: str = "", width: int = 0) -> list[str]:
     """Return `before`, the node and `after` as lines, indented by `indent` columns."""
     margin = " " * indent
+    width = width or WIDTH
     if isinstance(node, str):
         return [f"{margin}{before}{node}{after}"]
     one = f"{margin}{before}{node.flat()}{after}"
-    if len(one) <= WIDTH:
+    if len(one) <= width:
         return [one]
     if isinstance(node, Comprehension):
         body = [f"{margin}    {node.flat()[1:-1]}"]
-        if len(body[0]) > WIDTH:
-            body = lines(node.element, indent + 4)
-            body += [f"{margin}    {loop}" for loop in node.loops]
+        if len(body[0]) > width:
+            body = lines(node.element, indent + 4, width=width)
+            for targets, values in node.loops:
+                body += lines(values, indent + 4, f"for {targets} in ", width=width)
         return [f"{margin}{before}[", *body, f"{margin}]{after}"]
-    return _broken(node, indent, before, f"{node.after}{after}")
+    return _broken(node, indent, before, f"{node.after}{after}", width)
 
 
-def _broken(group: Group, indent: int, before: str = "", after: str = "") -> list[str]:
+def _broken(
+    group: Group, indent: int, before: str = "", after: str = "", width: int = 0
+) -> list[str]:
     """Return a group with each item on a line of its own; a comma follows each."""
     margin = " " * indent
     result = [f"{margin}{before}{group.before}{group.brackets[0]}"]
     for item in group.items:
-        result += lines(item, indent + 4, "", ",")
+        result += lines(item, indent + 4, "", ",", width)
     result.append(f"{margin}{group.brackets[1]}{after}")
     return result
 
 
-def all_of(conditions: list[str], indent: int) -> list[str]:
+def import_from(module: str, names: Sequence[str], indent: int = 0, width: int = 0) -> list[str]:
+    """Return the lines of an import statement."""
+    margin = " " * indent
+    one = f"{margin}from {module} import {', '.join(names)}"
+    if len(one) <= (width or WIDTH) or " as " in one:
+        return [one]
+    items = [f"{margin}    {name}," for name in names]
+    return [f"{margin}from {module} import (", *items, f"{margin})"]
+
+
+def all_of(conditions: Sequence[str], indent: int) -> list[str]:
     """Return lines that return whether all conditions are true."""
     margin = " " * indent
-    text = " and ".join(conditions) or "True"
-    if len(margin) + len(text) + 7 <= WIDTH:
-        return [f"{margin}return {text}"]
+    one = f"{margin}return {' and '.join(conditions)}"
+    if len(one) <= WIDTH:
+        return [one]
     return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
 
 
-def _spread(conditions: list[str], word: str, indent: int) -> list[str]:
+def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
     one = f"{margin}{f' {word} '.join(conditions)}"
@@ -108,19 +125,15 @@ def _spread(conditions: list[str], word: str, indent: int) -> list[str]:
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
 
 
-def if_any(conditions: list[str], rest: Group, indent: int) -> list[str]:
-    """Return the head of an `if`: one of the conditions, and the call `rest`."""
+def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
+    """Return the head of an `if` of one condition, or else all of the others."""
     margin = " " * indent
-    if len(conditions) == 1:
-        return lines(rest, indent, f"if {conditions[0]} and ", ":")
-    either = " or ".join(conditions)
-    before = f"if ({either}) and "
-    if len(margin) + len(before) + len(rest.before) < WIDTH:
-        result = lines(rest, indent, before, ":")
-        items = ", ".join(map(flat, rest.items))
-        return result if len(result) == 1 else [result[0], f"{margin}    {items}", result[-1]]
-    end = f"{margin}) and {flat(rest)}:"
-    return [f"{margin}if (", *_spread(conditions, "or", indent + 4), end]
+    if len(rest) < 2:
+        return any_of([first, *rest], indent, "if ", ":")
+    one = f"{margin}if {first} or ({' and '.join(rest)}):"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:

@@ -2,55 +2,74 @@
 
 from __future__ import annotations
 
+import builtins
 from collections import defaultdict
 from collections.abc import Iterable
 
 from idlc.emit import pynames
 from idlc.emit.codec import wire_plan
+from idlc.emit.imports import statements
 from idlc.model import derive, ir
+
+
+class Homes:
+    """The module of each structure of a package, without the package and the kind."""
+
+    def __init__(self, interface: ir.Interface, modules: pynames.Modules) -> None:
+        self.modules = modules
+        self.classes = modules[interface.name]
+        self.protocol = pynames.protocol_module(self.classes)
+        self.sections = {message.name for message in derive.sections(interface)}
+        self.derived = {message.name for message in derive.messages(interface)} - self.sections
+
+    def of(self, structure: ir.TypeName) -> pynames.ModuleName:
+        """Return the module that defines a structure's class."""
+        if structure in self.sections:
+            return self.classes
+        return self.protocol if structure in self.derived else self.modules[structure]
 
 
 class References:
     """The names of all classes that a module mentions.
 
-    `direct` are the types of fields as written in the file, imported with the module; `implied`
-    those of derived fields in other packages, imported when used, so that a service's request can
-    be used without them.
+    `own` are the structures that it defines, `others` those of other packages that their fields
+    name. `direct` are imported with the module; `implied` are others of fields that ROS 2 adds,
+    imported when they are used, so that each part of a protocol needs only what it holds.
     """
 
     def __init__(
-        self, interface: ir.Interface, messages: wire_plan.Messages, modules: pynames.Modules
+        self,
+        interface: ir.Interface,
+        structures: Iterable[ir.Message],
+        messages: wire_plan.Messages,
+        homes: Homes,
     ) -> None:
-        self._modules = modules
+        self._homes = homes
         self.package = interface.name.package
-        self.own = {message.name for message in derive.messages(interface)}
-        written = {message.name for message in derive.sections(interface)}
-        self.direct: set[ir.TypeName] = set()
-        self.implied: set[ir.TypeName] = set()
-        for message in derive.messages(interface):
-            for name in referred(message):
-                if name in self.own:
-                    continue
-                if message.name in written or name.package == self.package:
-                    self.direct.add(name)
-                else:
-                    self.implied.add(name)
-        self.implied -= self.direct
+        self.kind = interface.name.kind
+        self.own = {message.name for message in structures}
+        named = {name for message in structures for name in message.references} - self.own
+        self.others = {name for name in named if name.package != self.package}
+        self.implied = self.others if self.own & homes.derived else set()
+        self.direct = named - self.implied
         groups = {interface.name, *(service.name for service in derive.services(interface))}
         self._names = self._named(self.own | groups, _closure(self.own, messages))
 
     def _named(
         self, own: set[ir.TypeName], others: set[ir.TypeName]
     ) -> dict[ir.TypeName, pynames.ClassName]:
-        """Return each structure's class; those that the module defines keep their plain name."""
+        """Return each structure's class; those that the module defines keep their plain name.
+
+        Others get another one if something else has it: an exception of Python, for example.
+        """
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
         for name in own | others:
             by_class[pynames.class_(name)].append(name)
         return {
             name: pynames.class_(name)
-            if name in own or len(same) == 1
+            if name in own or (len(same) == 1 and not hasattr(builtins, class_))
             else pynames.qualified_class(name)
-            for same in by_class.values()
+            for class_, same in by_class.items()
             for name in same
         }
 
@@ -68,25 +87,33 @@ class References:
         """Return the modules of implied types, with their names in this module."""
         return sorted({(f"{type_.package}.{type_.kind}", _module(type_)) for type_ in self.implied})
 
-    def imports(self, types: Iterable[ir.TypeName], kind: ir.Kind) -> tuple[list[str], list[str]]:
-        """Return import statements, those of this package and those of others, sorted."""
-        inside: set[tuple[int, str, str]] = set()
+    def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
+        """Return import statements, those of this package and those of others, sorted.
+
+        Those of others are indented by four more columns.
+        """
+        inside: dict[tuple[int, str], set[str]] = defaultdict(set)
         outside: dict[str, set[str]] = defaultdict(set)
         for type_ in types:
-            target = pynames.class_(type_)
-            if self.name(type_) != target:
-                target = pynames.ClassName(f"{target} as {self.name(type_)}")
+            name: str = pynames.class_(type_)
+            if self.name(type_) != name:
+                name = f"{name} as {self.name(type_)}"
             if type_.package != self.package:
-                outside[f"{type_.package}.{type_.kind}"].add(target)
-            elif type_.kind == kind:
-                inside.add((1, f".{self._modules[type_]}", target))
+                outside[f"{type_.package}.{type_.kind}"].add(name)
+            elif type_.kind == self.kind:
+                inside[1, f".{self._homes.of(type_)}"].add(name)
             else:
-                inside.add((0, f"..{type_.kind}.{self._modules[type_]}", target))
+                inside[0, f"..{type_.kind}.{self._homes.of(type_)}"].add(name)
         return (
-            [f"from {module} import {target}" for _, module, target in sorted(inside)],
             [
-                f"from {module} import {', '.join(sorted(targets))}"
-                for module, targets in sorted(outside.items())
+                line
+                for (_, module), names in sorted(inside.items())
+                for line in statements(module, names, indent)
+            ],
+            [
+                line
+                for module, names in sorted(outside.items())
+                for line in statements(module, names, indent + 4)
             ],
         )
 
@@ -95,30 +122,12 @@ def _module(type_: ir.TypeName) -> str:
     return f"_{type_.package}_{type_.kind}"
 
 
-def referred(message: ir.Message) -> list[ir.TypeName]:
-    """Return the structures that a structure's fields name, in order."""
-    elements = (ir.element_of(field.type) for field in message.fields)
-    return [element.target for element in elements if isinstance(element, ir.Ref)]
-
-
 def _closure(own: set[ir.TypeName], messages: wire_plan.Messages) -> set[ir.TypeName]:
     found: set[ir.TypeName] = set()
     waiting = list(own)
     while waiting:
-        for name in referred(messages[waiting.pop()]):
+        for name in messages[waiting.pop()].references:
             if name not in found:
                 found.add(name)
                 waiting.append(name)
     return found
-
-
-def wrapped(statements: list[str]) -> list[str]:
-    """Break import statements that are too long inside a block."""
-    result = []
-    for statement in statements:
-        head, _, names = statement.partition(" import ")
-        if len(statement) + 8 <= 88:
-            result.append(statement)
-        else:
-            result += [f"{head} import (", *(f"    {n}," for n in names.split(", ")), ")"]
-    return result

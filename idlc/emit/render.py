@@ -5,37 +5,17 @@ Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made h
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
 import jinja2
-import msgspec
 
 from idlc.emit import listing, pynames, type_data, view
 from idlc.model import ir, link
+from idlc.templating import RenderedFile, environment
 
 PACKAGE = Path(__file__).parent.parent
-
-
-class RenderedFile(msgspec.Struct, frozen=True):
-    """A file to write: `path` with slashes, relative to the package's folder."""
-
-    path: str
-    text: str
-
-
-@cache
-def environment() -> jinja2.Environment:
-    """Return the environment of all templates: strict, without filters of our own."""
-    folders = [PACKAGE / "templates", PACKAGE.parent / "templates"]
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folders),
-        undefined=jinja2.StrictUndefined,
-        autoescape=False,  # noqa: S701 (Python source, escaped by emit.literals)
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
 
 
 @cache
@@ -60,12 +40,13 @@ def support_packages() -> list[str]:
     return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
 
 
-def module_file(
+def module_files(
     interface: ir.Interface, model: link.Model, modules: pynames.Modules
-) -> RenderedFile:
-    """Return the module of one interface."""
-    page = view.module(interface, model.messages, modules)
-    return RenderedFile(page.path, _template("message/module.py.jinja").render(module=page))
+) -> Iterator[RenderedFile]:
+    """Yield the modules of one interface."""
+    for module in view.modules(interface, model.messages, modules):
+        template = _template(f"message/{module.template}.py.jinja")
+        yield RenderedFile(module.path, template.render(module=module))
 
 
 def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
@@ -74,7 +55,7 @@ def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
     The model must be without errors: no `Unknown` type, nothing that is not found.
     """
     modules = pynames.modules(interface.name for interface in model.own)
-    files = [module_file(interface, model, modules) for interface in model.own]
+    files = [file for own in model.own for file in module_files(own, model, modules)]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = listing.package(model, kind, modules)
         text = _template("message/package_init.py.jinja").render(package=page)

@@ -17,10 +17,7 @@ def idl(interface: ir.Interface) -> str:
     parts = derive.sections(interface)
     included = {
         f'#include "{target.package}/{target.kind}/{target.name}.idl"'
-        for part in parts
-        for field in part.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-        for target in (element.target,)
+        for target in derive.references(interface)
     }
     body = [line for part in parts for line in _structure(part)]
     inner = [f"module {name.kind} {{", *_indented(body), "};"]

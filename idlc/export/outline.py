@@ -54,7 +54,7 @@ def _fields(message: ir.Message, model: Model, depth: int) -> Iterator[tuple[str
 
 
 def _commented(code: str, comment: tuple[str, ...], column: int) -> Iterator[str]:
-    """Yield a line of code with its comment behind it, the rest of that below."""
+    """Yield a line of code with its comment after it, the rest of that below."""
     if not comment:
         yield code
         return

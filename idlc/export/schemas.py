@@ -60,12 +60,11 @@ def _used(parts: tuple[ir.Message, ...], model: Model) -> Iterator[ir.TypeName]:
     seen: set[ir.TypeName] = set()
     waiting = list(reversed(parts))
     while waiting:
-        for field in waiting.pop().fields:
-            element = ir.element_of(field.type)
-            if isinstance(element, ir.Ref) and element.target not in seen:
-                seen.add(element.target)
-                yield element.target
-                waiting.insert(0, model.messages[element.target])
+        for target in waiting.pop().references:
+            if target not in seen:
+                seen.add(target)
+                yield target
+                waiting.insert(0, model.messages[target])
 
 
 def json_schema(interface: ir.Interface, model: Model) -> Json:

@@ -7,8 +7,6 @@ from idlc.model import ir
 SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
 TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
-CANCEL_GOAL = ir.TypeName("action_msgs", "srv", "CancelGoal")
-GOAL_STATUS_ARRAY = ir.TypeName("action_msgs", "msg", "GoalStatusArray")
 
 #: What each kind of file needs beside the types that it names.
 IMPLICIT_PACKAGES: dict[ir.Kind, tuple[str, ...]] = {
@@ -118,6 +116,11 @@ def sections(interface: ir.Interface) -> tuple[ir.Message, ...]:
             return (interface.request, interface.response)
         case ir.Action():
             return (interface.goal, interface.result, interface.feedback)
+
+
+def references(interface: ir.Interface) -> set[ir.TypeName]:
+    """Return the structures that an interface's file names as types of fields."""
+    return {target for section in sections(interface) for target in section.references}
 
 
 def pseudo_structures(interface: ir.Interface) -> tuple[ir.Message, ...]:

@@ -55,6 +55,11 @@ class PrimitiveInfo(NamedTuple):
     low: int | None = None
     high: int | None = None
 
+    @property
+    def dtype(self) -> str:
+        """How numpy calls it."""
+        return {"float": "float32", "double": "float64"}.get(self.idl, self.idl)
+
 
 PRIMITIVES: dict[str, PrimitiveInfo] = {
     "bool": PrimitiveInfo("boolean", 15, "?", 1),
@@ -178,6 +183,12 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     def wire_fields(self) -> tuple[Field, ...]:
         """The fields as hashed and sent: a dummy member where there are none (language 5, 8.6)."""
         return self.fields or (Field(name=DUMMY_FIELD, type=Primitive("uint8")),)
+
+    @property
+    def references(self) -> tuple[TypeName, ...]:
+        """The structures that the fields' types name, once for each field, in order."""
+        elements = (element_of(field.type) for field in self.fields)
+        return tuple(element.target for element in elements if isinstance(element, Ref))
 
 
 class Service(msgspec.Struct, frozen=True, kw_only=True):

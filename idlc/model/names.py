@@ -17,22 +17,22 @@ MESSAGE_HINT = "use letters and digits, a capital letter first"
 
 
 def is_package_name(name: str) -> bool:
-    """Tell whether a package may be called so."""
+    """Return whether a package may be called so."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_field_name(name: str) -> bool:
-    """Tell whether a field may be called so."""
+    """Return whether a field may be called so."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_constant_name(name: str) -> bool:
-    """Tell whether a constant may be called so."""
+    """Return whether a constant may be called so."""
     return _UPPER.fullmatch(name) is not None
 
 
 def is_message_name(name: str) -> bool:
-    """Tell whether a message may be called so; each derived suffix counts once, in this order."""
+    """Return whether a message may be called so; each derived suffix counts once, in this order."""
     name = name.removeprefix("Sample_")
     for suffix in _MESSAGE_SUFFIXES:
         name = name.removesuffix(suffix)

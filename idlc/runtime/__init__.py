@@ -26,10 +26,10 @@ from .cdr import (
     read_octets,
     text_phases,
 )
-from .codec import Codec, Reading, codec_for, maker
+from .codec import Codec, Reading, maker
 from .construction import construct
 from .errors import DecodeError, ValidationError, importing
-from .interfaces import Action, Imported, Package, Service, several
+from .interfaces import Action, Imported, Package, Service, complete, several
 from .lazy import Fresh, FreshList, lazily
 from .message import Message, dataclass, table
 from .objects import same
@@ -109,7 +109,7 @@ __all__ = [
     "ValidationError",
     "array",
     "array_of",
-    "codec_for",
+    "complete",
     "construct",
     "dataclass",
     "flags",

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from os import environ
 
+from .objects import owner_of
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +29,7 @@ def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
     """Make a message that checks its fields, as the environment asks for."""
     if "check_fields" in cls._fields_and_field_types:
         return type.__call__(cls, *values, **named)  # the name is a field's
-    if "_codec_" in cls.__dict__:
+    if owner_of(cls) is cls:
         return type.__call__(cls, *values, **{"check_fields": True, **named})
     message = type.__call__(cls, *values, **named)
     message._check_fields = True

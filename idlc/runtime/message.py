@@ -66,7 +66,10 @@ def metaclass_of(
     base: type[InterfaceMeta], name: str, namespace: dict[str, Any]
 ) -> Any:
     """Return a metaclass for one interface, in the module of its class like rosidl's."""
-    module = namespace["__module__"]
+    module = namespace["__module__"].removesuffix("__protocol")
+    if module != namespace["__module__"]:
+        namespace["__module__"] = module
+        namespace.pop("__firstlineno__", None)  # that is another file's
     made = type(f"Metaclass_{name}", (base,), {"__module__": module})
     setattr(sys.modules.get(module), made.__name__, made)
     return made
@@ -124,7 +127,7 @@ class MessageMeta(InterfaceMeta):
 class Message(metaclass=MessageMeta):
     """The base of all generated messages.
 
-    `_codec_` makes the functions that read and write one byte order.
+    `_codec_` gives the functions that read and write one byte order.
     """
 
     __slots__ = ()
@@ -137,6 +140,7 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
+        _codec_ = OnDemand(codec.codecs_of)
         SLOT_TYPES = OnDemand(_slot_types)
         __dataclass_fields__ = OnDemand(_dataclass_fields)
         __dataclass_params__ = OnDemand(_dataclass_params)

@@ -1,8 +1,10 @@
-"""Lines of Python that are as long as they may be, and laid out as formatters do it."""
+"""Lines of users' files: as long as ament allows, and laid out as formatters do it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+
+from idlc.emit.python_lines import Group, import_from, lines
 
 WIDTH = 99
 INDENT = 4
@@ -10,10 +12,16 @@ INDENT = 4
 
 def call(function: str, words: Sequence[str], *, depth: int) -> list[str]:
     """Return the lines of a call: one if it fits, else a line for each argument."""
-    line = f"{function}({', '.join(words)})"
-    if depth * INDENT + len(line) <= WIDTH:
-        return [line]
-    return [f"{function}(", *(f"    {word}," for word in words), ")"]
+    return _unindented(Group(function, tuple(words)), depth * INDENT)
+
+
+def collection(head: str, opening: str, items: Sequence[str], closing: str) -> list[str]:
+    """Return the lines of a list, set or dictionary: one if it fits, else a line for each item."""
+    return _unindented(Group(head, tuple(items), brackets=opening + closing), 0)
+
+
+def _unindented(group: Group, indent: int) -> list[str]:
+    return [line[indent:] for line in lines(group, indent, width=WIDTH)]
 
 
 def logged(parts: Sequence[str], *, depth: int) -> list[str]:
@@ -46,9 +54,7 @@ def imports(modules: Mapping[str, Iterable[str]], plain: Iterable[str]) -> list[
         ordered = sorted(set(names) - renamed, key=lambda name: (name.lower(), name))
         if not ordered:
             continue
-        line = f"from {module} import {', '.join(ordered)}"
-        if len(line) > WIDTH:
-            line = "\n".join([f"from {module} import (", *(f"    {n}," for n in ordered), ")"])
+        line = "\n".join(import_from(module, ordered, width=WIDTH))
         found.append((module.lower(), ordered[0].lower(), line))
     return [line for *_, line in sorted(found)]
 
@@ -62,13 +68,5 @@ def signature(head: str, parameters: Sequence[str], returns: str, *, depth: int)
     inner = f"{margin}    {', '.join(parameters)}"
     if len(inner) <= WIDTH:
         return f"{head}(\n{inner}\n{margin}) -> {returns}:"
-    lines = "".join(f"{margin}    {one},\n" for one in parameters)
-    return f"{head}(\n{lines}{margin}) -> {returns}:"
-
-
-def collection(head: str, opening: str, items: Sequence[str], closing: str) -> list[str]:
-    """Return the lines of a list, set or dictionary: one if it fits, else a line for each item."""
-    line = f"{head}{opening}{', '.join(items)}{closing}"
-    if len(line) <= WIDTH:
-        return [line]
-    return [f"{head}{opening}", *(f"    {item}," for item in items), closing]
+    each = "".join(f"{margin}    {one},\n" for one in parameters)
+    return f"{head}(\n{each}{margin}) -> {returns}:"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.emit.pynames import why_not_package
-from idlc.emit.render import environment
+from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"
 LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
@@ -117,6 +117,11 @@ _CMAKE_FILES = {
     "pyproject.toml": "package/interfaces_pyproject.toml.jinja",
     "README.md": "package/README.md.jinja",
 }
+#: Files of a new package that are edited later on.
+GROWING = (
+    *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
+    *("README.md", ".gitattributes", ".gitignore"),
+)
 #: What would not be found any more next to a package of such a name.
 _TAKEN = frozenset(
     "action idlc launch launch_ros msg pytest rclpy resource setuptools srv test".split()
@@ -133,12 +138,17 @@ def check_name(name: str) -> str:
     return name
 
 
-def files(package: Package) -> dict[str, str]:
+def plain(name: str) -> Package:
+    """Return a package of which only the name matters."""
+    return Package(name, "", "", "", LICENSES[0])
+
+
+def files(package: Package, templates: Templates) -> dict[str, str]:
     """Return the texts of a new package's files by their paths in its folder."""
-    templates = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
+    listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
     found = {
-        path.replace("NAME", package.name): rendered(template, package)
-        for path, template in templates.items()
+        path.replace("NAME", package.name): rendered(template, package, templates)
+        for path, template in listed.items()
     }
     found["LICENSE"] = license_text(package)
     if package.build_type == PYTHON:
@@ -147,9 +157,9 @@ def files(package: Package) -> dict[str, str]:
     return found
 
 
-def rendered(template: str, package: Package) -> str:
+def rendered(template: str, package: Package, templates: Templates) -> str:
     """Return the text of one of a package's files."""
-    return environment().get_template(template).render(package=package)
+    return templates.render(template, package=package)
 
 
 def license_text(package: Package) -> str:

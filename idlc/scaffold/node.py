@@ -4,37 +4,26 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from idlc.emit.render import environment
 from idlc.model import derive
-from idlc.scaffold import arguments, spec
-from idlc.scaffold.endpoints import IMPORTS, LATCHED, QOS_IMPORTS, Endpoints, Part
-from idlc.scaffold.line_breaks import call, imports
+from idlc.scaffold import arguments, qos, spec
+from idlc.scaffold.import_list import ImportList
+from idlc.scaffold.line_breaks import call
 from idlc.scaffold.planned import Plan
-from idlc.scaffold.samples import INDENT, Page
-from idlc.scaffold.states import PAUSING, StatesView, kept, pauses, states
+from idlc.scaffold.roles import ROLES
+from idlc.scaffold.roles.role import Context, Part
+from idlc.scaffold.samples import Page
+from idlc.scaffold.states import StatesView, plain, remembered, states
+from idlc.scaffold.templates import Templates
 
-#: Names that a module of a node uses itself.
+#: The module of the package that has what every `main` needs.
+MAIN_MODULE = "node_main"
+#: Names that a module of a node uses itself, whatever its roles.
 _OWN = (
-    *(
-        "Any",
-        "Callable",
-        "Coroutine",
-        "ExternalShutdownException",
-        "Future",
-        "LifecycleNode",
-        "LifecycleState",
-    ),
-    *(
-        "ExitStack",
-        "Node",
-        "SignalHandlerOptions",
-        "SingleThreadedExecutor",
-        "TransitionCallbackReturn",
-    ),
-    *("ActionServer", "ActionClient", "CancelResponse", "ClientGoalHandle", "GoalResponse"),
-    *("Event", "GoalStatus", "ServerGoalHandle", "DurabilityPolicy", "QoSProfile", "LATCHED"),
+    *("Any", "Callable", "Coroutine", "ExitStack", "Future", "WakingExecutor"),
+    *("LifecycleNode", "LifecycleState", "Node", "TransitionCallbackReturn"),
+    *(name for preset in qos.PRESETS for name in (*preset.imports, preset.source)),
+    *(name for role in ROLES for names in role.imports.values() for name in names),
 )
-_STANDARD = {"argparse", "collections.abc", "contextlib", "sys", "time", "threading", "typing"}
 #: The longest description of a node that fits wherever it stands.
 SUMMARY = 70
 CLOCK = "self.get_clock().now().to_msg()"
@@ -42,7 +31,7 @@ TIMEOUT = "server_timeout"
 
 
 class ParameterView(NamedTuple):
-    """A parameter as its property shows it."""
+    """A parameter as its property shows it: its name, that in Python, its type and its value."""
 
     name: str
     word: str
@@ -51,20 +40,28 @@ class ParameterView(NamedTuple):
 
 
 class MainView(NamedTuple):
-    """The function that runs the node, and the command line that it reads."""
+    """The function `main`: the template that lays it out, and what it does.
+
+    `run` calls it, `node` makes the node. `tasks` start what the node asks others for;
+    `arguments` are the lines that declare the command line, `requests` the functions that make
+    requests of it.
+    """
 
     template: str
     run: str
-    init_arguments: str
-    before: tuple[str, ...]
+    node: str
     tasks: tuple[str, ...]
-    cancels: tuple[str, ...]
     arguments: tuple[str, ...]
     requests: tuple[arguments.RequestView, ...]
 
 
 class NodeView(NamedTuple):
-    """What the template shows; lines are finished, without their indentation."""
+    """What the template of a node shows; lines are finished, without their indentation.
+
+    `base` is the class that it extends, `setup` its `__init__`, `states` what it does when the
+    state of its lifecycle changes. `has_pause`, `has_until` and `has_retire` say which methods
+    its parts need.
+    """
 
     name: str
     class_name: str
@@ -76,95 +73,94 @@ class NodeView(NamedTuple):
     setup: tuple[str, ...]
     parameters: tuple[ParameterView, ...]
     parts: tuple[Part, ...]
-    timers: tuple[str, ...]
-    pauses: bool
-    retires: bool
+    has_pause: bool
+    has_until: bool
+    has_retire: bool
     has_arguments: bool
     lifecycle: bool
     states: StatesView
     main: MainView
 
 
-def render(planned: Plan) -> str:
+def render(planned: Plan, templates: Templates) -> str:
     """Return the text of a node's module."""
-    return environment().get_template("node/module.py.jinja").render(node=view(planned))
+    return templates.render("node/module.py.jinja", node=view(planned))
 
 
 def view(planned: Plan) -> NodeView:
     """Return the lines of a node's module."""
     node = planned.node
     page = Page(planned.messages, clock=CLOCK, taken=_OWN, own=node.package)
-    endpoints = Endpoints(page, lifecycle=node.lifecycle)
-    triples = zip(node.endpoints, planned.words, planned.interfaces, strict=True)
-    parts = tuple(endpoints.part(*one) for one in triples)
+    parts = _parts(planned, page)
     page.clock = None  # there is none where the command line is read
-    main = _main(planned, page)
-    timers = tuple("tick" if n == 0 else f"tick_{n + 1}" for n in range(len(node.timers)))
-    steps = states(node, parts, timers, _tasks(planned))
-    given = _given(planned)
-    created = () if node.lifecycle else (*steps.on_configure, *steps.on_activate)
     class_name = spec.class_name(node.name)
-    taken = class_name in page.names or class_name in _OWN
+    class_name += "Node" if class_name in page.names or class_name in _OWN else ""
+    main = _main(planned, page, class_name)
+    given, helpers = _given(planned), _helpers(node)
+    waits = "pause" in helpers
+    created = remembered(parts, waits=waits) if node.lifecycle else ()
+    begun = () if node.lifecycle else plain(parts)
     return NodeView(
         name=node.name,
-        class_name=f"{class_name}Node" if taken else class_name,
+        class_name=class_name,
         base="LifecycleNode" if node.lifecycle else "Node",
         summary=_summary(node),
         imports=_imports(planned, page),
-        constants=_constants(node),
+        constants=constants(node),
         init_head=given.head,
-        setup=(*given.setup, *kept(node, parts), *_declarations(node), *created),
+        setup=(*given.setup, *created, *_declarations(node), *begun),
         parameters=tuple(map(_parameter, node.parameters)),
         parts=parts,
-        timers=timers,
-        pauses=pauses(parts),
-        retires=node.lifecycle and any("action" in part.role for part in parts),
-        has_arguments=bool(planned.clients),
+        has_pause=waits,
+        has_until="until" in helpers,
+        has_retire="retire" in helpers and node.lifecycle,
+        has_arguments=bool(planned.asking),
         lifecycle=node.lifecycle,
-        states=steps,
+        states=states(parts, _tasks(planned), waits=waits),
         main=main,
     )
 
 
-def _main(planned: Plan, page: Page) -> MainView:
+def _parts(planned: Plan, page: Page) -> tuple[Part, ...]:
+    parts = []
+    for endpoint, word, interface in planned.endpoints:
+        type_ = page.use(interface.name) if interface else ""
+        sections = derive.sections(interface) if interface else ()
+        context = Context(endpoint, word, type_, sections, page, planned.node.lifecycle)
+        parts.append(endpoint.role.node(context))
+    return tuple(parts)
+
+
+def _helpers(node: spec.Node) -> set[str]:
+    return {helper for endpoint in node.endpoints for helper in endpoint.role.helpers}
+
+
+def _main(planned: Plan, page: Page, class_name: str) -> MainView:
     requests, declared = _requests(planned, page)
-    has_arguments = bool(planned.clients)
-    goals = [word for endpoint, word, _ in planned.clients if endpoint.role == "action_client"]
     return MainView(
         template="node/main_once.py.jinja" if planned.once else "node/main.py.jinja",
         run="sys.exit(main())" if planned.once else "main()",
-        init_arguments=_given(planned).call,
-        before=("given = parse_arguments(args)",) if has_arguments else (),
-        tasks=_given_tasks(planned),
-        cancels=tuple(f"node.cancel_{word}" for word in goals),
+        node=f"{class_name}({_given(planned).call})",
+        tasks=_started(planned),
         arguments=tuple(declared),
         requests=tuple(requests),
     )
 
 
-_DOES = {
-    "publisher": "publishes {}",
-    "subscriber": "listens to {}",
-    "service": "serves {}",
-    "client": "calls {}",
-    "action_server": "works on goals for {}",
-    "action_client": "sends goals to {}",
-}
-
-
 def _summary(node: spec.Node) -> str:
     """Return what the node does, if that fits into a line."""
     kind = "lifecycle node" if node.lifecycle else "node"
-    does = [_DOES[endpoint.role].format(endpoint.topic) for endpoint in node.endpoints]
+    does = [one.role.summary.format(one.topic) for one in node.endpoints if one.role.summary]
     *most, last = does or [""]
     said = f"{', '.join(most)} and {last}" if most else last
     text = f"The {kind} {node.name} {said}.".replace(" .", ".")
     return text if len(text) <= SUMMARY else f"The {kind} {node.name}."
 
 
-def _constants(node: spec.Node) -> tuple[str, ...]:
-    latched = any(endpoint.qos == "latched" for endpoint in node.endpoints)
-    return (LATCHED, "") if latched else ()
+def constants(node: spec.Node) -> tuple[str, ...]:
+    """Return the lines that define what qualities of service are called."""
+    lines = {one.qos.constant: None for one in node.endpoints if one.qos.constant}
+    return (*lines, "") if lines else ()
 
 
 def _declarations(node: spec.Node) -> list[str]:
@@ -183,36 +179,35 @@ def _parameter(one: spec.Parameter) -> ParameterView:
 
 def _requests(planned: Plan, page: Page) -> tuple[list[arguments.RequestView], list[str]]:
     """Return the functions that make requests, and the lines that declare their arguments."""
-    clients = planned.clients
+    asking = planned.asking
     requests, declared = [], []
-    for endpoint, word, interface in clients:
+    for request, word, interface in asking:
         message = derive.sections(interface)[0]
-        prefix = "" if len(clients) == 1 else f"{word}_"
-        what = "the goal" if endpoint.role == "action_client" else "the request"
-        requests.append(arguments.request(message, page, word, what, prefix))
-        positional = planned.once and len(clients) == 1
+        prefix = "" if len(asking) == 1 else f"{word}_"
+        requests.append(arguments.request(message, page, word, request.title, prefix))
+        positional = planned.once and len(asking) == 1
         declared += arguments.lines(message, page, prefix, positional=positional)
     return requests, declared
 
 
 def _tasks(planned: Plan) -> list[tuple[str, str]]:
-    """Return the method that each client's work begins with, and what it is given."""
-    verbs = {"client": "call", "action_client": "send"}
-    return [(f"{verbs[e.role]}_{word}", f"{word}_request") for e, word, _ in planned.clients]
+    """Return the methods that begin to ask others, each with the function that makes a request."""
+    return [(f"{one.request.method}_{one.word}", f"{one.word}_request") for one in planned.asking]
 
 
-def _given_tasks(planned: Plan) -> tuple[str, ...]:
-    """Return what `main` starts: what clients do, unless they wait for the node's activation."""
+def _started(planned: Plan) -> tuple[str, ...]:
+    """Return what `main` starts, unless it waits for the node's activation."""
     if planned.node.lifecycle:
         return ()
-    head = "task = executor.create_task" if planned.once else "executor.create_task"
-    calls = (
-        call(head, [f"node.{method}", f"{request}(given)"], depth=2)
-        for method, request in _tasks(planned)
-    )
-    return tuple(
-        "\n".join([first, *(INDENT * 2 + line for line in rest)]) for first, *rest in calls
-    )
+    calls = []
+    for one, (method, request) in zip(planned.asking, _tasks(planned), strict=True):
+        words = [f"node.{method}", f"{request}(given)"]
+        if planned.once:
+            undone = [f"node.{one.request.cancel}_{one.word}"] if one.request.cancel else []
+            calls.append(call("once.run", ["node", *words, *undone], depth=2))
+        else:
+            calls.append(call("executor.create_task", words, depth=1))
+    return tuple(line for lines in calls for line in lines)
 
 
 class _Given(NamedTuple):
@@ -223,7 +218,7 @@ class _Given(NamedTuple):
 
 def _given(planned: Plan) -> _Given:
     """Return how the class is told what the command line says."""
-    if not planned.clients:
+    if not planned.asking:
         return _Given("def __init__(self) -> None:", (), "")
     if planned.node.lifecycle:
         setup = ("self.given = given", f"self.timeout: float = given.{TIMEOUT}")
@@ -235,40 +230,25 @@ def _given(planned: Plan) -> _Given:
 def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
     """Return the import lines in groups: the standard library, then everything else."""
     node = planned.node
-    names: dict[str, set[str]] = {name: set(found) for name, found in page.imports().items()}
-
-    def add(module: str, *found: str) -> None:
-        if found:
-            names.setdefault(module, set()).update(found)
-
+    waits = "pause" in _helpers(node)
+    found = ImportList(page.imports())
     for endpoint in node.endpoints:
-        for module, found in IMPORTS.get(endpoint.role, {}).items():
-            add(module, *found)
-        add("rclpy.qos", *QOS_IMPORTS[endpoint.qos])
-    roles = {endpoint.role for endpoint in node.endpoints}
-    if roles & PAUSING:
-        add("rclpy.task", "Future")
-    if planned.clients:
-        add("collections.abc", "Callable")
-        add("rclpy.utilities", "remove_ros_args")
-    add("rclpy.utilities", "try_shutdown")
-    add("rclpy.executors", "ExternalShutdownException", "SingleThreadedExecutor")
-    if planned.once:
-        add("rclpy.signals", "SignalHandlerOptions")
-        add("threading", "Event")
-    else:
-        add("rclpy.utilities", "ok")
+        found.add_all(endpoint.role.imports)
+        found.add("rclpy.qos", *endpoint.qos.imports)
+    if waits:
+        found.add("rclpy.task", "Future")
+    if planned.asking:
+        found.add("collections.abc", "Callable")
+        found.add("rclpy.utilities", "remove_ros_args")
+    main = ("interruptible",) if planned.once else ("until_shutdown", "WakingExecutor")
+    found.add(f"{node.package}.{MAIN_MODULE}", *main)
     if node.lifecycle:
-        add("contextlib", "ExitStack")
-        if roles & PAUSING:
-            add("collections.abc", "Callable", "Coroutine")
-            add("typing", "Any")
-        add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
+        found.add("contextlib", "ExitStack")
+        found.add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
+        if waits:
+            found.add("collections.abc", "Callable", "Coroutine")
+            found.add("typing", "Any")
     else:
-        add("rclpy.node", "Node")
-    standard = {module: found for module, found in names.items() if module in _STANDARD}
-    others = {module: found for module, found in names.items() if module not in _STANDARD}
-    reading = ("argparse", "sys", "time") if planned.clients else ()
-    plain = (*reading, *(("signal",) if planned.once else ()))
-    groups = (imports(standard, plain), imports(others, ("rclpy",)))
-    return tuple(tuple(group) for group in groups if group)
+        found.add("rclpy.node", "Node")
+    reading = ("argparse", "sys", "time") if planned.asking else ()
+    return found.groups((*reading, *(() if planned.once else ("rclpy",))))

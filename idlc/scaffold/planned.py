@@ -2,52 +2,68 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from idlc.model import ir
 from idlc.scaffold import spec
+from idlc.scaffold.roles.role import Endpoint, Request
 
-_CLIENTS = ("client", "action_client")
+
+class Placed(NamedTuple):
+    """An endpoint with its interface, if its role has one, and a word for its names."""
+
+    endpoint: Endpoint
+    word: str
+    interface: ir.Interface | None
+
+
+class Asking(NamedTuple):
+    """An endpoint that sends a request or a goal, which the command line describes."""
+
+    request: Request
+    word: str
+    interface: ir.Interface
 
 
 class Plan(NamedTuple):
-    """A node with the interfaces of its endpoints and a word for each."""
+    """A node with its endpoints and all messages that those may need."""
 
     node: spec.Node
-    interfaces: tuple[ir.Interface, ...]
-    words: tuple[str, ...]
+    endpoints: tuple[Placed, ...]
     messages: Mapping[ir.TypeName, ir.Message]
+
+    @property
+    def asking(self) -> tuple[Asking, ...]:
+        """The endpoints that send requests or goals."""
+        return tuple(
+            Asking(placed.endpoint.role.request, placed.word, placed.interface)
+            for placed in self.endpoints
+            if placed.endpoint.role.request and placed.interface
+        )
 
     @property
     def once(self) -> bool:
         """Whether the node does what it is asked to and ends: it only calls others."""
-        node = self.node
-        only = all(endpoint.role in _CLIENTS for endpoint in node.endpoints)
-        return bool(node.endpoints) and only and not node.timers and not node.lifecycle
-
-    @property
-    def clients(self) -> tuple[tuple[spec.Endpoint, str, ir.Interface], ...]:
-        """The endpoints that send requests or goals."""
-        triples = zip(self.node.endpoints, self.words, self.interfaces, strict=True)
-        return tuple(one for one in triples if one[0].role in _CLIENTS)
+        endpoints = self.node.endpoints
+        only = all(endpoint.role.request for endpoint in endpoints)
+        return bool(endpoints) and only and not self.node.lifecycle
 
     @property
     def packages(self) -> list[str]:
         """The packages that the node's module imports, rclpy among them; its own is not."""
-        found = {interface.name.package for interface in self.interfaces} | {"rclpy"}
-        found |= (
-            {"action_msgs"}
-            if any(e.role == "action_client" for e in self.node.endpoints)
-            else set()
-        )
-        return sorted(found - {self.node.package})
+        used = {placed.interface.name.package for placed in self.endpoints if placed.interface}
+        modules = {module for one in self.node.endpoints for module in one.role.imports}
+        libraries = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names
+        return sorted(({"rclpy"} | used | libraries) - {self.node.package})
 
 
 def plan(
     node: spec.Node,
-    interfaces: Iterable[ir.Interface],
+    interfaces: Iterable[ir.Interface | None],
     messages: Mapping[ir.TypeName, ir.Message],
 ) -> Plan:
     """Return a node with the interfaces of its endpoints, in their order."""
-    return Plan(node, tuple(interfaces), tuple(spec.words(node.endpoints)), messages)
+    placed = zip(node.endpoints, spec.words(node.endpoints), interfaces, strict=True)
+    return Plan(node, tuple(Placed(*one) for one in placed), messages)

@@ -94,7 +94,7 @@ def constructed(
     depth: int,
     given: Mapping[str, str] | None = None,
 ) -> str:
-    """Return the lines that make a message, behind `head`, at a depth of indentation.
+    """Return the lines that make a message, after `head`, at a depth of indentation.
 
     `given` holds the values of fields that come from elsewhere.
     """

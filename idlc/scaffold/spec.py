@@ -9,29 +9,14 @@ import keyword
 import re
 import sys
 from collections.abc import Iterable
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from idlc.model import ir
-
-Role: TypeAlias = Literal[
-    "publisher", "subscriber", "service", "client", "action_server", "action_client"
-]
-#: Each role with the kind of interface that it speaks.
-ROLES: dict[Role, ir.Kind] = {
-    "publisher": "msg",
-    "subscriber": "msg",
-    "service": "srv",
-    "client": "srv",
-    "action_server": "action",
-    "action_client": "action",
-}
-QOS = ("default", "sensor_data", "latched")
-#: What separates a quality of service from the endpoint that it belongs to.
-QOS_MARK = "\0qos="
+from idlc.scaffold import qos
+from idlc.scaffold.roles import ROLES
+from idlc.scaffold.roles.role import Endpoint, Role
 
 #: Names that a module of a node cannot have in its package.
-TAKEN = frozenset({"msg", "srv", "action"})
-_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+TAKEN = frozenset({"msg", "srv", "action", "node_main"})
 _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 
@@ -49,21 +34,6 @@ PARAMETERS: dict[str, type[Scalar]] = {
 _BOOLEANS = {"true": True, "false": False}
 
 
-class Endpoint(NamedTuple):
-    """One thing that a node offers or uses; `rate` is in Hz, for publishers only."""
-
-    role: Role
-    type: str
-    topic: str
-    rate: float | None = None
-    qos: str = "default"
-
-    @property
-    def word(self) -> str:
-        """The topic as part of a Python name."""
-        return re.sub(r"[^a-z0-9]+", "_", self.topic.lower()).strip("_")[:30].rstrip("_")
-
-
 class Parameter(NamedTuple):
     """A parameter with its default."""
 
@@ -78,12 +48,11 @@ class Parameter(NamedTuple):
 
 
 class Node(NamedTuple):
-    """A node as asked for; `timers` are periods in seconds."""
+    """A node as asked for; its endpoints are in the order of the roles."""
 
     name: str
     package: str
     endpoints: tuple[Endpoint, ...] = ()
-    timers: tuple[float, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     lifecycle: bool = False
 
@@ -102,40 +71,18 @@ def check_name(name: str) -> str:
     return name
 
 
-def endpoint(role: Role, text: str) -> Endpoint:
-    """Return the endpoint that `TYPE:TOPIC[@HZ]` means."""
-    text, _, qos = text.partition(QOS_MARK)
-    type_, colon, topic = text.partition(":")
-    rate = None
-    if role == "publisher" and "@" in topic:
-        topic, _, hertz = topic.partition("@")
-        rate = _positive(hertz, f"the rate of `{topic}`", "Hz")
-    shape = "TYPE:TOPIC[@HZ]" if role == "publisher" else "TYPE:NAME"
-    if not colon or not type_ or not topic:
-        raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
-    if not _TOPIC.fullmatch(topic) or "__" in topic:
-        raise ValueError(
-            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
-            "and single underscores, parts separated by `/`"
-        )
-    if qos and ROLES[role] != "msg":
-        raise ValueError("--qos is for publishers and subscribers")
-    return Endpoint(role, type_, topic, rate, qos or "default")
+def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
+    """Return the endpoint that an option's value means, with a quality of service by its name."""
+    if preset is not None and role.kind != "msg":
+        options = ", ".join(one.option for one in ROLES if one.kind == "msg")
+        raise ValueError(f"--qos is for {options}")
+    quality = qos.DEFAULT if preset is None else qos.preset(preset)
+    return Endpoint(role, *role.read(text), quality)
 
 
-def period(text: str) -> float:
-    """Return a timer's period in seconds."""
-    return _positive(text, "the period of a timer", "seconds")
-
-
-def _positive(text: str, what: str, unit: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-6 <= value <= 1e6:
-        raise ValueError(f"{what} must be a number of {unit} above 0, not `{text}`")
-    return value
+def in_order(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
+    """Return endpoints in the order of the roles."""
+    return tuple(sorted(endpoints, key=lambda one: ROLES.index(one.role)))
 
 
 def parameter(text: str) -> Parameter:
@@ -164,7 +111,8 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
             return _BOOLEANS[text.lower()]
         value = type_(text)
     except (ValueError, KeyError):
-        raise ValueError(f"`{text}` is no {type_.__name__}, for the parameter `{name}`") from None
+        what = {"int": "an integer", "str": "a string"}.get(type_.__name__, f"a {type_.__name__}")
+        raise ValueError(f"`{text}` is not {what}, for the parameter `{name}`") from None
     if isinstance(value, float) and value - value != 0:
         raise ValueError(f"`{text}` is not finite, for the parameter `{name}`")
     if isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:
@@ -172,16 +120,12 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
     return value
 
 
-#: Roles whose endpoints share the names of attributes and methods.
-_FAMILIES = {"action_server": "action", "action_client": "action", "client": "action"}
-
-
 def words(endpoints: Iterable[Endpoint]) -> list[str]:
     """Return a word for each endpoint, no two the same where names are made of them."""
     seen: set[tuple[str, str]] = set()
     found = []
     for one in endpoints:
-        family, word, count = _FAMILIES.get(one.role, one.role), one.word, 1
+        family, word, count = one.role.family, one.word, 1
         while (family, word) in seen:
             count += 1
             word = f"{one.word}_{count}"

@@ -200,7 +200,7 @@ def _in(columns: set[_Edge], word: _Word) -> bool:
 
 
 def _is_even(block: _Column) -> bool:
-    """Tell whether the block's gaps are the same; a comment may stand where it likes if alone."""
+    """Return whether the block's gaps are the same; a comment may stand where it likes if alone."""
     gaps = {word.gap for row, word in block if not row.is_comment}
     alone = len(block) == 1 and block[0][1].kind != "comment"
     return len(gaps) == 1 and "" not in gaps and not alone
@@ -208,8 +208,8 @@ def _is_even(block: _Column) -> bool:
 
 def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
     """Return the column of the row nearest to one, the row above first; 0 if there is none."""
-    behind = bisect(anchors, (at, 0))
-    close = anchors[max(behind - 1, 0) : behind + 1]
+    after = bisect(anchors, (at, 0))
+    close = anchors[max(after - 1, 0) : after + 1]
     return min(close, key=lambda anchor: abs(anchor[0] - at), default=(0, 0))[1]
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, cast
 from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedInput
 
+from idlc.diagnostics import codes
 from idlc.syntax import tree
 from idlc.syntax.grammar import grammar
 
@@ -93,14 +94,7 @@ def definition(text: str) -> tree.Body:
     if isinstance(body, tuple):
         return tree.Field(type_, *body)
     equals = text.index("=", type_.whole.end)
-    name = body.get("CONSTANT_NAME", tree.Piece("", equals))
-    value = body.get("VALUE", tree.Piece("", len(text)))
-    stripped = value.text.lstrip()
-    return tree.Constant(
-        type_,
-        tree.Piece(name.text.rstrip(), name.start),
-        tree.Piece(stripped, value.start + len(value.text) - len(stripped)),
-    )
+    return tree.constant(type_, body.get("CONSTANT_NAME"), equals, body.get("VALUE"), len(text))
 
 
 def _type(text: str, name: tree.Piece, *parts: tree.Piece | _Array) -> tree.Type:
@@ -120,7 +114,7 @@ def _type(text: str, name: tree.Piece, *parts: tree.Piece | _Array) -> tree.Type
 def _broken_indent(text: str) -> tree.Broken:
     blank = len(text) - len(text.lstrip())
     return tree.Broken(
-        "indented-definition",
+        codes.INDENTED_DEFINITION,
         tree.Piece(text[:blank], 0),
         "a definition must begin in the first column",
         "remove the white space before it",
@@ -134,7 +128,7 @@ def _broken(text: str, error: UnexpectedInput) -> tree.Broken:
     if set(type_) == {"-"} and not space:
         alone = type_ == "---"
         return tree.Broken(
-            "malformed-separator",
+            codes.MALFORMED_SEPARATOR,
             whole,
             "a separator must be alone on its line" if alone else f"`{type_}` is not a separator",
             "remove the blanks or the comment after it"
@@ -143,10 +137,10 @@ def _broken(text: str, error: UnexpectedInput) -> tree.Broken:
         )
     if not space:
         hint = "write `TYPE name`; a comment begins with `#`"
-        return tree.Broken("missing-name", whole, f"`{type_}` has no name after it", hint)
+        return tree.Broken(codes.MISSING_NAME, whole, f"`{type_}` has no name after it", hint)
     at = min(getattr(error, "pos_in_stream", None) or 0, len(type_) - 1)
     return tree.Broken(
-        "malformed-type",
+        codes.MALFORMED_TYPE,
         tree.Piece(type_[at:], at) if at else whole,
         f"malformed type `{type_}`",
         _type_hint(type_),

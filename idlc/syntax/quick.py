@@ -61,14 +61,8 @@ def definition(text: str) -> tree.Body | None:
     )
     if found["field"] is not None:
         return tree.Field(type_, _piece(found, "field"), _optional(found, "default"))
-    name = _optional(found, "constant") or tree.Piece("", found.start("sign"))
-    value = _optional(found, "value") or tree.Piece("", len(text))
-    stripped = value.text.lstrip()
-    return tree.Constant(
-        type_,
-        tree.Piece(name.text.rstrip(), name.start),
-        tree.Piece(stripped, value.start + len(value.text) - len(stripped)),
-    )
+    name, value = _optional(found, "constant"), _optional(found, "value")
+    return tree.constant(type_, name, found.start("sign"), value, len(text))
 
 
 def _piece(found: re.Match[str], group: str) -> tree.Piece:

@@ -10,6 +10,7 @@ from typing import TypeAlias
 
 import msgspec
 
+from idlc.diagnostics.codes import Code
 from idlc.diagnostics.source import Source, Span
 
 #: An ordinary character for ROS 2, and therefore wrong wherever it stands (language 1.1).
@@ -26,7 +27,7 @@ class Piece(msgspec.Struct, frozen=True):
 
     @property
     def end(self) -> int:
-        """The offset behind the last character."""
+        """The offset after the last character."""
         return self.start + len(self.text)
 
 
@@ -57,10 +58,27 @@ class Constant(msgspec.Struct, frozen=True):
     value: Piece
 
 
-class Broken(msgspec.Struct, frozen=True):
-    """Code that is no definition: the guilty piece, a code's slug and words for the reader."""
+def constant(
+    type_: Type, name: Piece | None, equals: int, value: Piece | None, end: int
+) -> Constant:
+    """Return a constant without the spaces around its parts, of which one may be missing.
 
-    slug: str
+    `equals` is where its `=` stands, `end` where its line ends.
+    """
+    name = name or Piece("", equals)
+    value = value or Piece("", end)
+    stripped = value.text.lstrip()
+    return Constant(
+        type_,
+        Piece(name.text.rstrip(), name.start),
+        Piece(stripped, value.start + len(value.text) - len(stripped)),
+    )
+
+
+class Broken(msgspec.Struct, frozen=True):
+    """Code that is no definition: the guilty piece, and what to say about it."""
+
+    code: Code
     piece: Piece
     message: str
     hint: str
@@ -84,7 +102,7 @@ class Line(msgspec.Struct, frozen=True):
 
     @property
     def definition(self) -> str:
-        """The code as a definition: TABs as spaces, nothing behind it; may be empty."""
+        """The code as a definition: TABs as spaces, nothing after it; may be empty."""
         return self.code.replace("\t", " ").rstrip()
 
     @property

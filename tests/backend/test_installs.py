@@ -105,8 +105,8 @@ def test_pip_shows_the_report_of_a_rejected_interface(source, tmp_path):
     assert "Traceback" not in said
 
 
+@pytest.mark.ros  # colcon is installed with what needs ROS 2
 def test_colcon_takes_the_folder_for_one_of_cmake(scaffolded, tmp_path):
-    pytest.importorskip("colcon_ros")
     said = run(BIN / "colcon", "--log-base", tmp_path / "log", "list", cwd=scaffolded.parent)
     assert said.split("\t")[0] == "demo_msgs"
     assert said.split("\t")[2].strip() == "(ros.ament_cmake)"

@@ -122,7 +122,7 @@ def act(environment, **inputs):
 
 def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
     done = act(pull_request, paths="demo")
-    assert (done.returncode, done.stderr) == (0, "1 file in order\n")
+    assert (done.returncode, done.stderr) == (0, "1 file already formatted\n")
     token, again, notice = done.stdout.splitlines()
     assert token.removeprefix("::stop-commands") == again[:-2]
     assert notice.startswith("::notice title=idlc breaking::nothing breaks")

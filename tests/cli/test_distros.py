@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 import pytest
 
-from idlc.checks.lint import lint
+from idlc.checks.registry import advise
+from idlc.checks.select import Selection
 from idlc.cli import completion
 from idlc.cli.commands.check import command as check
 from idlc.cli.main import main
@@ -483,11 +484,11 @@ def test_settings_can_name_it(capsys):
     assert [one["code"] for one in said(capsys, "breaking")] == ["IDL505", "IDL515"]
 
 
-def test_lints_look_at_names_of_the_catalogue_alone():
+def test_advice_looks_at_names_of_the_catalogue_alone():
     report, found = Report(), Report()
     name = ir.TypeName("demo", "msg", "A")
     own = lower(parse(Source("A.msg", "Pose2D a\n")), name, report)
     other = lower(parse(Source("Pose2D.msg", "int32 a\n")), name._replace(name="Pose2D"), report)
-    lint(link("demo", [own, other], catalog, report), found)
+    advise(link("demo", [own, other], catalog, report), found, Selection())
     assert list(report) == []
     assert {one.code for one in found} & {"IDL424", "IDL425"} == set()

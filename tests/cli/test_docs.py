@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from idlc.cli.main import main
+from idlc.site.view import blocks
 from tests.support.files import write
 
 HOSTILE = '</p><script>alert(1)</script> "quoted" & <img src=x onerror=alert(1)>'
@@ -129,7 +130,7 @@ def test_the_title_page_tells_what_package_xml_says(tmp_path, monkeypatch):
     write(
         "demo/package.xml",
         "<package format='3'><name>demo_msgs</name><version>1.2.3</version>"
-        "<description>Drives\n   &amp; stops.</description>"
+        "<description>Drives\n   <b>&amp;</b> stops.</description>"
         "<maintainer email='a@example.org'>Ann</maintainer><license>MIT</license></package>",
     )
     assert main(["docs", "demo", "-o", "site"]) == 0
@@ -146,13 +147,11 @@ def test_a_page_holds_the_text_of_its_file(site):
 
 
 def test_only_what_is_drawn_is_kept_as_drawn():
-    from idlc.site.html import prose
-
-    assert prose(["-PI..+PI,  (radians)"]).startswith("<p>")
-    assert prose(["one  two"]).startswith("<p>"), "one line is no drawing"
-    assert prose(["A sentence.  Another one,", "which goes on."]).startswith("<p>")
-    assert prose(["+--+  +--+", "|a |--|b |"]).startswith("<pre>")
-    assert prose(["A list:", "  - one"]).startswith("<pre>")
+    assert blocks(["-PI..+PI,  (radians)"])[0].tag == "p"
+    assert blocks(["one  two"])[0].tag == "p", "one line is no drawing"
+    assert blocks(["A sentence.  Another one,", "which goes on."])[0].tag == "p"
+    assert blocks(["+--+  +--+", "|a |--|b |"])[0].tag == "pre"
+    assert blocks(["A list:", "  - one"])[0].tag == "pre"
 
 
 def test_pictures_are_well_formed(site):

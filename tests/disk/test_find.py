@@ -109,6 +109,7 @@ def test_a_package_xml_beyond_the_repository_does_not_count():
         ("<package><name>\n  a_b\n</name></package>", "a_b"),
         ("<package><name>a<!-- c -->_b</name></package>", "a_b"),
         ("<package><author><name>x</name></author><name>a_b</name></package>", "a_b"),
+        ("<package><name>a_b</name><export><name>x</name></export></package>", "a_b"),
         ("<?xml version='1.0' encoding='ISO-8859-1'?><package><name>a_b</name></package>", "a_b"),
     ],
 )

@@ -11,6 +11,7 @@ from jinja2 import UndefinedError
 
 from idlc.emit import literals, render
 from idlc.model import ir, link
+from idlc.templating import environment
 
 HOSTILE = [
     '"""',
@@ -68,7 +69,7 @@ def page(text, *more):
         constants=(ir.Constant(name="C", type=string, value=text, comment=lines, unit=text),),
     )
     model = link.Model("hostile_msgs", (message,), {message.name: message})
-    return render.module_file(message, model, {message.name: "_it"}).text
+    return next(render.module_files(message, model, {message.name: "_it"})).text
 
 
 def shape(code):
@@ -100,10 +101,11 @@ def test_a_literal_is_read_back_as_the_text(text):
     assert ast.literal_eval(literals.text(text)) == text
 
 
-@given(st.lists(TEXT, min_size=1, max_size=4))
-def test_a_docstring_is_read_back_as_its_lines(lines):
-    shown = literals.docstring([literals.prose(line) for line in lines], 0)
-    read = ast.literal_eval("\n".join(shown))
+@given(st.lists(TEXT, min_size=1, max_size=4), st.booleans())
+def test_a_docstring_is_read_back_as_its_lines(lines, one_line):
+    shown = literals.docstring([literals.prose(line) for line in lines], one_line=one_line)
+    end = "" if one_line and len(lines) == 1 else "\n"
+    read = ast.literal_eval(f'"""{shown}{end}"""')
     for line in lines:
         assert "".join(c for c in line if c.isalnum()) in "".join(
             c for c in read if c.isalnum()
@@ -139,4 +141,4 @@ def test_pages_of_hostile_text_are_formatted_and_clean(hostile_folder):
 
 def test_an_unknown_name_in_a_template_is_an_error():
     with pytest.raises(UndefinedError):
-        render.environment().from_string("{{ nothing }}").render()
+        environment().from_string("{{ nothing }}").render()

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from idlc.breaking.allow import Allowance
-from idlc.checks.select import OFF_BY_DEFAULT
 from idlc.cli.main import main
+from idlc.diagnostics.codes import CODES
 from idlc.disk.pyproject import Config
 from tests.support import command_line_page, programs, refresh
 from tests.support.paths import DOCS, ROOT
@@ -86,7 +86,9 @@ def test_the_defaults_of_settings():
         assert default == ("false" if value is False else "none")
         assert not value
     (listed,) = re.findall(r"Only if it is selected idlc gives (.*?)\.\n", SETTINGS, re.DOTALL)
-    assert set(re.findall(r"IDL\d+", listed)) == OFF_BY_DEFAULT
+    assert set(re.findall(r"IDL\d+", listed)) == {
+        code.id for code in CODES.values() if not code.default
+    }
 
 
 def test_the_keys_of_an_allowance():

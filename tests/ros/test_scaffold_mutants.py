@@ -18,6 +18,8 @@ from tests.support import programs
 EVERY = 1 if os.environ.get("IDLC_LONG") else 6
 AT_ONCE = 4
 MARK = "this is the mutant"
+#: What all nodes of the package share is broken, too.
+MAIN = "demo/node_main.py"
 #: How long a mutant's test waits for what never happens.
 PATIENCE = "6.0"
 NODES = {
@@ -39,7 +41,7 @@ NODES = {
     "managed_actor": ["--action-server", "test_msgs/Fibonacci:count", "--lifecycle"],
 }
 RAISES = "raise RuntimeError('broken')"
-ENDS = "except (KeyboardInterrupt, ExternalShutdownException):\n        pass\n"
+ENDS = "except (KeyboardInterrupt, ExternalShutdownException):\n            pass\n"
 ENDING = {
     "dies at its start": (
         "        super().__init__(",
@@ -53,9 +55,9 @@ ENDING = {
 ENDING_ONCE = {
     "dies at its start": ENDING["dies at its start"],
     "does not end": ("interrupted.set()", "None"),
-    "always fails": ("else 0 if well else 1", "else 1"),
-    "never fails": ("else 0 if well else 1", "else 0"),
-    "hides that it was interrupted": ("130 if interrupted", "0 if interrupted"),
+    "always fails": ("else 0 if self._succeeded else 1", "else 1"),
+    "never fails": ("else 0 if self._succeeded else 1", "else 0"),
+    "hides that it was interrupted": ("130 if self._interrupted", "0 if self._interrupted"),
 }
 PUBLISHING = {
     "uses a field that is gone": ("data='hello'", "data=String.HELLO"),
@@ -174,21 +176,19 @@ def package(tmp_path_factory) -> Path:
 def run(package: Path, folder: Path, node: str, change: tuple[str, str]) -> tuple[int, str]:
     """Return the status of a node's test after a change, and what it printed."""
     module, test = f"demo/{node}_node.py", f"test/test_{node}_node.py"
-    for path in ("demo/__init__.py", module, "test/conftest.py", test):
+    for path in ("demo/__init__.py", MAIN, module, "test/conftest.py", test):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(package / path, folder / path)
-    text = (folder / module).read_text()
-    assert change[0] in text, f"{node}: nothing to break: {change[0]}"
-    broken = text.replace(change[0], change[1])
+    where = next((one for one in (module, MAIN) if change[0] in (folder / one).read_text()), None)
+    assert where, f"{node}: nothing to break: {change[0]}"
     if change[0]:
-        broken = broken.replace(
-            "\nimport rclpy\n", f"\nimport sys\nimport rclpy\nprint('{MARK}')\n", 1
-        )
+        head = "from __future__ import annotations\n"
+        text = (folder / where).read_text().replace(*change)
+        (folder / where).write_text(text.replace(head, f"{head}import sys\nprint('{MARK}')\n", 1))
         conftest = (folder / "test/conftest.py").read_text()
         shorter = conftest.replace("PATIENCE = 20.0", f"PATIENCE = {PATIENCE}")
         assert shorter != conftest
         (folder / "test/conftest.py").write_text(shorter)
-    (folder / module).write_text(broken)
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
     plain = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONDONTWRITEBYTECODE": "1"}
     return programs.ended(*command, cwd=folder, environment={**os.environ, **plain})

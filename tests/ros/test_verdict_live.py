@@ -1,6 +1,6 @@
 """idlc and the installed rosidl agree on interface files that nobody wrote.
 
-The seed is fixed, so a disagreement stays until it is mended. To search further:
+The seed is fixed, so a disagreement stays until it is fixed. To search further:
 IDLC_LIVE_SEED=2 IDLC_LIVE_FILES=5000 make test ARGS='-k live'
 """
 

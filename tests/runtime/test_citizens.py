@@ -108,7 +108,10 @@ def test_help_and_inspect_take_all_attributes(kind):
             assert inspect.classify_class_attrs(one)
     parameters = [name for name in inspect.signature(kind).parameters if name != "options"]
     assert parameters == [field.name for field in dataclasses.fields(kind)]
-    assert inspect.getsource(kind.__mro__[-3]).lstrip().startswith(("@", "class "))
+    made = kind.__mro__[-3]
+    assert inspect.getsource(made.__init__).lstrip().startswith("def __init__")
+    if made.__init__.__module__ == made.__module__:  # what ROS 2 adds is in a module of its own
+        assert inspect.getsource(made).lstrip().startswith(("@", "class "))
 
 
 def test_help_of_modules_lists_what_they_offer():

@@ -28,6 +28,7 @@ import sys
 
 import idlc
 import idlc.emit.render
+import idlc.templating
 from idlc.disk.read import absolute
 
 WRITES = {"os.mkdir", "os.rmdir", "os.remove", "os.rename", "os.utime", "os.chmod", "os.truncate"}
@@ -109,7 +110,7 @@ def main():
     names = ("difflib", "encodings.idna", "encodings.unicode_escape", "fcntl", "html", "tempfile")
     for name in (*names, "xml.parsers.expat"):
         importlib.import_module(name)
-    idlc.emit.render.environment()
+    idlc.templating.environment()
     for line in sys.stdin:
         order = json.loads(line)
         read, write = os.pipe()

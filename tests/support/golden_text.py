@@ -31,7 +31,7 @@ _SECTION = re.compile(r"^-- (.+) --\n", re.MULTILINE)
 STAGES = {
     "parse": "idlc.syntax.parse.parse",
     "link": "idlc.model.link.link",
-    "check": "idlc.checks.check",
+    "check": "idlc.checks.registry.check",
     "render": "idlc.emit.render.render_package",
 }
 

@@ -17,9 +17,9 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from idlc.checks.lint import lint
-from idlc.checks.select import Selection, category
-from idlc.diagnostics.codes import CODES
+from idlc.checks.registry import advise
+from idlc.checks.select import Selection
+from idlc.diagnostics.codes import CODES, STYLE
 from idlc.diagnostics.report import Severity
 from tests.support import rosidl_view
 from tests.support.paths import DOCS
@@ -182,7 +182,7 @@ def told_by_idlc(example: Example) -> tuple[str, ...]:
     asked = {arrow.partition(" ")[0] + " " for arrow in example.arrows} & set(ASKED)
     if asked:
         return tuple(_answer(model, str(name), word) for word in ASKED if word in asked)
-    lint(model, report)
+    advise(model, report, Selection())
     warned = _codes(found.code for found in report if _is_shown(found.code))
     lines = spoken(example, rosidl_view.view(example.case)["parsed"])
     if not example.inline:
@@ -192,7 +192,7 @@ def told_by_idlc(example: Example) -> tuple[str, ...]:
 
 
 def _is_shown(code: str) -> bool:
-    return Selection().has(code) and category(code) != "style"
+    return Selection().has(CODES[code]) and CODES[code].category != STYLE
 
 
 def _codes(codes: Any) -> str:

@@ -4,7 +4,7 @@ A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `te
 `bytes_hex`; `distro` if that is not Jazzy.
 """
 
-from idlc import checks
+from idlc.checks import registry
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir
@@ -50,7 +50,7 @@ def compile_case(case) -> tuple[Model | None, Report]:
     source = Source(f"{case['name']}.{case['kind']}", text)
     interface = lower(parse(source), name, report, BY_NAME[case.get("distro", "jazzy")])
     model = link(case["pkg"], [interface], Siblings(case), report)
-    checks.check(model, report)
+    registry.check(model, report)
     return model, report
 
 

@@ -7,25 +7,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-import signal
 import sys
-from threading import Event
 import time
 
+from my_robot_controller.node_main import interruptible
 from my_robot_controller.srv import AddTwoInts
-import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 
 
 class AddTwoIntsClient(Node):
     """The node add_two_ints_client calls add_two_ints."""
 
     def __init__(self, timeout: float) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('add_two_ints_client')
         self.timeout = timeout
         self.add_two_ints_client = self.create_client(AddTwoInts, 'add_two_ints')
@@ -63,7 +59,7 @@ class AddTwoIntsClient(Node):
 
 
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
-    """Return what the command line says, ROS 2's own arguments left out."""
+    """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
         description='The node add_two_ints_client calls add_two_ints.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
@@ -82,7 +78,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def add_two_ints_request(given: argparse.Namespace) -> AddTwoInts.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return AddTwoInts.Request(
         a=given.a,
         b=given.b,
@@ -90,26 +86,12 @@ def add_two_ints_request(given: argparse.Namespace) -> AddTwoInts.Request:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if all went well."""
+    """Do what the command line asks for; return 0 if it succeeded."""
     given = parse_arguments(args)
-    interrupted = Event()
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: interrupted.set())
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        executor = SingleThreadedExecutor()
+    with interruptible(args) as once:
         node = AddTwoIntsClient(given.server_timeout)
-        executor.add_node(node)
-        well = True
-        task = executor.create_task(node.call_add_two_ints, add_two_ints_request(given))
-        while not (task.done() or interrupted.is_set()):
-            executor.spin_once(timeout_sec=0.1)
-        well = well and bool(task.result())
-        return 130 if interrupted.is_set() else 0 if well else 1
-    except ExternalShutdownException:
-        return 1
-    finally:
-        try_shutdown()
+        once.run(node, node.call_add_two_ints, add_two_ints_request(given))
+    return once.status
 
 
 if __name__ == '__main__':

@@ -6,17 +6,16 @@
 from __future__ import annotations
 
 from my_robot_controller.msg import RobotCommand
+from my_robot_controller.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.utilities import ok, try_shutdown
 
 
 class CommandPublisher(Node):
     """The node command_publisher publishes robot_command."""
 
     def __init__(self) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('command_publisher')
         self.speed = 0.0
         self.robot_command_publisher = self.create_publisher(RobotCommand, 'robot_command', 10)
@@ -39,27 +38,13 @@ class CommandPublisher(Node):
         self.speed = 0.5 - self.speed
 
 
+@until_shutdown
 def main(args: list[str] | None = None) -> None:
-    """Run the node until it is asked to end."""
-    try:
-        rclpy.init(args=args)
-        executor = SingleThreadedExecutor()
-        node = CommandPublisher()
-        executor.add_node(node)
-        # a signal that comes while rclpy starts can fail to wake it, so it waits a second at most
-        while ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():
-            raise
-        # otherwise it was asked to end before it was complete
-    finally:
-        try:
-            try_shutdown()
-        except RuntimeError:
-            pass  # the signal that ended the node is shutting rclpy down at this very moment
+    """Run the node until Ctrl-C or SIGTERM."""
+    rclpy.init(args=args)
+    node = CommandPublisher()
+    executor = WakingExecutor()
+    rclpy.spin(node, executor)
 
 
 if __name__ == '__main__':

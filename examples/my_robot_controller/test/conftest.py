@@ -1,4 +1,4 @@
-"""What the tests of nodes share: the node in a process, and a node that looks at it."""
+"""Fixtures for tests of nodes: the node in its own process, and an observer."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -18,15 +18,15 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-#: How many seconds to wait for what is to happen.
+#: How many seconds to wait for something to happen.
 PATIENCE = 20.0
 
 
 class Running:
-    """A node in a process of its own, with the observer beside it."""
+    """A node that runs in its own process."""
 
     def __init__(self, observer: Node, log: Path, *words: str) -> None:
-        """Start the node; what it prints goes into a file."""
+        """Start the node, with its output in a file."""
         self._observer = observer
         self._log = log
         command = [sys.executable, '-u', '-m', *words]
@@ -35,11 +35,11 @@ class Running:
 
     @property
     def output(self) -> str:
-        """Return what the node has printed up to now."""
+        """Return what the node has printed so far."""
         return self._log.read_text()
 
     def said(self, text: str, times: int = 1) -> bool:
-        """Return whether the node has logged so many lines that begin with the text."""
+        """Return whether the node has logged that many lines that begin with the text."""
         return self.output.count(f']: {text}') >= times
 
     def ended(self) -> bool:
@@ -47,7 +47,7 @@ class Running:
         return self.process.poll() is not None
 
     def until(self, condition: Callable[[], bool], seconds: float = PATIENCE) -> None:
-        """Let the observer work until a condition holds; fail if it never will."""
+        """Spin the observer until a condition holds; fail after a timeout."""
         __tracebackhide__ = True
         why = f'this did not happen within {seconds} seconds'
         deadline = time.monotonic() + seconds
@@ -56,14 +56,14 @@ class Running:
             if not ended and self.ended():
                 ended = True
                 why = f'the node ended with status {self.process.returncode} before this'
-                # what it sent at last may be on its way
+                # its last messages may still arrive
                 deadline = min(deadline, time.monotonic() + 1.0)
             if time.monotonic() > deadline:
                 pytest.fail(f'{why}; it printed:\n{self.output}')
             rclpy.spin_once(self._observer, timeout_sec=0.05)
 
     def leave(self) -> None:
-        """End the node, politely if it can: others would go on seeing one that was killed."""
+        """Terminate the node; one that is killed stays visible to others for a while."""
         self.process.terminate()
         try:
             self.process.wait(timeout=5)
@@ -72,7 +72,7 @@ class Running:
             self.process.wait()
 
     def end(self, how: signal.Signals = signal.SIGINT) -> int:
-        """Ask the node to end; return the status that it ends with."""
+        """Ask the node to end; return its exit status."""
         self.process.send_signal(how)
         self.until(self.ended)
         return self.process.returncode
@@ -80,7 +80,7 @@ class Running:
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Give the test a ROS domain that no other has; nothing that is sent leaves this machine."""
+    """Give the test its own ROS domain, and keep its traffic on this machine."""
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     monkeypatch.setenv('RCUTILS_CONSOLE_OUTPUT_FORMAT', '[{severity}] [{name}]: {message}')
     monkeypatch.setenv('RCUTILS_COLORIZED_OUTPUT', '0')
@@ -97,7 +97,7 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def observer(domain: None) -> Iterator[Node]:
-    """Yield a node that looks at others."""
+    """Yield a node that observes others."""
     rclpy.init()
     node = rclpy.create_node('observer')
     yield node
@@ -107,7 +107,7 @@ def observer(domain: None) -> Iterator[Node]:
 
 @pytest.fixture
 def start(tmp_path: Path, observer: Node) -> Iterator[Callable[..., Running]]:
-    """Yield a function that starts a node beside the observer, to be ended with the test."""
+    """Yield a function that starts a node, which ends with the test."""
     nodes: list[Running] = []
 
     def started(module: str, *words: str) -> Running:

@@ -1,4 +1,4 @@
-"""The node add_two_ints_client does what it is for, on the real rclpy."""
+"""Tests of the node add_two_ints_client, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -18,7 +18,7 @@ Start = Callable[..., Any]
 
 
 def test_it_calls_add_two_ints(start: Start, observer: Node) -> None:
-    """The node calls add_two_ints and says what is answered."""
+    """The node calls add_two_ints and logs the response."""
     requests: list[object] = []
 
     def answer(request: object, response: object) -> object:
@@ -34,7 +34,7 @@ def test_it_calls_add_two_ints(start: Start, observer: Node) -> None:
 
 
 def test_it_says_so_when_nobody_answers(start: Start) -> None:
-    """Without a server the node ends, with a message and a status."""
+    """Without a server the node logs an error and ends with status 1."""
     node = start(MODULE, '--server-timeout', '0.5')
     node.until(node.ended)
     assert node.process.returncode == 1, node.output
@@ -44,7 +44,7 @@ def test_it_says_so_when_nobody_answers(start: Start) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE, '--server-timeout', '1000')
     node.until(lambda: 'add_two_ints_client' in observer.get_node_names())
     assert node.end(how) == 130, node.output

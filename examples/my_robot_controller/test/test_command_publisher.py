@@ -1,4 +1,4 @@
-"""The node command_publisher does what it is for, on the real rclpy."""
+"""Tests of the node command_publisher, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -27,7 +27,7 @@ def test_it_publishes_robot_command(start: Start, observer: Node) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE)
     node.until(lambda: 'command_publisher' in observer.get_node_names())
     assert node.end(how) == 0, node.output

@@ -1,4 +1,4 @@
-"""The node countdown_action_client does what it is for, on the real rclpy."""
+"""Tests of the node countdown_action_client, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -68,7 +68,7 @@ def test_it_takes_back_countdown(start: Start, observer: Node) -> None:
 
 
 def test_it_says_so_when_nobody_answers(start: Start) -> None:
-    """Without a server the node ends, with a message and a status."""
+    """Without a server the node logs an error and ends with status 1."""
     node = start(MODULE, '--server-timeout', '0.5')
     node.until(node.ended)
     assert node.process.returncode == 1, node.output
@@ -78,7 +78,7 @@ def test_it_says_so_when_nobody_answers(start: Start) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE, '--server-timeout', '1000')
     node.until(lambda: 'countdown_action_client' in observer.get_node_names())
     assert node.end(how) == 130, node.output

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
 
 
-def _said(setup: Source) -> Setup:
+def _read(setup: Source) -> Setup:
     from idlc.checks.package.python_files import read_setup  # what has no setup.py needs no ast
 
     return read_setup(setup)
@@ -25,15 +25,15 @@ def installed_interfaces(facts: Facts, model: Model, report: Report) -> None:
     """setup.py installs the interface files, without which `ros2 interface show` finds nothing."""
     if facts.setup_py is None or facts.build_type != "ament_python":
         return
-    said = _said(facts.setup_py).data_files
-    texts = [text.value for text in said or ()]
+    found = _read(facts.setup_py).data_files
+    texts = [text.value for text in found or ()]
     for kind in sorted({interface.name.kind for interface in model.own}):
-        if said is not None and not texts:
+        if found is not None and not texts:
             return  # computed
         if not any(kind in text.replace(".", "/").split("/") for text in texts):
             report.add(
-                codes.NOT_INSTALLED.at(
-                    said[0].span if said else Span(facts.setup_py, 0, 0),
+                codes.INTERFACES_NOT_INSTALLED.at(
+                    found[0].span if found else Span(facts.setup_py, 0, 0),
                     f"the .{kind} files are not among the `data_files`",
                     hint=f"add `('share/{facts.name}/{kind}', glob('{kind}/*.{kind}'))`",
                 )
@@ -53,7 +53,7 @@ def resource_marker(facts: Facts, _: Model, report: Report) -> None:
     """The package's marker is there and installed, without which `ros2 run` does not find it."""
     if facts.setup_py is None or facts.build_type != "ament_python":
         return
-    said = _said(facts.setup_py).data_files
+    found = _read(facts.setup_py).data_files
     if not facts.marker:
         report.add(
             codes.NO_RESOURCE_MARKER.at(
@@ -62,7 +62,7 @@ def resource_marker(facts: Facts, _: Model, report: Report) -> None:
                 hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
             )
         )
-    elif not said or not any("resource_index/packages" in text.value for text in said):
+    elif not found or not any("resource_index/packages" in text.value for text in found):
         report.add(
             codes.NO_RESOURCE_MARKER.at(
                 Span(facts.setup_py, 0, 0),
@@ -77,7 +77,7 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
     """Each console script names a function that is there."""
     if facts.setup_py is None:
         return
-    for text in _said(facts.setup_py).scripts:
+    for text in _read(facts.setup_py).scripts:
         problem = _problem(text, facts)
         if problem:
             report.add(codes.BAD_ENTRY_POINT.at(text.span, problem[0], hint=problem[1]))
@@ -106,12 +106,12 @@ def _problem(text: Text, facts: Facts) -> tuple[str, str] | None:
 
 def names(facts: Facts, _: Model, report: Report) -> None:
     """setup.py and setup.cfg call the package what package.xml calls it."""
-    said = _said(facts.setup_py).name if facts.setup_py else None
-    if said is not None and said.value.replace("-", "_") != facts.name:
+    found = _read(facts.setup_py).name if facts.setup_py else None
+    if found is not None and found.value.replace("-", "_") != facts.name:
         report.add(
             codes.NAME_MISMATCH.at(
-                said.span,
-                f"setup.py calls the package `{said.value}`, package.xml `{facts.name}`",
+                found.span,
+                f"setup.py calls the package `{found.value}`, package.xml `{facts.name}`",
                 hint="give both the same name",
             )
         )
@@ -145,7 +145,7 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
         if changed:
             listed = first_few((f"`{name}`" for name in sorted(changed)), 3)
             report.add(
-                codes.STALE_OUTPUT.of(
+                codes.STALE_GENERATED_CODE.of(
                     output.path,
                     f"the generated code is out of date: {listed} changed",
                     hint="run idlc gen",

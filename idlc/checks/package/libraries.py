@@ -36,7 +36,7 @@ def unusable_entry(setup: Source, package: str) -> Iterator[Diagnostic]:
         return
     edits = edits_for(setup)
     by_hand = "; --fix does" if edits else f", as in `setup(**{RESULT}, ...)`"
-    problem = codes.NO_LIBRARY.at(
+    problem = codes.NO_LIBRARY_INSTALLED.at(
         index[0].span,
         f"`{package}` is entered in ROS 2's index without libraries for its types, and stops "
         "`ros2 bag record`",

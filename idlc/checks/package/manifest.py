@@ -80,7 +80,7 @@ def interface_group(facts: Facts, model: Model, report: Report) -> None:
         return
     if _GROUP not in facts.declared("member_of_group"):
         line = f"<member_of_group>{_GROUP}</member_of_group>"
-        found = codes.NO_INTERFACE_GROUP.at(
+        found = codes.NOT_IN_INTERFACE_GROUP.at(
             facts.place,
             "CMake stops at a package with interfaces that is in no interface group",
             hint=f"add `{line}`",
@@ -103,7 +103,7 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
     if missing:
         needed = " and ".join(f"`{package}`" for package, _ in missing)
         lines = " and ".join(f"`{line}`" for _, line in missing)
-        found = codes.NO_GENERATORS.at(
+        found = codes.NO_INTERFACE_GENERATORS.at(
             facts.place, f"a package with interfaces needs {needed}", hint=f"add {lines}"
         )
         report.add(_with_lines(found, facts, [line for _, line in missing]))

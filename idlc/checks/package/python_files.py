@@ -46,7 +46,7 @@ def imported_packages(source: Source) -> Iterator[tuple[str, Span]]:
 
 
 def defines(source: Source, name: str) -> bool:
-    """Tell whether a file gives a meaning to a name at its top level."""
+    """Return whether a file gives a meaning to a name at its top level."""
     tree = parsed(source.text)
     if tree is None:
         return True

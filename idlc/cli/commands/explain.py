@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
 
 import click
 
@@ -41,16 +42,23 @@ def command(code: str | None, everything: bool) -> int:
         hint = f"did you mean {close}?" if close else "`idlc explain` lists the codes"
         raise click.UsageError(f"no such code: {code}; {hint}")
     if output.colours(sys.stdout):
-        _show(text)
+        sys.stdout.writelines(_coloured(text))
     else:
         sys.stdout.write(text)
     return 0
 
 
-def _show(text: str) -> None:
-    """Write a page to a terminal, with the names of files, which Markdown would hide."""
-    from rich.console import Console
-    from rich.markdown import Markdown
-
-    named = re.sub(r"^```(\S*[./]\S*)$", r"`\1`\n```text", text, flags=re.MULTILINE)
-    Console(width=min(100, Console().width)).print(Markdown(named))
+def _coloured(text: str) -> Iterator[str]:
+    """Yield the lines of a page for a terminal: files under their names, and no Markdown."""
+    fenced = False
+    for line in text.splitlines():
+        if line.startswith("```"):
+            fenced = not fenced
+            if (file := line.strip("`")) not in ("", "console"):
+                yield f"    \x1b[2m{file}\x1b[0m\n"
+        elif fenced:
+            yield f"    {line}".rstrip() + "\n"
+        elif line.startswith("#"):
+            yield f"\x1b[1m{line.lstrip('# ')}\x1b[0m\n"
+        else:
+            yield re.sub("`([^`]+)`", "\x1b[36m\\1\x1b[0m", line) + "\n"

@@ -30,6 +30,7 @@ COMMANDS = {
     "package": "Write a new package.",
     "interface": "Write a .msg, .srv or .action file.",
     "node": "Write a node with its test, and enter it in its package.",
+    "templates": "List the templates of nodes and packages, or copy one to change it.",
 }
 
 
@@ -38,6 +39,7 @@ MEANT = {
     **dict.fromkeys(("pkg", "project", "workspace"), "package"),
     **dict.fromkeys(("msg", "srv", "action", "message", "service", "type"), "interface"),
     **dict.fromkeys(("publisher", "subscriber", "client", "server"), "node"),
+    "template": "templates",
 }
 
 
@@ -56,13 +58,24 @@ def command() -> None:
     """
 
 
-def common(function: Command) -> Command:
-    """Add the options that all the commands have."""
+def writing(function: Command) -> Command:
+    """Add the options of a command that writes files, perhaps by templates."""
     dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the difference.")
     force = click.option(
         "--force", is_flag=True, help="Replace existing files that differ, keeping copies."
     )
-    return options.include(dry(force(function)))
+    templates = click.option(
+        "--templates",
+        metavar="DIR",
+        type=click.Path(file_okay=False),
+        help="Use the templates of this folder instead of those of the same names.",
+    )
+    return dry(force(templates(function)))
+
+
+def common(function: Command) -> Command:
+    """Add the options of a command that writes files and knows interfaces."""
+    return options.include(writing(function))
 
 
 def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:

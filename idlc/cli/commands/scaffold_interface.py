@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from idlc.cli.commands.scaffold import common, finish
@@ -28,8 +30,7 @@ def command(
     fields: tuple[str, ...],
     comment: str,
     include: tuple[str, ...],
-    dry_run: bool,
-    force: bool,
+    **given: Any,
 ) -> int:
     """Write an interface of the package that the working folder belongs to.
 
@@ -37,7 +38,8 @@ def command(
     actions are separated by ---.
     """
     from idlc.diagnostics.report import Report
-    from idlc.driver import scaffold
+    from idlc.driver.scaffold import Settings
+    from idlc.driver.scaffold_interface import interface
     from idlc.model.ir import KINDS
     from idlc.scaffold import new_interface
 
@@ -48,7 +50,7 @@ def command(
         new_interface.text(kind, fields, comment)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    settings = scaffold.Settings(dry_run, force, include)
+    settings = Settings(include=include, **given)
     known = KINDS[KINDS.index(kind)]
-    result = scaffold.interface(known, name, fields, comment, settings, report)
+    result = interface(known, name, fields, comment, settings, report)
     return finish(result, report)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import click
 
 from idlc.cli import completion
 from idlc.cli.commands.scaffold import common, finish
+from idlc.scaffold import qos, spec
+from idlc.scaffold.roles import ROLES
 
 EPILOG = """\
 TYPE is an interface of your own package (RobotCommand) or any other (std_msgs/String). An
@@ -21,20 +24,10 @@ Example, within a package:
   idlc scaffold node talker --publisher std_msgs/String:chatter@2 --qos latched
   idlc scaffold node listener --subscriber std_msgs/String:chatter --param verbose:bool=true
 """
-QOS = ("default", "sensor_data", "latched")
-_ENDPOINTS = {
-    "publisher": ("TYPE:TOPIC[@HZ]", "Publish, by default once a second."),
-    "subscriber": ("TYPE:TOPIC", "Receive messages."),
-    "service": ("TYPE:NAME", "Answer requests."),
-    "client": ("TYPE:NAME", "Call a service; the request's fields come from the command line."),
-    "action-server": ("TYPE:NAME", "Work on goals, which can be cancelled and replaced."),
-    "action-client": ("TYPE:NAME", "Send a goal; its fields come from the command line."),
-}
-_MARK = "\0qos="
 
 
 def interactive() -> bool:
-    """Whether there is somebody to ask."""
+    """Return whether there is somebody to ask."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
@@ -42,90 +35,86 @@ class NodeCommand(click.Command):
     """A command whose --qos belongs to the endpoint before it."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Attach each quality of service to its endpoint, then go on as usual."""
-        return super().parse_args(ctx, args if ctx.resilient_parsing else _attached(args, ctx))
+        """Note to which endpoint each quality of service belongs, then go on as usual."""
+        if not ctx.resilient_parsing:
+            _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+            ctx.meta[_OWNERS] = _owners([one.name or "" for one in order], ctx)
+        return super().parse_args(ctx, args)
 
 
-def _attached(args: list[str], ctx: click.Context) -> list[str]:
-    words: list[str] = []
-    endpoint: int | None = None
-    waiting = iter(args)
-    for word in waiting:
-        name, equals, value = word.partition("=")
-        if name == "--qos":
-            value = value if equals else next(waiting, "")
-            if value not in QOS:
-                raise click.UsageError(f"--qos is one of {', '.join(QOS)}, not {value!r}", ctx)
-            if endpoint is None:
+#: Where the endpoints that have a --qos are kept: for each, its role and its place in that.
+_OWNERS = "idlc.qos"
+
+
+def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
+    """Return which endpoint each --qos comes after; `order` names the options as given."""
+    names = {role.name for role in ROLES if role.kind}
+    counts: Counter[str] = Counter()
+    last: tuple[str, int] | None = None
+    owners = []
+    for name in order:
+        if name in names:
+            last = (name, counts[name])
+            counts[name] += 1
+        elif name == "qos":
+            if last is None:
                 raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
-            words[endpoint] += f"{_MARK}{value}"
-        elif name.removeprefix("--") in _ENDPOINTS and name.startswith("--"):
-            words.append(word)
-            if not equals:
-                words += [following] if (following := next(waiting, None)) is not None else []
-            endpoint = len(words) - 1
-        else:
-            words.append(word)
-    return words
+            owners.append(last)
+    return owners
 
 
-def _endpoint_options(function: Any) -> Any:
-    for name, (metavar, text) in reversed(_ENDPOINTS.items()):
+def _role_options(function: Any) -> Any:
+    for role in reversed(ROLES):
         function = click.option(
-            f"--{name}",
-            name.replace("-", "_"),
-            metavar=metavar,
+            role.option,
+            role.name,
+            metavar=role.metavar,
             multiple=True,
-            shell_complete=completion.endpoint,
-            help=text,
+            shell_complete=completion.endpoint if role.kind else None,
+            help=role.help,
         )(function)
     return function
 
 
 @click.command("node", cls=NodeCommand, epilog=EPILOG)
 @click.argument("name", metavar="NAME")
-@_endpoint_options
-@click.option("--timer", "timers", metavar="SECONDS", multiple=True, help="Do something regularly.")
+@_role_options
 @click.option(
     "--param", "parameters", metavar="NAME:TYPE=DEFAULT", multiple=True, help="Declare a parameter."
 )
 @click.option(
     "--qos",
-    metavar="|".join(QOS),
-    shell_complete=lambda _, __, word: [one for one in QOS if one.startswith(word)],
-    help="The quality of service of the endpoint before.",
+    "qos",
+    metavar="|".join(qos.NAMES),
+    multiple=True,
+    shell_complete=lambda _, __, word: [one for one in qos.NAMES if one.startswith(word)],
+    help="The quality of service of the endpoint before it.",
 )
 @click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
 @click.option("--launch/--no-launch", default=True, help="Enter it in the launch file, or not.")
 @common
-def command(name: str, qos: str | None, lifecycle: bool, launch: bool, **given: Any) -> int:  # noqa: ARG001
+def command(name: str, **given: Any) -> int:
     """Write a node of the package that the working folder belongs to.
 
     Writes the module and its test, and adds the command to setup.py, the packages that it needs
     to package.xml and the node to the launch file, unless it does one thing and ends.
     """
     from idlc.diagnostics.report import Report
-    from idlc.driver import scaffold, scaffold_node
-    from idlc.scaffold import spec
+    from idlc.driver import scaffold_node, scaffold_types
+    from idlc.driver.scaffold import Settings
 
-    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"], launch)
-    asked = any(given[key.replace("-", "_")] for key in _ENDPOINTS)
-    asked = asked or given["timers"] or given["parameters"] or lifecycle
+    shared = ("dry_run", "force", "include", "templates", "launch")
+    settings = Settings(**{key: given[key] for key in shared})
+    asked = any(given[role.name] for role in ROLES) or given["parameters"] or given["lifecycle"]
     try:
         spec.check_name(name)
         if not asked and interactive():
             from idlc.cli.wizard import ask
 
-            wanted = ask(name, lambda role, type_: scaffold_node.check_type(role, type_, settings))
+            wanted = ask(name, lambda role, type_: scaffold_types.check(role, type_, settings))
         else:
-            wanted = spec.Node(
-                name,
-                "",
-                tuple(spec.endpoint(role, one) for role in spec.ROLES for one in given[role]),
-                tuple(map(spec.period, given["timers"])),
-                tuple(map(spec.parameter, given["parameters"])),
-                lifecycle,
-            )
+            owners = click.get_current_context().meta[_OWNERS]
+            wanted = _wanted(name, given, dict(zip(owners, given["qos"], strict=True)))
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
@@ -133,3 +122,14 @@ def command(name: str, qos: str | None, lifecycle: bool, launch: bool, **given: 
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     test = f"{Path(sys.executable).name} -m pytest {folder}test/test_{name}.py"
     return finish(result, report, (test,))
+
+
+def _wanted(name: str, given: dict[str, Any], presets: dict[tuple[str, int], str]) -> spec.Node:
+    """Return the node that the command line describes."""
+    endpoints = (
+        spec.endpoint(role, value, presets.get((role.name, n)))
+        for role in ROLES
+        for n, value in enumerate(given[role.name])
+    )
+    parameters = tuple(map(spec.parameter, given["parameters"]))
+    return spec.Node(name, "", tuple(endpoints), parameters, given["lifecycle"])

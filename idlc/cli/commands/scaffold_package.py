@@ -57,7 +57,8 @@ def command(
     from idlc.cli.program import program
     from idlc.diagnostics.report import Report
     from idlc.disk.revision import setting
-    from idlc.driver import scaffold
+    from idlc.driver.scaffold import Settings
+    from idlc.driver.scaffold_package import package
     from idlc.scaffold.new_interface import starter
     from idlc.scaffold.new_package import Package, check_name
 
@@ -83,7 +84,7 @@ def command(
         given["licence"],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
-    settings = scaffold.Settings(given["dry_run"], given["force"], given["include"])
-    result = scaffold.package(wanted, folder, settings, report, examples)
+    shared = {key: given[key] for key in ("dry_run", "force", "include", "templates")}
+    result = package(wanted, folder, Settings(**shared), report, examples)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
     return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

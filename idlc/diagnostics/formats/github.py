@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.formats import Run
 from idlc.diagnostics.report import Diagnostic
 from idlc.diagnostics.visible import one_line
 
 
-def lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
-    """Yield one command for each problem."""
-    for one in diagnostics:
-        slug = CODES[one.code].slug if one.code in CODES else ""
-        facts = {"file": one.where[0], **_region(one), "title": f"{one.code} {slug}".strip()}
-        listed = ",".join(
-            f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
-        )
-        parts = (one.message, one.breaks, one.holds_for, one.hint)
-        text = "\n".join(one_line(part) for part in parts if part)
-        yield f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
+def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+    """Return one command for each problem."""
+    return "".join(map(_command, diagnostics))
+
+
+def _command(one: Diagnostic) -> str:
+    slug = CODES[one.code].slug if one.code in CODES else ""
+    facts = {"file": one.where[0], **_region(one), "title": f"{one.code} {slug}".strip()}
+    listed = ",".join(
+        f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
+    )
+    parts = (one.message, one.breaks, one.holds_for, one.hint)
+    text = "\n".join(one_line(part) for part in parts if part)
+    return f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
 
 
 def notice(title: str, text: str) -> str:

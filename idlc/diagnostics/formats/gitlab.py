@@ -6,10 +6,11 @@ import hashlib
 import json
 from collections.abc import Iterable
 
+from idlc.diagnostics.formats import Run
 from idlc.diagnostics.report import Diagnostic, Severity
 
 
-def document(diagnostics: Iterable[Diagnostic]) -> str:
+def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     """Return the JSON document."""
     seen: dict[str, int] = {}
     return json.dumps([_issue(one, seen) for one in diagnostics], indent=2) + "\n"

@@ -7,22 +7,23 @@ from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.formats import Run
 from idlc.diagnostics.report import Diagnostic
 from idlc.diagnostics.visible import one_line
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def document(diagnostics: Iterable[Diagnostic], files: Iterable[str], suite: str = "idlc") -> str:
+def document(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     """Return the XML document: one failed test for each problem, one passed for each clean file."""
     found = list(diagnostics)
-    clean = [file for file in files if file not in {one.where[0] for one in found}]
+    clean = [file for file in run.files if file not in {one.where[0] for one in found}]
     head = (
-        f'<testsuite name={_quoted(suite)} tests="{len(found) + len(clean)}" '
+        f'<testsuite name="idlc" tests="{len(found) + len(clean)}" '
         f'failures="{len(found)}" errors="0" skipped="0">'
     )
     cases = [_failed(one) for one in found]
-    cases += [f"  <testcase classname={_quoted(suite)} name={_quoted(file)}/>" for file in clean]
+    cases += [f'  <testcase classname="idlc" name={_quoted(file)}/>' for file in clean]
     return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""])
 
 

@@ -9,6 +9,7 @@ from urllib.parse import quote
 
 from idlc.diagnostics.code_pages import page
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.formats import Run
 from idlc.diagnostics.formats.gitlab import fingerprint
 from idlc.diagnostics.report import Diagnostic, Edit, Severity
 from idlc.diagnostics.source import Span
@@ -16,23 +17,24 @@ from idlc.diagnostics.source import Span
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def document(diagnostics: Iterable[Diagnostic], version: str, category: str) -> str:
-    """Return the JSON document; `version` is idlc's.
-
-    Services that are given several documents keep them apart by `category`.
-    """
+def document(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+    """Return the JSON document; services keep those of several commands apart."""
     found = list(diagnostics)
     codes = sorted({one.code for one in found})
     seen: dict[str, int] = {}
-    run = {
+    whole = {
         "tool": {
-            "driver": {"name": "idlc", "version": version, "rules": [_rule(code) for code in codes]}
+            "driver": {
+                "name": "idlc",
+                "version": run.version,
+                "rules": [_rule(code) for code in codes],
+            }
         },
-        "automationDetails": {"id": f"idlc/{category}/"},
+        "automationDetails": {"id": f"idlc/{run.command}/"},
         "columnKind": "unicodeCodePoints",
         "results": [_result(one, codes.index(one.code), seen) for one in found],
     }
-    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2) + "\n"
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [whole]}, indent=2) + "\n"
 
 
 def _rule(code: str) -> dict[str, object]:

@@ -50,7 +50,7 @@ class Target:
         return load(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
 
     def usable(self) -> bool:
-        """Whether this is or can become a folder; reports IDL612."""
+        """Return whether this is or can become a folder; reports IDL612."""
         for path in (self._path, *self._path.parents):
             if is_folder(path):
                 return True
@@ -63,7 +63,7 @@ class Target:
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Whether what is here is what compiling the inputs would write."""
+        """Return whether what is here is what compiling the inputs would write."""
         found = up_to_date.unchanged(
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
@@ -85,7 +85,7 @@ class Target:
         return environment.runs_nodes() or any(map(environment.python_folders, needed))
 
     def _finds(self, package: str, kind: str) -> bool:
-        """Whether a package can be imported, found without importing, or lies next to this one."""
+        """Return whether a package lies next to this one or could be imported; imports nothing."""
         inside = f"{kind}/__init__.py"
         beside = (self._path / self.modules).parent
         return is_file(beside / package / inside) or any(

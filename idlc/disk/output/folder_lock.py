@@ -23,7 +23,7 @@ def alone(folder: Path) -> Iterator[None]:
     """Wait until no other idlc writes to a folder, and let none begin meanwhile.
 
     The lock is the operating system's, on the folder itself, or the nearest above as long as
-    there is none: it leaves no file behind and ends with the process. Where folders cannot be
+    there is none: it leaves no file and ends with the process. Where folders cannot be
     locked, nothing is. A run that holds one folder may only ask for others below it.
     """
     place = _nearest(folder)
@@ -71,7 +71,7 @@ def _unlock(handle: int | None) -> None:
 
 
 def _is(handle: int | None, place: Path) -> bool:
-    """Whether a handle is still that of the folder of this name, or there is none."""
+    """Return whether a handle is still that of the folder of this name, or there is none."""
     try:
         return handle is None or os.path.samestat(os.fstat(handle), place.stat())
     except OSError:

@@ -57,7 +57,7 @@ class Overlay(Target):
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Whether nothing is to be done: not to be told from interfaces alone.
+        """Return whether nothing is to be done: not to be told from interfaces alone.
 
         Libraries depend on what else is installed, too.
         """

@@ -40,7 +40,7 @@ class Project:
         return path if self.name in ("", ".") else f"{self.name}/{path}"
 
     def has(self, path: str) -> bool:
-        """Whether there is anything of this name."""
+        """Return whether there is anything of this name."""
         return (self.path / path).exists()
 
     def text(self, path: str) -> str | None:

@@ -54,7 +54,7 @@ def _abandoned(out: Path) -> list[Path]:
 
 
 def _in_use(stage: Path) -> bool:
-    """Whether the process that made a staging folder may still be running."""
+    """Return whether the process that made a staging folder may still be running."""
     number = stage.name.removeprefix(STAGE)
     if not number.isdigit() or int(number) == os.getpid():
         return False
@@ -153,7 +153,7 @@ def _outcome(torn: list[str], name: str) -> str:
 
 
 def sweep(out: Path) -> None:
-    """Remove what killed runs left behind."""
+    """Remove what killed runs left."""
     for stage in _abandoned(out):
         _remove(stage)
 

@@ -32,7 +32,7 @@ def unchanged(
     *,
     vendor_deps: bool = False,
 ) -> bool:
-    """Whether the package in `out` is what a run would write.
+    """Return whether the package in `out` is what a run would write.
 
     `inputs` are the digests of the input files by name within the package.
     """
@@ -70,7 +70,7 @@ def _outputs_stand(out: Path, lock: Lock) -> bool:
 
 
 def _idlc_is_newer(path: Path) -> bool:
-    """Whether idlc itself was changed after a lock was written: by a developer, or installed."""
+    """Return whether idlc was changed after a lock was written: by a developer, or installed."""
     return _newest_maker() > path.stat().st_mtime_ns
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
@@ -68,28 +69,43 @@ def plan(
     outputs: dict[str, str] = {}
     stale = [path for path in owned if path not in files and path != home + FILE]
     for path in (*files, *sorted(stale)):
-        new = files.get(path)
-        old = tree.read(path)
+        old, new = tree.read(path), files.get(path)
         if isinstance(old, Obstacle):
-            if new is not None:
-                refused.append(_in_the_way(name, path, old))
+            refused += [_in_the_way(name, path, old)] if new is not None else []
             continue
-        mine = old is None or digest(old) in owned.get(path, ())
-        if not mine and path in YIELDING and path not in owned:
+        ground = _ground(path, old, owned)
+        if ground is Ground.USERS:
             continue
         if new is not None:
             outputs[path] = digest(new)
         if old != new:
-            if not mine and not force and old is not None:
-                diff = len(refused) < DIFFS
-                refused.append(_refusal(name, path, old, new, path in owned, diff))
-            changes.append(Change(path, old, new, backup=not mine))
+            if ground is not Ground.OWN and not force:
+                diff = _diff(old, new) if len(refused) < DIFFS else ""
+                refused.append(_refusal(f"{name}/{path}", ground, diff, removed=new is None))
+            changes.append(Change(path, old, new, backup=ground is not Ground.OWN))
     if isinstance(record, Obstacle):
         refused.append(_in_the_way(name, home + FILE, record))
     report.extend(refused)
     if refused or isinstance(record, Obstacle):
         return None
     return Plan(out, tuple(changes), outputs, record, home)
+
+
+class Ground(enum.Enum):
+    """What there is where a file is to be written, replaced or removed."""
+
+    OWN = "nothing, or what idlc wrote"
+    EDITED = "what idlc wrote, edited since"
+    FOREIGN = "a file that idlc did not write"
+    USERS = "a file that idlc did not write, and that stays"
+
+
+def _ground(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ground:
+    if old is None or digest(old) in owned.get(path, ()):
+        return Ground.OWN
+    if path in owned:
+        return Ground.EDITED
+    return Ground.USERS if path in YIELDING else Ground.FOREIGN
 
 
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
@@ -100,28 +116,26 @@ def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
     )
 
 
-def _refusal(
-    name: str, path: str, old: bytes, new: bytes | None, owned: bool, diff: bool
-) -> Diagnostic:
-    shown = f"{name}/{path}"
-    detail = "\n".join(difference(old, new)) if diff and new is not None else ""
-    if not owned:
+def _refusal(shown: str, ground: Ground, diff: str, *, removed: bool) -> Diagnostic:
+    if ground is Ground.FOREIGN:
         return codes.FOREIGN_FILE.of(
             shown,
             f"`{shown}` is in the way and was not written by idlc",
             hint="move it away, choose another folder with -o, or run again with --force, "
             "which keeps a copy",
-            detail=detail,
+            detail=diff,
         )
-    message = "was edited since idlc wrote it" + (
-        "" if new is not None else ", and is to be removed"
-    )
+    message = "was edited since idlc wrote it" + (", and is to be removed" if removed else "")
     return codes.EDITED_FILE.of(
         shown,
         f"`{shown}` {message}",
         hint="move the edit out of generated code, or run again with --force, which keeps a copy",
-        detail=detail,
+        detail=diff,
     )
+
+
+def _diff(old: bytes | None, new: bytes | None) -> str:
+    return "\n".join(difference(old or b"", new)) if new is not None else ""
 
 
 def difference(old: bytes, new: bytes) -> Iterator[str]:

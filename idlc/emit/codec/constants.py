@@ -9,13 +9,13 @@ from typing import NamedTuple
 from idlc.emit import pynames
 from idlc.emit.codec import wire_plan
 from idlc.emit.python_lines import Group, Node, call
+from idlc.model import ir
 
 
 class Mark(NamedTuple):
     """What was named at some point."""
 
     made: dict[Hashable, tuple[str, Node]]
-    numbers: dict[str, int]
     names: frozenset[str]
 
 
@@ -25,7 +25,6 @@ class Tables:
     def __init__(self, names: pynames.Locals) -> None:
         self._names = names
         self._made: dict[Hashable, tuple[str, Node]] = {}
-        self._numbers: dict[str, int] = {}
 
     @property
     def definitions(self) -> tuple[tuple[str, Node], ...]:
@@ -38,11 +37,11 @@ class Tables:
 
     def mark(self) -> Mark:
         """Return what `reset` needs."""
-        return Mark(self._made.copy(), self._numbers.copy(), self._names.mark())
+        return Mark(self._made.copy(), self._names.mark())
 
     def reset(self, mark: Mark) -> None:
         """Forget everything named since `mark`."""
-        self._made, self._numbers = mark.made, mark.numbers
+        self._made = mark.made
         self._names.reset(mark.names)
 
     def define(self, wanted: str, key: Hashable, expression: Node) -> str:
@@ -52,15 +51,10 @@ class Tables:
             known = self._made[key] = (self._names.new(wanted), expression)
         return known[0]
 
-    def numbered(self, stem: str, function: str, *arguments: str, after: str = "") -> str:
-        """Return the name of a runtime function's result, made as `stem` and a number."""
-        key = (stem, function, *arguments, after)
-        known = self._made.get(key)
-        if known:
-            return known[0]
-        number = self._numbers[stem] = self._numbers.get(stem, 0) + 1
+    def made(self, wanted: str, function: str, *arguments: str, after: str = "") -> str:
+        """Return the name of what a runtime function makes for the byte order."""
         value = Group(f"_idlc.{function}", ("order", *arguments), after)
-        return self.define(f"{stem}_{number}", key, value)
+        return self.define(wanted, (function, *arguments, after), value)
 
     def function(self, name: str, expression: str) -> str:
         """Return the name of a runtime function."""
@@ -68,27 +62,29 @@ class Tables:
 
     def reader(self, fields: str, start: int | None) -> str:
         """Return what unpacks a run: a function, or without `start` a table by position."""
+        name = f"read_{_content(fields)}"
         if start is None:
-            return self.numbered("read", "phases", f'"{fields}"')
+            return self.made(f"{name}_at", "phases", f'"{fields}"')
         arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
-        return self.numbered("read", "layout", *arguments, after=".unpack_from")
+        return self.made(name, "layout", *arguments, after=".unpack_from")
 
     def rows(self, fields: str) -> str:
         """Return the function that yields the values of one structure after the other."""
-        return self.numbered("rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
+        return self.made("read_rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
 
     def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
         """Return what packs a frame: a function, or a table by text size or by position."""
+        name = f"write_{_content(fields)}"
         arguments = [f'"{fields}"']
         if start:
             arguments.append(f"start={start}")
         if align > 1:
             arguments.append(f"align={align}")
         if start is None:
-            return self.numbered("write", "text_phases" if texts else "phases", *arguments)
+            return self.made(f"{name}_at", "text_phases" if texts else "phases", *arguments)
         if texts:
-            return self.numbered("write", "Texts", *arguments)
-        return self.numbered("write", "layout", *arguments, after=".pack")
+            return self.made(name, "Texts", *arguments)
+        return self.made(name, "layout", *arguments, after=".pack")
 
     def pad(self, align: int) -> str:
         """Return the table of padding to `align`, by position."""
@@ -104,40 +100,40 @@ class Tables:
             kind = wire_plan.LIST_PRIMITIVES[step.primitive]
             name = f"{kind}_{step.count}"
             return self.define(name, name, f"_idlc.{kind}_writer({step.count})")
-        return self._array("bytes", "array_writer", step)
+        return self._array("bytes_of", "array_writer", step)
 
     def buffer_writer(self, step: wire_plan.Block) -> str:
         """Return the function that turns a fixed-size array into any kind of buffer."""
         if step.primitive in wire_plan.LIST_PRIMITIVES:
             return self.block_writer(step)
-        return self._array("buffer", "buffer_writer", step)
+        return self._array("buffer_of", "buffer_writer", step)
 
     def block_reader(self, step: wire_plan.Block) -> str:
         """Return the function that turns bytes into a fixed-size array."""
         if step.primitive in wire_plan.LIST_PRIMITIVES:
             kind = wire_plan.LIST_PRIMITIVES[step.primitive]
             return self.function(f"read_{kind}", f"read_{kind}")
-        return self._array("array", "array_reader", step, "reading")
+        return self._array("array_of", "array_reader", step, "reading")
 
     def _array(self, stem: str, function: str, step: wire_plan.Block, *more: str) -> str:
-        dtype = numpy_name(step.primitive)
+        dtype = ir.PRIMITIVES[step.primitive].dtype
         expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
         return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
 
     def sequence_writer(self, step: wire_plan.Numbers) -> str:
         """Return the function that makes an array of another sequence of numbers."""
         expression = f'_idlc.sequence_writer(order, "{step.code}")'
-        return self.define(f"buffer_{step.code}", expression, expression)
+        return self.define(f"array_of_{step.numpy}", expression, expression)
 
     def sequence_copier(self, step: wire_plan.Numbers) -> str:
         """Return the function that turns a sequence of numbers into bytes."""
         expression = f'_idlc.sequence_copier(order, "{step.code}")'
-        return self.define(f"copy_{step.code}", expression, expression)
+        return self.define(f"bytes_of_{step.numpy}", expression, expression)
 
     def sequence_reader(self, step: wire_plan.Numbers) -> str:
         """Return the function that turns a buffer into a sequence of numbers."""
         expression = f'_idlc.sequence_reader(order, "{step.code}", reading)'
-        return self.define(f"numbers_{step.code}", expression, expression)
+        return self.define(f"read_{step.numpy}", expression, expression)
 
     def texts_writer(self, step: wire_plan.Texts) -> str:
         """Return the function that writes an array of strings; one for each field."""
@@ -173,6 +169,10 @@ class Tables:
         return self.define("small", "small", "reading.small")
 
 
-def numpy_name(primitive: str) -> str:
-    """Return the dtype of a numeric primitive."""
-    return {"char": "uint8"}.get(primitive, primitive)
+def _content(fields: str) -> str:
+    """Return a word for what a layout consists of."""
+    if fields.startswith("4s"):
+        return "head"
+    if "*" in fields:
+        return "text"
+    return "count" if fields == "I" else "values"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import msgspec
 
+from idlc.emit.codec.alignment import Alignment
+
 
 class Cursor(msgspec.Struct, frozen=True):
-    """The position `base + offset`, or `offset` alone; modulo `modulus` it is `residue`."""
+    """The position `base + offset`, or `offset` alone."""
 
-    base: str = ""
-    offset: int = 4
-    modulus: int = 8
-    residue: int = 4
+    base: str
+    offset: int
+    known: Alignment
 
     def text(self, by: int = 0) -> str:
         """Return the position `by` bytes further as an expression."""
@@ -22,30 +23,18 @@ class Cursor(msgspec.Struct, frozen=True):
             return f"{self.base} - {-offset}"
         return f"{self.base} + {offset}" if offset else self.base
 
-    def padding(self, align: int) -> int:
-        """Return the bytes to the next multiple of a known `align`, from the header's end on."""
-        return (4 - self.residue) % align
-
-    def aligned(self, align: int) -> bool:
-        """Whether this is known to be a multiple of `align`, counted from the header's end."""
-        return self.modulus >= align and self.padding(align) == 0
-
     def skip(self, size: int) -> Cursor:
         """Return the position `size` bytes further."""
-        residue = (self.residue + size) % self.modulus
-        return Cursor(self.base, self.offset + size, self.modulus, residue)
+        return Cursor(self.base, self.offset + size, self.known.after(size))
 
     def at(self, base: str, offset: int = 0) -> Cursor:
         """Return the same position, held by another variable."""
-        return Cursor(base, offset, self.modulus, self.residue)
+        return Cursor(base, offset, self.known)
 
-    def known(self, modulus: int, residue: int) -> Cursor:
+    def where(self, known: Alignment) -> Cursor:
         """Return the position with other knowledge of it."""
-        return Cursor(self.base, self.offset, modulus, residue % modulus)
+        return Cursor(self.base, self.offset, known)
 
-    def meet(self, other: Cursor) -> Cursor:
-        """Return this with only that knowledge that is also true of `other`."""
-        modulus = min(self.modulus, other.modulus)
-        while self.residue % modulus != other.residue % modulus:
-            modulus //= 2
-        return self.known(modulus, self.residue)
+
+#: The end of the header.
+START = Cursor("", 4, Alignment(8, 4))

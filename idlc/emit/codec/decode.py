@@ -1,7 +1,7 @@
 """From a layout to the statements that read it.
 
 Numbers that follow each other are read by one precompiled Struct. A Struct and an index check
-their own bounds; a slice that ends behind the buffer's end is shorter, and whatever is read next,
+their own bounds; a slice that ends after the buffer's end is shorter, and whatever is read next,
 or a check at the end, fails. Before structures are made, their least size is compared with the
 bytes that are left: nothing is allocated that the buffer does not hold. Any failure is explained
 afterwards, by the runtime.
@@ -12,20 +12,19 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from idlc.emit.codec import wire_plan
+from idlc.emit.codec.alignment import multiple_of
 from idlc.emit.codec.constants import Tables
 from idlc.emit.codec.cursor import Cursor
-from idlc.emit.codec.encode import block_code
+from idlc.emit.codec.runs import Run, Running, slice_of
 from idlc.emit.codec.statements import Block, Line, Statement
-from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
+from idlc.emit.python_lines import Comprehension, Node, call, tuple_of
 from idlc.model import ir
 
-TOO_SHORT = (Line('raise ValueError("too short")'),)
 UNENDED = (Line('raise ValueError("text without end")'),)
-TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
 def is_bulk(steps: tuple[wire_plan.Step, ...]) -> bool:
-    """Whether a structure holds numeric buffers, which are read through a memoryview."""
+    """Return whether a structure holds numeric buffers, which are read through a memoryview."""
     return any(
         isinstance(step, wire_plan.Numbers)
         or (isinstance(step, wire_plan.Block) and step.is_large)
@@ -60,49 +59,13 @@ def decode(
     return (*first, *decoder.body, Line("return message"))
 
 
-class _Run:
-    """Fixed-size values that are read together."""
-
-    def __init__(self) -> None:
-        self.fields: list[str] = []
-        self.targets: list[str] = []
-        self.sizes: list[tuple[int, int]] = []
-        self.after: list[Statement] = []
-
-    def add(self, token: str, align: int, size: int, target: str = "") -> None:
-        """Add a value of `size` bytes, stored in `target`."""
-        self.fields.append(token)
-        self.sizes.append((align, size))
-        if target:
-            self.targets.append(target)
-
-    def skipped(self, cursor: Cursor) -> Cursor:
-        """Return the position after the values, of which the first is at `cursor`."""
-        for align, size in self.sizes:
-            if align > cursor.modulus:
-                cursor = cursor.known(align, 4)
-            cursor = cursor.skip(cursor.padding(align) + size)
-        return cursor
-
-    def assignment(self, value: Group) -> Line:
-        """Return the statement that reads the values."""
-        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
-
-
-class _Decoder:
-    """The statements so far, the values to be read together, and the position before them."""
+class _Decoder(Running):
+    """Emits a message's steps; `makers` name the functions that make empty objects."""
 
     def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], source: str) -> None:
-        self.tables = tables
+        super().__init__(tables, source)
         self.makers = makers
-        self.source = source
-        self.body: list[Statement] = []
-        self.here = Cursor()
-        self.run = _Run()
-        self.limited = False
         self.looping = False
-        self.unchecked = False
-        self.worded = False
 
     def step(self, step: wire_plan.Step) -> None:
         """Emit one step."""
@@ -126,20 +89,15 @@ class _Decoder:
             case wire_plan.Items():
                 self.items(step)
 
-    def line(self, value: Node, target: Node = "") -> None:
-        """Emit a statement."""
-        self.body.append(Line(value, target))
-
     # Values of fixed size.
 
-    def fixed(self, step: wire_plan.Step, run: _Run) -> None:
+    def fixed(self, step: wire_plan.Step, run: Run) -> None:
         """Add a value to a run."""
         match step:
             case wire_plan.Number(place, letter, size):
                 run.add(letter, size, size, place.text)
-            case wire_plan.Block(place, primitive, count):
-                token = f"{count}{block_code(primitive)}"
-                run.add(token, step.unit, step.size, place.local)
+            case wire_plan.Block(place):
+                run.add(step.token, step.unit, step.size, place.local)
                 reader = self.tables.block_reader(step)
                 run.after.append(Line(call(reader, place.local), place.text))
             case _:
@@ -149,73 +107,7 @@ class _Decoder:
         """Return the statements that make a nested object."""
         return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
 
-    def flush(self, *, last: bool = False) -> None:
-        """Read the run; the position after it is of no interest if it is the `last`."""
-        run, self.run = self.run, _Run()
-        if not run.fields:
-            return
-        self.unchecked = False
-        widest = max(align for align, _ in run.sizes)
-        if run.sizes[0][0] == widest:
-            self.align(widest)
-        fields = "".join(run.fields)
-        here = self.here.text()
-        if self.worded and fields == "I":
-            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
-            self.here = run.skipped(self.here)
-        elif widest <= self.here.modulus:
-            reader = self.tables.reader(fields, self.here.residue)
-            self.body.append(run.assignment(call(reader, "data", here)))
-            self.here = run.skipped(self.here)
-        else:
-            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
-            struct = table if last else "struct"
-            if not last:
-                self.line(table, struct)
-            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
-            if not last:
-                self.line(f"{here} + struct.size", "at")
-                self.here = run.skipped(self.here).at("at")
-        self.body += run.after
-
-    def align(self, align: int) -> None:
-        """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.here.modulus >= align:
-            self.here = self.here.skip(self.here.padding(align))
-        elif align == 8:
-            self.line(f"({self.here.text(3)} & -8) + 4", "at")
-            self.here = Cursor("at", 0, 8, 4)
-        else:
-            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
-            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
-            self.here = Cursor("at", -lead, align, 4 % align)
-
-    def settle(self, target: Cursor) -> None:
-        """Bring the position into the variable of `target`."""
-        value = self.here.text(-target.offset)
-        if value != target.base:
-            self.line(value, target.base)
-        self.here = self.here.at(target.base, target.offset)
-
     # Values of variable size.
-
-    def number(self, target: str) -> None:
-        """Read a count or size into a variable, together with the numbers before it."""
-        self.run.add("I", 4, 4, target)
-        self.flush()
-
-    def count(self, bound: int | None) -> str:
-        """Read the count of a sequence and check its upper limit."""
-        self.number("count")
-        if bound is not None:
-            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
-        return "count"
-
-    def start(self) -> str:
-        """Return the position as an expression that stays true when `end` changes."""
-        if self.here.base == "end":
-            self.settle(Cursor("at", 0))
-        return self.here.text()
 
     def text(self) -> Node:
         """Read the size of a string; return the expression that reads the string.
@@ -233,7 +125,7 @@ class _Decoder:
             start = self.start()
         self.line(f"{self.here.text(-1)} + {size}", "end")
         self.body.append(Block("if data[end]:", UNENDED))
-        self.here = Cursor("end", 1, 1, 0)
+        self.here = Cursor("end", 1, multiple_of(1))
         if self.worded:
             return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.text(), f"data{slice_of(start)}")
@@ -243,32 +135,6 @@ class _Decoder:
         self.number("count")
         raw = self.buffer("count", 4, 4, "data")
         return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
-
-    def buffer(self, count: str, align: int, size: int, source: str) -> str:
-        """Return the slice of `count` elements, and go behind it.
-
-        It is shorter if the buffer is, which whatever is read next notices.
-        """
-        if not self.here.aligned(align):
-            self.settle(Cursor("at", 0))
-            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
-            self.here = self.here.known(4, 0)
-        start = self.start()
-        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
-        self.unchecked = True
-        modulus = min(self.here.modulus, size & -size)
-        self.here = self.here.at("end").known(modulus, self.here.residue)
-        return f"{source}{slice_of(start)}"
-
-    def finish(self) -> None:
-        """Emit the check that nothing after the last buffer makes."""
-        if self.unchecked:
-            self.short_if(f"{self.here.text()} > limit")
-
-    def short_if(self, condition: str) -> None:
-        """Emit a check that the buffer is long enough."""
-        self.limited = True
-        self.body.append(Block(f"if {condition}:", TOO_SHORT))
 
     def numbers(self, step: wire_plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
@@ -299,7 +165,7 @@ class _Decoder:
         reader = self.tables.texts_reader(step)
         texts = call(reader, "data", self.here.text(), count)
         self.line(texts, tuple_of(step.place.text, "end"))
-        self.here = Cursor("end", 0, 4 if step.wide else 1, 0)
+        self.here = Cursor("end", 0, multiple_of(4 if step.wide else 1))
 
     def items(self, step: wire_plan.Items) -> None:
         """Read an array or sequence of structures."""
@@ -320,7 +186,7 @@ class _Decoder:
             self.short_if(f"{self.here.text()} + {wanted} > limit")
         else:
             self.short_if(f"{self.here.text(least * step.size)} > limit")
-        empty = Comprehension(f"{self.makers[step.type]}()", (f"for _ in range({count})",))
+        empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
         worded = self.worded
@@ -340,7 +206,7 @@ class _Decoder:
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
-        run = _Run()
+        run = Run()
         entered: list[Statement] = []
         for part in step.body:
             if isinstance(part, wire_plan.Enter):
@@ -365,33 +231,26 @@ class _Decoder:
 
         Between two rounds the position is in `at`, or in `end` if the body ends with a string.
         """
-        outside, entry = self.body, self.here
+        entry, first = self.here, self.here.at("at")
         unchecked = self.unchecked
-        first = entry.at("at")
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
-            self.body, self.here = [], first
-            emit()
-            again = first.meet(self.here)
-            if first.base == "at" and self.here.base == "end":
-                again = again.at("end", self.here.offset)
+            with self.within(head):
+                self.here = first
+                emit()
+                again = first.where(first.known.meet(self.here.known))
+                if first.base == "at" and self.here.base == "end":
+                    again = again.at("end", self.here.offset)
+                self.settle(again.base, again.offset)
+            loop = self.body.pop()
             if again == first:
                 break
             first = again
             self.tables.reset(mark)
         self.looping = looping
-        self.settle(first)
-        loop = Block(head, tuple(self.body))
-        self.body, self.here = outside, entry
-        self.settle(first)
+        self.here = entry
+        self.settle(first.base, first.offset)
         self.body.append(loop)
         self.here = first
         self.unchecked |= unchecked
-
-
-def slice_of(start: str, end: str = "end") -> str:
-    """Return the slice from one expression to another."""
-    if " " in start + end:
-        return f"[{start} : {end}]"
-    return f"[{start}:{end}]"

@@ -9,39 +9,19 @@ remainder in `low`) only where somebody reads it.
 
 from __future__ import annotations
 
-import re
-
 from idlc.emit.codec import statements, wire_plan
+from idlc.emit.codec.alignment import Alignment, multiple_of
 from idlc.emit.codec.constants import Tables
+from idlc.emit.codec.frames import Frame, Framing
 from idlc.emit.codec.position import Position, aligned_to_8
 from idlc.emit.python_lines import Comprehension, Group, Node, call, tuple_of
-from idlc.model import ir
 
 NONE: frozenset[str] = frozenset()
-_POSITIONS = re.compile(r"\b(?:at|low)\b")
-
-
-class Frame:
-    """Fixed-size values that follow each other, with at most one text: one Struct."""
-
-    def __init__(self, start: Position) -> None:
-        self.modulus = start.modulus
-        self.residue = start.residue
-        self.fields: list[str] = []
-        self.values: list[Node] = []
-        self.text_size = ""
-        self.widest = 1
-
-    def phase(self) -> str:
-        """Return the subscript that picks a Struct by the position, empty if one is enough."""
-        if self.modulus >= self.widest:
-            return ""
-        return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
 
 
 def encode(steps: tuple[wire_plan.Step, ...], tables: Tables, indent: int) -> list[str]:
     """Return the lines that write a message; what they use is defined in `tables`."""
-    encoder = _Encoder(tables, Position())
+    encoder = _Encoder(tables, Position(Alignment()))
     encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
     for step in steps:
         encoder.step(step)
@@ -50,14 +30,11 @@ def encode(steps: tuple[wire_plan.Step, ...], tables: Tables, indent: int) -> li
     return statements.function(body, indent, tuple(encoder.again))
 
 
-class _Encoder:
-    """The statements so far, the frame that grows, and the position after both."""
+class _Encoder(Framing):
+    """Emits a message's steps."""
 
     def __init__(self, tables: Tables, here: Position) -> None:
-        self.tables = tables
-        self.here = here
-        self.body: list[statements.Statement] = []
-        self.frame = Frame(here)
+        super().__init__(tables, here)
         #: What is true if another thread changed the length of an array that was not copied.
         self.again: list[str] = []
         self.looping = False
@@ -88,89 +65,6 @@ class _Encoder:
                 self.texts(step)
             case wire_plan.Items():
                 self.items(step)
-
-    def line(self, value: Node, target: str) -> None:
-        """Emit an assignment."""
-        self.body.append(statements.Line(value, target))
-
-    def put(self, part: Node, reads: str = "") -> None:
-        """Emit a part of the message."""
-        self.body.append(statements.Put(part, positions(reads)))
-
-    # Values of fixed size, and one text among them, gather in a frame.
-
-    def fixed(self, step: wire_plan.Step) -> None:
-        """Add a value of fixed size to the frame."""
-        match step:
-            case wire_plan.Number(place, "?"):
-                truths = self.tables.function("truths", "TRUTHS")
-                self.field("?", 1, 1, f"{truths}[{place.text}]")
-            case wire_plan.Number(place, letter, size):
-                self.field(letter, size, size, place.text)
-            case wire_plan.Block(place, primitive, count):
-                value = call(self.tables.block_writer(step), place.text)
-                self.field(f"{count}{block_code(primitive)}", step.unit, step.size, value)
-            case _:
-                self.field("x", 1, 1)
-
-    def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
-        """Add a value to the frame."""
-        frame = self.frame
-        frame.fields.append(token)
-        frame.widest = max(frame.widest, align)
-        if value is not None:
-            frame.values.append(value)
-        self.here.align(align)
-        self.here.advance(size)
-
-    def text(self, place: wire_plan.Place) -> None:
-        """Add a string to the frame; a frame has at most one."""
-        if self.frame.text_size:
-            self.flush(4)
-        size = self.tables.local(f"{place.local}_size")
-        self.line(f"{place.text}.encode()", place.local)
-        self.line(call("len", place.local), size)
-        self.field("I", 4, 4, f"{size} + 1")
-        self.frame.fields.append("*")
-        self.frame.values.append(place.local)
-        self.frame.text_size = size
-        self.here.skip(size, 1)
-        self.here.advance(1)
-
-    def flush(self, align: int) -> None:
-        """Write the frame; with the padding for a following `align` where that is known."""
-        frame = self.frame
-        if frame.fields:
-            if max(frame.modulus, frame.widest) < align:
-                align = 1
-            frame.widest = max(frame.widest, align)
-            phase = frame.phase()
-            start = None if phase else frame.residue
-            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
-            key = f"[{frame.text_size}]" if frame.text_size else ""
-            method = ".pack" if phase and not key else ""
-            self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
-            self.here.align(align)
-        self.settle()
-
-    def settle(self) -> None:
-        """Note the position in `at` and `low`, and begin a new frame there."""
-        here = self.here
-        for target, value in here.before:
-            self.note(target, value)
-        here.before.clear()
-        if not here.constant:
-            self.note("at", here.text)
-            if not here.known(4):
-                self.note("low", here.low)
-            self.here = Position.variable(here.modulus, here.residue)
-        self.frame = Frame(self.here)
-
-    def note(self, target: str, value: str) -> None:
-        """Note a position; dropped later unless it is read."""
-        value = without_parentheses(value)
-        if target != value:
-            self.body.append(statements.Note(target, value, positions(value)))
 
     # Values of variable or large size are parts of their own.
 
@@ -244,18 +138,6 @@ class _Encoder:
         else:
             self.check(f"{count} != {step.size}", "wrong number of elements")
 
-    def pad(self, align: int, unless_empty: str = "") -> None:
-        """Emit padding as a part of its own."""
-        here = self.here
-        if here.aligned(align):
-            return
-        phase = "[at & 7]" if align == 8 else "[low & 3]"
-        index = f"[{here.residue}]" if here.known(align) else phase
-        part = f"{self.tables.pad(align)}{index}"
-        self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
-        if not unless_empty:
-            here.align(align)
-
     def rows(self, step: wire_plan.Items) -> None:
         """Emit structures of strings: what goes around each is looked up, all is encoded once."""
         local = step.place.local
@@ -271,9 +153,9 @@ class _Encoder:
         lines = [statements.Line(one.text, one.local) for one in places]
         lines.append(statements.Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
-        given = tuple_of(*(one.text for one in places)).flat()
+        given = tuple_of(*(one.text for one in places))
         each = self.tables.local("each")
-        texts = Comprehension(each, (loop, f"for {each} in {given}"))
+        texts = Comprehension(each, ((step.item, local), (each, given)))
         unsized = call(self.tables.function("unsized", "unsized"), texts)
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
@@ -307,15 +189,15 @@ class _Encoder:
         """Emit structures of constant size: one Struct, one join."""
         local = step.place.local
         self.flush(1 if step.size is None else repeat.align)
-        inner = _Encoder(self.tables, Position(8, 4))
+        inner = _Encoder(self.tables, Position(Alignment(8, 4)))
         for part in inlined(step):
             inner.fixed(part)
         writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
         row = Group(writer, tuple(inner.frame.values))
         block = self.tables.local(f"{local}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
-        loop = f"for {step.item} in {local}"
-        self.line(Group(f'b"{gap}".join', (Comprehension(row, (loop,)),)), block)
+        blocks = Comprehension(row, ((step.item, local),))
+        self.line(Group(f'b"{gap}".join', (blocks,)), block)
         self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
 
     def elements(self, part: str, count: str, repeat: wire_plan.Fixed, *, unless: str) -> None:
@@ -324,7 +206,7 @@ class _Encoder:
         size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
         size += f" - {gap}" if gap else ""
         modulus = power_of_two(repeat.size, repeat.stride)
-        if not unless or (self.here.aligned(repeat.align) and not gap):
+        if not unless or (self.here.known.is_at(repeat.align) and not gap):
             self.pad(repeat.align)
             self.put(part)
             self.here.skip(size, modulus)
@@ -335,13 +217,11 @@ class _Encoder:
             self.note("low", self.here.low)
             self.pad(repeat.align, unless)
             self.put(part)
-            outside, self.body = self.body, []
-            start = aligned_to_8("at") if repeat.align == 8 else "at"
-            self.note("at", f"{start} + {size}")
-            self.note("low", size)
-            outside.append(statements.Block(f"if {unless}:", tuple(self.body)))
-            self.body = outside
-            self.here = Position.variable(min(modulus, 4), 0)
+            with self.within(f"if {unless}:"):
+                start = aligned_to_8("at") if repeat.align == 8 else "at"
+                self.note("at", f"{start} + {size}")
+                self.note("low", size)
+            self.here = Position.variable(multiple_of(4).modulo(modulus))
         self.settle()
 
     def loop(self, step: wire_plan.Items) -> None:
@@ -350,54 +230,30 @@ class _Encoder:
         entry = self.here
         if entry.constant:
             self.note("at", entry.text)
-        if entry.known(4):
+        if entry.known.knows(4):
             self.note("low", entry.low)
-        outside = self.body
-        head = entry.meet(entry)
+        head = entry.known
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
-            self.body = []
-            self.here = Position.variable(head.modulus, head.residue)
-            self.frame = Frame(self.here)
-            for part in step.body:
-                self.step(part)
-            self.flush(1)
-            end = self.here
-            if end.modulus >= 4 > head.modulus:
-                self.note("low", end.low)
-            met = head.meet(end)
-            if met.modulus == head.modulus:
+            with self.within(f"for {step.item} in {step.place.local}:"):
+                self.here = Position.variable(head)
+                self.frame = Frame(self.here)
+                for part in step.body:
+                    self.step(part)
+                self.flush(1)
+                end = self.here
+                if end.known.knows(4) and not head.knows(4):
+                    self.note("low", end.low)
+            met = head.meet(end.known)
+            if met == head:
                 break
             head = met
             self.tables.reset(mark)
-        outside.append(
-            statements.Block(f"for {step.item} in {step.place.local}:", tuple(self.body))
-        )
+            self.body.pop()
         self.looping = looping
-        self.body = outside
-        self.here = head
-        self.frame = Frame(head)
-
-
-def positions(expression: str) -> frozenset[str]:
-    """Return the variables in an expression that hold positions."""
-    return frozenset(_POSITIONS.findall(expression))
-
-
-def without_parentheses(value: str) -> str:
-    """Return an expression without parentheses around all of it."""
-    depth = 0
-    for place, character in enumerate(value):
-        depth += (character == "(") - (character == ")")
-        if depth == 0 and place < len(value) - 1:
-            return value
-    return value[1:-1] if value.startswith("(") else value
-
-
-def block_code(primitive: str) -> str:
-    """Return the character for a fixed-size array in a layout."""
-    return "B" if primitive in wire_plan.LIST_PRIMITIVES else ir.PRIMITIVES[primitive].code
+        self.here = Position.variable(head)
+        self.frame = Frame(self.here)
 
 
 def power_of_two(*sizes: int) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from idlc.emit.codec.alignment import Alignment, multiple_of
+
 #: Expressions longer than this are set aside.
 LONG = 40
 
@@ -9,15 +11,13 @@ LONG = 40
 class Position:
     """A position counted from the start of the buffer, as far as it is known.
 
-    Its residue modulo `modulus` (8, 4, 2 or 1) is `residue`. Its value is `text`, an expression
-    over the variable `at`, or a number while nothing of variable size came before. `low` agrees
-    with it modulo 4 and is an expression over sizes since the last multiple of 4. `before` are
-    assignments that both expressions rely on.
+    Its value is `text`, an expression over the variable `at`, or a number while nothing of
+    variable size came before. `low` agrees with it modulo 4 and is an expression over sizes since
+    the last multiple of 4. `before` are assignments that both expressions rely on.
     """
 
-    def __init__(self, modulus: int = 8, residue: int = 0, base: str = "", low: str = "") -> None:
-        self.modulus = modulus
-        self.residue = residue
+    def __init__(self, known: Alignment, base: str = "", low: str = "") -> None:
+        self.known = known
         self._base = base
         self._offset = 0
         self._low = low
@@ -25,17 +25,9 @@ class Position:
         self.before: list[tuple[str, str]] = []
 
     @classmethod
-    def variable(cls, modulus: int, residue: int) -> Position:
+    def variable(cls, known: Alignment) -> Position:
         """Return a position that is in `at` and, modulo 4, in `low`."""
-        return cls(modulus, residue % modulus, "at", "low")
-
-    def known(self, align: int) -> bool:
-        """Whether the residue modulo `align` is known."""
-        return self.modulus >= align
-
-    def aligned(self, align: int) -> bool:
-        """Whether this is known to be a multiple of `align`, counted from the header's end."""
-        return self.known(align) and (4 - self.residue) % align == 0
+        return cls(known, "at", "low")
 
     @property
     def constant(self) -> bool:
@@ -50,50 +42,42 @@ class Position:
     @property
     def low(self) -> str:
         """An expression that is equal to the position modulo 4."""
-        if self.known(4):
-            return str(self.residue % 4)
+        if self.known.knows(4):
+            return str(self.known.residue % 4)
         return _sum(self._low, self._low_offset % 4)
 
     def advance(self, size: int) -> None:
         """Go `size` bytes ahead."""
         self._offset += size
         self._low_offset += size
-        self.residue = (self.residue + size) % self.modulus
+        self.known = self.known.after(size)
 
     def align(self, align: int) -> None:
         """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.known(align):
-            self.advance((4 - self.residue) % align)
+        if self.known.knows(align):
+            self.advance(self.known.padding(align))
             return
         self.shorten()
         self._base, self._offset = _align_up(self._base, self._offset, align)
         self._low, self._low_offset = _align_up(self._low, self._low_offset, align)
-        self.modulus, self.residue = align, 4 % align
+        self.known = multiple_of(align)
 
     def skip(self, size: str, modulus: int) -> None:
         """Go ahead by an expression, which is a multiple of `modulus`."""
-        if self.known(4):
-            self._low, self._low_offset = "", self.residue % 4
+        if self.known.knows(4):
+            self._low, self._low_offset = "", self.known.residue % 4
         self._base = _plus(self._base, size)
         self._low = _plus(self._low, size)
-        self.modulus = min(self.modulus, modulus)
-        self.residue %= self.modulus
+        self.known = self.known.modulo(modulus)
 
     def shorten(self) -> None:
         """Set a long expression aside as a statement of its own."""
         if len(self.text) > LONG:
             self.before.append(("at", self.text))
             self._base, self._offset = "at", 0
-        if not self.known(4) and len(self.low) > LONG:
+        if not self.known.knows(4) and len(self.low) > LONG:
             self.before.append(("low", self.low))
             self._low, self._low_offset = "low", 0
-
-    def meet(self, other: Position) -> Position:
-        """Return a variable position of which only that is known that is true of both."""
-        modulus = min(self.modulus, other.modulus)
-        while self.residue % modulus != other.residue % modulus:
-            modulus //= 2
-        return Position.variable(modulus, self.residue)
 
 
 def aligned_to_8(position: str) -> str:

@@ -6,6 +6,8 @@ are never read. `prune` drops them, `text_of` turns the rest into lines.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TypeAlias
 
 import msgspec
@@ -44,6 +46,25 @@ class Block(msgspec.Struct, frozen=True):
 
 
 Statement: TypeAlias = Line | Put | Note | Block
+
+
+class Emitter:
+    """The statements so far."""
+
+    def __init__(self) -> None:
+        self.body: list[Statement] = []
+
+    def line(self, value: Node, target: Node = "") -> None:
+        """Emit a statement without effect on the position."""
+        self.body.append(Line(value, target))
+
+    @contextmanager
+    def within(self, head: str) -> Iterator[None]:
+        """Make what is emitted meanwhile the body of a compound statement."""
+        outside, self.body = self.body, []
+        yield
+        outside.append(Block(head, tuple(self.body)))
+        self.body = outside
 
 
 def prune(body: tuple[Statement, ...], live: frozenset[str]) -> tuple[Statement, ...]:
@@ -95,7 +116,7 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
 
 
 def _interferes(statement: Statement, waiting: list[Put]) -> bool:
-    """Whether a statement must not run before the parts that wait to be put."""
+    """Return whether a statement must not run before the parts that wait to be put."""
     match statement:
         case Note(target):
             return any(target in put.reads for put in waiting)

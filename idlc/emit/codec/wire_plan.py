@@ -57,6 +57,12 @@ class Block(msgspec.Struct, frozen=True):
         return ir.PRIMITIVES[self.primitive].size
 
     @property
+    def token(self) -> str:
+        """The array in the layout of a Struct, where it is a number of bytes or numbers."""
+        lists = self.primitive in LIST_PRIMITIVES
+        return f"{self.count}{'B' if lists else ir.PRIMITIVES[self.primitive].code}"
+
+    @property
     def size(self) -> int:
         """Bytes of all."""
         return self.unit * self.count
@@ -85,6 +91,11 @@ class Numbers(msgspec.Struct, frozen=True):
     def unit(self) -> int:
         """Bytes of one element."""
         return ir.PRIMITIVES[self.primitive].size
+
+    @property
+    def numpy(self) -> str:
+        """What numpy calls an element."""
+        return ir.PRIMITIVES[self.primitive].dtype
 
     @property
     def code(self) -> str:
@@ -184,7 +195,7 @@ def _step(type_: ir.FieldType, place: Place, messages: Messages, names: pynames.
             if isinstance(element, ir.String):
                 return Texts(place, element.wide, length, bound)
             if isinstance(element, ir.Ref):
-                item = names.new("item")
+                item = names.new(f"{place.local}_item")
                 body = _steps(messages[element.target], messages, names, item, (item,))
                 return Items(place, element.target, item, tuple(body), length, bound)
     raise ValueError(f"a type that cannot be emitted: {type_!r}")
@@ -226,13 +237,13 @@ def smallest(body: tuple[Step, ...]) -> int:
 
 
 def is_many(step: Items) -> bool:
-    """Whether there may be so many elements that preparing for them is worth its cost."""
+    """Return whether there may be so many elements that preparing for them is worth its cost."""
     most = step.bound if step.size is None else step.size
     return most is None or most > FEW
 
 
 def is_text(body: tuple[Step, ...]) -> bool:
-    """Whether steps are strings and structures of them, with nothing between but single bytes."""
+    """Return whether steps are strings, and structures of them, with only single bytes between."""
     for step in body:
         match step:
             case Text(wide=False) | Number(size=1) | Enter():

@@ -46,13 +46,13 @@ def brackets(text: str) -> Iterator[tuple[str, str]]:
 
     These may be units: the whole with the blanks before it, and what stands between the brackets.
     """
-    behind = 0
+    start = 0
     at = text.find("[")
     while at >= 0 and (end := _UNIT_END.search(text, at)):
         if end[0] == "]" and end.start() > at + 1:
-            head = text[behind:at]
-            yield text[behind + len(head.rstrip()) : end.end()], text[at + 1 : end.start()]
-            behind = end.end()
+            head = text[start:at]
+            yield text[start + len(head.rstrip()) : end.end()], text[at + 1 : end.start()]
+            start = end.end()
         at = text.find("[", end.end())
 
 

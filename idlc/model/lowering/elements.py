@@ -32,14 +32,14 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
     ends = {quote: _Ends(inside, quote) for quote in QUOTES}
     at = 0
     while at < len(inside) and len(found) <= MAX_ELEMENTS:
-        at = _behind_blanks(inside, at)
+        at = _after_blanks(inside, at)
         if at == len(inside) or inside[at] == ",":
             return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")
         quoted = False
         for quote in QUOTES:
             if inside.startswith(quote, at):
                 quoted = True
-                end = ends[quote].behind(at)
+                end = ends[quote].after(at)
                 if end == -1:
                     message = f"no {quote} that ends this element"
                     hint = (
@@ -55,12 +55,12 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
             end = len(inside) if comma < 0 else comma
             found.append((inside[at:end].strip(), at))
             at = end
-        at = _behind_blanks(inside, at)
+        at = _after_blanks(inside, at)
         at += inside.startswith(",", at)
     return found
 
 
-def _behind_blanks(text: str, at: int) -> int:
+def _after_blanks(text: str, at: int) -> int:
     """Return the first place from `at` on where no blank stands."""
     found = re.compile("[^ ]").search(text, at)  # compiled once, by re
     return found.start() if found else len(text)
@@ -76,10 +76,10 @@ class _Ends:
     def __init__(self, text: str, quote: str) -> None:
         self._text = text
         self._quote = quote
-        #: place -> the closing quote, the place behind the last escaped one, the place before that
+        #: place -> the closing quote, the place after the last escaped one, the place before that
         self._known: dict[int, tuple[int, int, int]] = {}
 
-    def behind(self, start: int) -> int:
+    def after(self, start: int) -> int:
         """Return the length of the text quoted at `start`; -1 if nothing ends it."""
         path = [start]
         while path[-1] not in self._known:
@@ -89,10 +89,10 @@ class _Ends:
                 self._known[here] = (at, here, here)
             else:
                 path.append(at + 1)
-        behind = path.pop()
+        following = path.pop()
         for here in reversed(path):
-            end, last, before = self._known[behind]
-            self._known[here] = (end, last, here if last == behind else before)
-            behind = here
+            end, last, before = self._known[following]
+            self._known[here] = (end, last, here if last == following else before)
+            following = here
         end, last, before = self._known[start]
         return -1 if end < 0 else end - 1 - before

@@ -96,7 +96,7 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 
 
 def _has_near_separator(file: tree.File, expected: int) -> bool:
-    """Tell whether some line was meant as a separator and is reported as such.
+    """Return whether some line was meant as a separator and is reported as such.
 
     What comes after the `expected` sections is not looked at any more.
     """
@@ -130,7 +130,7 @@ def _without_moved_constants(parts: list[ir.Message], report: Report) -> list[ir
 
 
 def _moved(constant: ir.Constant, span: Span) -> Diagnostic:
-    return codes.CONSTANT_MOVED.at(
+    return codes.REPEATED_SECTION_CONSTANT.at(
         span,
         f"ROS 2 gives `{constant.name}` to the earlier section only, because it is the same there",
         hint="give it another name or comment",

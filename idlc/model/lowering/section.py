@@ -22,16 +22,6 @@ from idlc.syntax.parse import parse_definition
 
 Lines: TypeAlias = tuple[tree.Line, ...]
 
-_BROKEN = {
-    code.slug: code
-    for code in (
-        codes.MISSING_NAME,
-        codes.INDENTED_DEFINITION,
-        codes.MALFORMED_TYPE,
-        codes.MALFORMED_SEPARATOR,
-    )
-}
-
 
 def lower_section(
     file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
@@ -146,12 +136,12 @@ class _Section:
 
     def _broken(self, line: tree.Line, body: tree.Broken) -> None:
         span = self.file.span(line, body.piece)
-        found = _BROKEN[body.slug].at(span, body.message, hint=body.hint)
+        found = body.code.at(span, body.message, hint=body.hint)
         self.report.add(msgspec.structs.replace(found, edits=self._edits(line, body, span)))
 
     def _edits(self, line: tree.Line, body: tree.Broken, span: Span) -> tuple[Edit, ...]:
         """Return the edit that makes a broken line what it was meant to be, if that is sure."""
-        if body.slug == codes.INDENTED_DEFINITION.slug:
+        if body.code is codes.INDENTED_DEFINITION:
             return (Edit(span, ""),)
         if not _is_dashes(line) or line.comment:
             return ()
@@ -191,7 +181,7 @@ class _Section:
         if as_parsed(lowered) != lowered and type_.bound and type_.brackets:
             bound = type_.bound.text
             self.report.add(
-                codes.WSTRING_BOUND.at(
+                codes.WSTRING_SEQUENCE_BOUND.at(
                     self.file.span(line, type_.brackets),
                     f"ROS 2 reads this as a sequence of at most {bound} elements",
                     hint=f"write `[<={bound}]` to say so, or remove the string's bound",
@@ -203,7 +193,7 @@ class _Section:
         if not names.is_field_name(body.name.text):
             like = names.field_name_like(body.name.text)
             self.report.add(
-                codes.FIELD_NAME.at(
+                codes.INVALID_FIELD_NAME.at(
                     self.file.span(line, body.name),
                     f"`{body.name.text}` cannot be a field name",
                     hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
@@ -229,7 +219,7 @@ class _Section:
             return None
         if isinstance(element, ir.Ref):
             self.report.add(
-                codes.MESSAGE_DEFAULT.at(
+                codes.DEFAULT_ON_MESSAGE.at(
                     self.file.span(line, piece),
                     "a field of a message type cannot have a default value",
                     hint="give the defaults inside that message",
@@ -247,7 +237,7 @@ class _Section:
             upper = names.field_name_like(body.name.text).upper()
             hint = f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT
             self.report.add(
-                codes.CONSTANT_NAME.at(
+                codes.INVALID_CONSTANT_NAME.at(
                     self.file.span(line, body.name),
                     f"`{body.name.text}` cannot be a constant name",
                     hint=hint,

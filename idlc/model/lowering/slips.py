@@ -108,13 +108,13 @@ def slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
 
 
 def _broken(text: str, body: tree.Broken, kind: ir.Kind) -> Fault | None:
-    if body.slug == "malformed-separator" and kind == "msg":
+    if body.code is codes.MALFORMED_SEPARATOR and kind == "msg":
         hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
-        return Fault(codes.MALFORMED_SEPARATOR, body.message, 0, len(text), hint)
+        return Fault(body.code, body.message, 0, len(text), hint)
     word = re.match(r"(?:std::)?(\w+)[<(]", text)
-    if body.slug == "malformed-type" and word and word[1].lower() in (*_LISTS, *_MAPS):
+    if body.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
         piece = body.piece
-        return Fault(codes.MALFORMED_TYPE, body.message, piece.start, piece.end, type_hint(word[1]))
+        return Fault(body.code, body.message, piece.start, piece.end, type_hint(word[1]))
     return None
 
 
@@ -123,7 +123,7 @@ def _qualified(text: str, body: tree.Field | tree.Constant) -> Fault | None:
     if word not in _QUALIFIERS:
         return None
     hint = f"a line begins with its type: `{text[len(word) :].strip()}`"
-    return Fault(codes.TYPE_NAME, f"`{word}` cannot be a type name", 0, len(word), hint)
+    return Fault(codes.INVALID_TYPE_NAME, f"`{word}` cannot be a type name", 0, len(word), hint)
 
 
 def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
@@ -155,12 +155,14 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
         return _name_fault(name, f"`{name.text}` cannot be a field name", hint)
     if type_.endswith(":"):
         hint = f"the type comes first: `{name.text} {type_[:-1]}`"
-        return Fault(codes.TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint)
+        return Fault(
+            codes.INVALID_TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint
+        )
     return None
 
 
 def _name_fault(name: tree.Piece, message: str, hint: str) -> Fault:
-    return Fault(codes.FIELD_NAME, message, name.start, name.end, hint)
+    return Fault(codes.INVALID_FIELD_NAME, message, name.start, name.end, hint)
 
 
 def _constant(body: tree.Constant) -> Fault | None:
@@ -169,11 +171,13 @@ def _constant(body: tree.Constant) -> Fault | None:
         value = "VALUE"
     if not name.text:
         hint = f"write `{type_} NAME={value}`"
-        return Fault(codes.CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint)
+        return Fault(
+            codes.INVALID_CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint
+        )
     if names.is_field_name(name.text):
         message = f"`{name.text}` cannot be a constant name"
         hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
         if type_ in (*ir.PRIMITIVES, "string", "wstring"):
             hint += f"; a constant is called `{name.text.upper()}`"
-        return Fault(codes.CONSTANT_NAME, message, name.start, name.end, hint)
+        return Fault(codes.INVALID_CONSTANT_NAME, message, name.start, name.end, hint)
     return None

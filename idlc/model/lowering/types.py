@@ -58,11 +58,11 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
         hint = f"write `{parts[0]}/{parts[-1]}`" if len(parts) == 3 else "write `package/Name`"
         if len(parts) == 3 and parts[1] in _NO_FIELDS:
             hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
-        return _fault(codes.TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
+        return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
     if len(parts) == 2 and not names.is_package_name(parts[0]):
         wrong = tree.Piece(parts[0], piece.start)
         message = f"`{parts[0]}` cannot be a package name"
-        return _fault(codes.TYPE_NAME, wrong, message, names.PACKAGE_HINT)
+        return _fault(codes.INVALID_TYPE_NAME, wrong, message, names.PACKAGE_HINT)
     name = parts[-1]
     if not names.is_message_name(name):
         return _bad_name(tree.Piece(name, piece.end - len(name)), qualified=len(parts) == 2)
@@ -77,10 +77,10 @@ def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
             return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
         if dotted := slips.dotted(name):
             message = f"`{name}` cannot be a type name"
-            return _fault(codes.TYPE_NAME, piece, message, f"write `{dotted}`")
+            return _fault(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
     like = names.message_name_like(name)
     hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
-    return _fault(codes.TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
+    return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 
 def _positive(piece: tree.Piece, what: str) -> int | Fault:

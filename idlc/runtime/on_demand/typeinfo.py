@@ -25,6 +25,15 @@ class Primitive(NamedTuple):
     low: float | None = None
     high: float | None = None
 
+    @property
+    def allowed(self) -> str:
+        """What a field of it takes, in words."""
+        if self.code in "?c":
+            return "a bool" if self.code == "?" else "bytes of length 1"
+        what = "a number" if self.code in "fd" else "an integer"
+        limits = "" if self.high is None else f" from {self.low} to {self.high}"
+        return f"{what}{limits} ({self.name})"
+
 
 #: The package that this support package is part of.
 OWN = __name__.rsplit(".", 3)[0]

@@ -186,8 +186,9 @@ def _check_member(reader: _Reader, part: bytes, known: _Known, is_array: int) ->
     _demand((size, bounded, default), (0, 0, 0), f"the bounds of {known.name!r}")
     if known.size:
         _demand(any(functions), False, f"whether {known.name!r} has functions")
-    for function in filter(None, functions):
-        reader.read(function, 1)
+    for function in functions:
+        if function:
+            reader.read(function, 1)
     if len(part) > 112:  # whether it may be a buffer of another kind
         _demand(part[112] in (0, 1), True, f"whether {known.name!r} has a flag")
 

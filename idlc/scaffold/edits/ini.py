@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from typing import TypeAlias
 
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused, Script, split, taken
+from idlc.scaffold.edits.outcome import Edited, Outcome, Script, split, taken
 
 Edit: TypeAlias = Callable[[str], Outcome]
 
@@ -117,8 +117,3 @@ def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
     if before and not before[-1].endswith(("\n", "\r")):
         before[-1] += ending
     return Edited("".join((*before, *(line + ending for line in new), *after)))
-
-
-def refusal(script: Script, why: str) -> Refused:
-    """Return the refusal of a setup.cfg."""
-    return Refused(why, f"    {script.line}", WHERE)

@@ -218,7 +218,7 @@ def _with_import(module: cst.Module, action: str) -> str:
 
 
 def _extensible(statement: cst.ImportFrom, module: cst.Module) -> bool:
-    """Whether another class can be imported by a statement, which is on one line."""
+    """Return whether another class can be imported by a statement, which is on one line."""
     source = module.code_for_node(statement.module) if statement.module else ""
     return source == MODULE and statement.lpar is None and bool(_aliases(statement))
 

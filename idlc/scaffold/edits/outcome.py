@@ -34,7 +34,7 @@ class Script(NamedTuple):
         return f"{self.name} = {self.target}"
 
     def same(self, entry: str) -> bool:
-        """Whether an entry says the same, however it is spaced."""
+        """Return whether an entry says the same, however it is spaced."""
         return split(entry) == (self.name, self.target)
 
 

@@ -1,16 +1,11 @@
-"""Adding dependencies to a package.xml; every byte that is there stays.
-
-The positions come from the XML parser, so that comments, spacing and declarations need not be
-written anew.
-"""
+"""Adding dependencies to a package.xml; every byte that is there stays."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
-from xml.parsers import expat
+from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
+from idlc.checks.package.package_xml import Manifest, NotXmlError, read
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
 
 #: Tags by which a package is there when a node runs.
@@ -26,27 +21,6 @@ _DEPENDENCIES = (
 )
 
 
-class Element(NamedTuple):
-    """A child of `<package>`: its tag, its text, and where it stands, in bytes."""
-
-    tag: str
-    text: str
-    start: int
-    end: int
-
-
-class Manifest(NamedTuple):
-    """What a package.xml says, as far as scaffolding cares."""
-
-    format: str
-    elements: tuple[Element, ...]
-
-    def texts(self, tags: Iterable[str]) -> set[str]:
-        """Return the contents of all elements with one of the tags."""
-        wanted = set(tags)
-        return {element.text for element in self.elements if element.tag in wanted}
-
-
 def add(
     text: str, *, depends: Sequence[str] = (), tests: Sequence[str] = (), group: bool = False
 ) -> Outcome:
@@ -56,24 +30,33 @@ def add(
     interfaces.
     """
     data = text.encode("utf-8")
-    manifest = read(data)
-    own = manifest.texts(["name"]) if manifest else ()
+    manifest = _manifest(data)
+    own = set(manifest.texts("name")) if manifest else set()
     if manifest is None or not own:
         line = " ".join(_depend(name, "depend") for name in depends)
         why = "it has no `<name>`" if manifest else "this is not a well-formed package.xml"
         return Refused(why, line, "within `<package>`")
-    running = manifest.texts(AT_RUN_TIME) | own
-    testing = manifest.texts(AT_TEST_TIME) | own
+    running = own.union(manifest.texts(*AT_RUN_TIME))
+    testing = own.union(manifest.texts(*AT_TEST_TIME))
     tag = "run_depend" if manifest.format == "1" else "depend"
     new = [(tag, name) for name in depends if name not in running]
     testing.update(name for _, name in new)
     new += [("test_depend", name) for name in tests if name not in testing]
     if group and manifest.format not in ("1", "2"):
-        present = manifest.texts(["member_of_group"])
+        present = manifest.texts("member_of_group")
         new += [("member_of_group", GROUP)] if GROUP not in present else []
     for kind, name in new:
         data = _with(data, kind, name)
     return Edited(data.decode("utf-8"))
+
+
+def _manifest(data: bytes) -> Manifest | None:
+    """Return what a package.xml says; `None` if it is not well-formed or another document."""
+    try:
+        manifest = read(data, "utf-8")
+    except NotXmlError:
+        return None
+    return manifest if manifest.children else None
 
 
 def _depend(name: str, tag: str) -> str:
@@ -81,12 +64,11 @@ def _depend(name: str, tag: str) -> str:
 
 
 def _with(data: bytes, tag: str, name: str) -> bytes:
-    """Return the file with an element, on a line of its own behind its likes."""
-    manifest = read(data)
-    assert manifest is not None
+    """Return the file with an element, on a line of its own after its like."""
+    elements = read(data, "utf-8").children
     rank = {one: at for at, one in enumerate((*_HEAD, *_DEPENDENCIES))}
-    same = [element for element in manifest.elements if element.tag == tag]
-    before = same or [e for e in manifest.elements if rank.get(e.tag, 99) < rank[tag]]
+    same = [element for element in elements if element.tag == tag]
+    before = same or [e for e in elements if rank.get(e.tag, 99) < rank[tag]]
     after = max(before, key=lambda element: element.end)
     line_start = data.rfind(b"\n", 0, after.start) + 1
     margin = data[line_start : after.start]
@@ -106,39 +88,3 @@ def _line_end(data: bytes, at: int) -> int:
     if rest and not (rest.startswith(b"<!--") and rest.endswith(b"-->") and rest.count(b"<") == 1):
         return at
     return end - 1 if data[:end].endswith(b"\r") else end
-
-
-def read(data: bytes) -> Manifest | None:
-    """Return what a package.xml says; `None` if it is not well-formed or another document."""
-    parser = expat.ParserCreate("utf-8")
-    parser.buffer_text = True
-    stack: list[str] = []
-    found: list[Element] = []
-    texts: list[str] = []
-    formats: list[str] = []
-    starts: list[int] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        stack.append(tag)
-        if len(stack) == 1:
-            formats.append(attributes.get("format", "1") if tag == "package" else "")
-        elif len(stack) == 2:
-            texts.clear()
-            starts.append(parser.CurrentByteIndex)
-
-    def end(tag: str) -> None:
-        if len(stack) == 2:
-            closing = data.index(b">", parser.CurrentByteIndex) + 1
-            found.append(Element(tag, "".join(texts).strip(), starts[-1], closing))
-        stack.pop()
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = texts.append
-    try:
-        parser.Parse(data, True)
-    except (expat.ExpatError, ValueError):
-        return None
-    if not formats or not formats[0] or not found:
-        return None
-    return Manifest(formats[0], tuple(found))

@@ -171,7 +171,7 @@ def _first(opening: _Space, closing: _Space, new: _Element) -> tuple[_Space, _Sp
 def _after(
     elements: Sequence[_Element], opening: _Space, closing: _Space, new: _Element
 ) -> tuple[_Element, _Element, _Space]:
-    """Return the last element, the new one after it and the space behind both."""
+    """Return the last element, the new one after it and the space after both."""
     last = elements[-1]
     between = _separation(elements, opening)
     if isinstance(closing, cst.ParenthesizedWhitespace):

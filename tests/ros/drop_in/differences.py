@@ -65,7 +65,7 @@ def wrong_values(case):
 
 
 def other_sizes(case):
-    """rosidl sends arrays of another size or shape, cut or with what lies behind them."""
+    """rosidl sends arrays of another size or shape, cut or with what lies after them."""
     return bool(case.field) and case.field[0] == "array" and refuses(case.idlc)
 
 

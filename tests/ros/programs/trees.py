@@ -50,7 +50,7 @@ def methods(message):
 
 
 def attribute(cls, field):
-    """Return a field's name in Python: idlc puts an underscore behind keywords."""
+    """Return a field's name in Python: idlc puts an underscore after keywords."""
     clash = field + "_"
     return clash if hasattr(cls, clash) else field
 

@@ -1,4 +1,4 @@
-"""Fixed-size numeric arrays: fields that hold a `numpy.ndarray`. Only who has one imports this."""
+"""Fixed-size numeric arrays, held as `numpy.ndarray`. Imported only by modules with such fields."""
 
 from __future__ import annotations
 

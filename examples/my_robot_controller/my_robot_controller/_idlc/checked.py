@@ -187,18 +187,19 @@ def _refusal_of_one(value: Any, field: FieldInfo, *, listed: bool = False) -> st
 def _refusal_of_primitive(value: Any, primitive: Primitive, *, listed: bool) -> str:
     code = primitive.code
     if code == "?":
-        return "" if isinstance(value, bool) else "a bool"
+        return "" if isinstance(value, bool) else primitive.allowed
     if code == "c":
         types: Any = bytes if listed else (bytes, bytearray)
         right = isinstance(value, types) and (listed or len(value) == 1)
-        return "" if right else "bytes of length 1"
+        return "" if right else primitive.allowed
     if code in "fd":
         if not isinstance(value, float):
             return f"a float ({primitive.name})"
         far = code == "f" and abs(value) > _FLOAT32 and not math.isinf(value)
-        return f"a float in [-{_FLOAT32}, {_FLOAT32}]" if far else ""
+        limited = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
+        return limited.allowed if far else ""
     assert primitive.low is not None
     assert primitive.high is not None
     if isinstance(value, int) and primitive.low <= value <= primitive.high:
         return ""
-    return f"an integer in [{primitive.low}, {primitive.high}]"
+    return primitive.allowed

@@ -1,4 +1,7 @@
-"""How a class gets its codec: made for one byte order, on first use."""
+"""How a class gets its codec: imported and made for one byte order, on first use.
+
+The codecs of a module of classes are in the module of the same name and `__codec`.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,6 @@ if TYPE_CHECKING:
 
     #: What turns bytes into a str.
     Text: TypeAlias = Callable[[Any], str]
-    Make: TypeAlias = Callable[[str, "Reading"], "Codec"]
     #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
     Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
 
@@ -84,27 +86,26 @@ class Codec:
         self.bulk = bulk
 
 
-def codec_for(kind: Any) -> Callable[[Make], Make]:
-    """Return a decorator that gives a message class the function that makes its codecs."""
+def codecs_of(kind: type) -> Codecs:
+    """Return the codecs of a generated class, which keeps them as `_codec_`."""
+    owner = owner_of(kind)
+    module = __import__(f"{owner.__init__.__module__}__codec", fromlist=["CODECS"])
+    make = module.CODECS[owner.__name__]
+    made: dict[tuple[str, Reading], Codec] = {}
 
-    def give(make: Make) -> Make:
-        made: dict[tuple[str, Reading], Codec] = {}
+    def codecs(order: str, reading: Reading = COPYING) -> Codec:
+        found = made.get((order, reading))
+        if found is None:
+            found = made[order, reading] = make(owner, order, reading)
+        return found
 
-        def codecs(order: str, reading: Reading = COPYING) -> Codec:
-            found = made.get((order, reading))
-            if found is None:
-                found = made[order, reading] = make(order, reading)
-            return found
-
-        kind._codec_ = staticmethod(codecs)
-        return make
-
-    return give
+    owner._codec_ = staticmethod(codecs)
+    return codecs
 
 
 def maker(kind: Any) -> Callable[[], Any]:
     """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
-    if hasattr(kind, "_codec_"):
+    if hasattr(type(kind), "_message"):
         return partial(object.__new__, checking(kind) if CHECK_FIELDS else kind)
     if "_check_fields" not in getattr(kind, "__slots__", ()):
         return partial(object.__new__, kind)
@@ -240,7 +241,7 @@ __all__ = [
     "Codec",
     "Reading",
     "Text",
-    "codec_for",
+    "codecs_of",
     "encode_error",
     "functions",
     "maker",

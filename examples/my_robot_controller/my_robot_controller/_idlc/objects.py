@@ -19,10 +19,10 @@ SMALL = 64
 
 def owner_of(kind: type) -> Any:
     """Return the generated class that a class is, or that a user's class derives from."""
-    for base in kind.__mro__:
-        if "_codec_" in base.__dict__:
-            return base
-    raise TypeError(f"{kind.__name__} is not a generated message class")
+    owner = getattr(type(kind), "_message", None)
+    if owner is None:
+        raise TypeError(f"{kind.__name__} is not a generated message class")
+    return owner
 
 
 def same(mine: Any, other: Any) -> bool:
@@ -42,7 +42,7 @@ def same(mine: Any, other: Any) -> bool:
 def copied(message: Any) -> Any:
     """Return a shallow copy."""
     kind = type(message)
-    if "_codec_" not in kind.__dict__:
+    if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: value)
     made = object.__new__(kind)
     for slot in kind.__slots__:
@@ -55,7 +55,7 @@ def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
     from copy import deepcopy
 
     kind = type(message)
-    if "_codec_" not in kind.__dict__:
+    if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
     made = memo[id(message)] = object.__new__(kind)
     for slot in kind.__slots__:

@@ -21,20 +21,6 @@ else:
 
 Number = TypeVar("Number", int, float)
 
-#: The array type code of each IDL type, as rosidl chooses it.
-TYPE_CODES = {
-    "float": "f",
-    "double": "d",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-}
-
 #: How other buffers spell the same numbers, where C has two names for them.
 SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
 

@@ -21,11 +21,11 @@ def subclass(
         namespace["__slots__"] = _without(fields, namespace["__slots__"])
         namespace.pop("__weakref__", None)  # dataclass() of Python 3.10 forgets it
     made: Any = type.__new__(metaclass, name, bases, namespace, **options)
-    for base in made.__mro__[1:]:
-        if "_codec_" in base.__dict__:
-            codec.extended(base)
-            if made.__eq__ is base.__eq__ and _holds_numbers(base):
-                made.__eq__ = equal
+    owner = metaclass._message
+    if owner is not None:
+        codec.extended(owner)
+        if made.__eq__ is owner.__eq__ and _holds_numbers(owner):
+            made.__eq__ = equal
     return made
 
 
@@ -46,7 +46,7 @@ def _without(fields: set[str], slots: Any) -> Any:
 
 
 def _holds_numbers(owner: Any) -> bool:
-    """Whether a field may hold a `numpy.ndarray`, which `==` compares element by element."""
+    """Return whether a field may hold a `numpy.ndarray`, compared element by element."""
     return any(isinstance(owner.__dict__[name], property) for name in _fields(owner))
 
 

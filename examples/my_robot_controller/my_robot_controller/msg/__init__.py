@@ -9,8 +9,12 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from ._robot_command import RobotCommand
 
-__all__ = ["RobotCommand"]
+__all__ = [
+    "RobotCommand",
+]
 
-_MODULES = {"RobotCommand": "_robot_command"}
+_MODULES = {
+    "RobotCommand": "_robot_command",
+}
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

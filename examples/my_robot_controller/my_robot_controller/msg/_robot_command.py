@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class RobotCommand(_idlc.Message):
@@ -50,10 +52,10 @@ class RobotCommand(_idlc.Message):
         frame_id: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or command_type.__class__ is not str) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or command_type.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._command_type = command_type
         self._linear_velocity_x = linear_velocity_x
         self._angular_velocity_z = angular_velocity_z
@@ -68,49 +70,3 @@ class RobotCommand(_idlc.Message):
             or self._angular_velocity_z != other._angular_velocity_z
             or self._frame_id != other._frame_id
         )
-
-
-@_idlc.codec_for(RobotCommand)
-def _robot_command_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads RobotCommand in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*ff", align=4)
-    write_2 = _idlc.Texts(order, "I*")
-    new_robot_command = _idlc.maker(RobotCommand)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "ffI").unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        command_type = message._command_type.encode()
-        command_type_size = len(command_type)
-        frame_id = message._frame_id.encode()
-        frame_id_size = len(frame_id)
-        parts = [
-            write_1[command_type_size](
-                encapsulation,
-                command_type_size + 1,
-                command_type,
-                message._linear_velocity_x,
-                message._angular_velocity_z,
-            ),
-            write_2[frame_id_size](frame_id_size + 1, frame_id),
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_robot_command()
-        (size,) = read_1(data, 4)
-        end = 7 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._command_type = text(data[8:end])
-        at = end + 4 & -4
-        message._linear_velocity_x, message._angular_velocity_z, size = read_2(data, at)
-        end = at + 11 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._frame_id = text(data[at + 12 : end])
-        return message
-
-    return _idlc.Codec(encode, decode)

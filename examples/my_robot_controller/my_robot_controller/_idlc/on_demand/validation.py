@@ -95,10 +95,10 @@ def _primitive(value: Any, primitive: Primitive, path: str) -> None:
     if primitive.code == "?":
         number = isinstance(value, (int, float)) and value in (0, 1)
         if not number and type(value).__name__ not in {"bool_", "bool"}:
-            raise ValidationError(path, "a bool", value)
+            raise ValidationError(path, primitive.allowed, value)
     elif primitive.code == "c":
         if not isinstance(value, bytes) or len(value) != 1:
-            raise ValidationError(path, "bytes of length 1", value)
+            raise ValidationError(path, primitive.allowed, value)
     elif primitive.code in "fd":
         _float(value, primitive, path)
     else:
@@ -106,15 +106,14 @@ def _primitive(value: Any, primitive: Primitive, path: str) -> None:
 
 
 def _integer(value: Any, primitive: Primitive, path: str) -> None:
-    allowed = f"an integer from {primitive.low} to {primitive.high} ({primitive.name})"
     try:
         number = value.__index__()
     except (AttributeError, TypeError):
-        raise ValidationError(path, allowed, value) from None
+        raise ValidationError(path, primitive.allowed, value) from None
     assert primitive.low is not None
     assert primitive.high is not None
     if not primitive.low <= number <= primitive.high:
-        raise ValidationError(path, allowed, value)
+        raise ValidationError(path, primitive.allowed, value)
 
 
 def _float(value: Any, primitive: Primitive, path: str) -> None:
@@ -127,10 +126,7 @@ def _float(value: Any, primitive: Primitive, path: str) -> None:
     if primitive.high is None or not math.isfinite(number):
         return
     if abs(number) > primitive.high:
-        allowed = (
-            f"a number from {primitive.low} to {primitive.high} ({primitive.name})"
-        )
-        raise ValidationError(path, allowed, value)
+        raise ValidationError(path, primitive.allowed, value)
 
 
 def refused(

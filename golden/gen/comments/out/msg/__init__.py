@@ -9,8 +9,12 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from ._gauge import Gauge
 
-__all__ = ["Gauge"]
+__all__ = [
+    "Gauge",
+]
 
-_MODULES = {"Gauge": "_gauge"}
+_MODULES = {
+    "Gauge": "_gauge",
+}
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

@@ -8,6 +8,8 @@ from array import array as _array
 from .. import _idlc
 from .._idlc import arrays as _arrays
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Gauge(_idlc.Message):
@@ -19,13 +21,13 @@ class Gauge(_idlc.Message):
 
     Attributes:
         rate: float32 [Hz]. How often it is read
-        level: uint8, 0 to 255. 0 is empty
+        level: uint8. 0 is empty
         label: string<=20. what stands on it
-        notes: string[<=3]. at most three, in a comment that goes on for so long that
-            the line has to be broken somewhere
-        samples: int16[], -32768 to 32767.
+        notes: string[<=3]. at most three, in a comment that goes on for so long
+            that the line has to be broken somewhere
+        samples: int16[]
         covariance: float64[9] [m^2]. row by row
-        flags: byte.
+        flags: byte
 
     Constants:
         EMPTY: uint8 [l]. nothing
@@ -79,10 +81,10 @@ class Gauge(_idlc.Message):
         flags: bytes = b"\x07",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or rate.__class__ is not float) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or rate.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._rate = rate
         self._level = level
         self._label = label
@@ -105,93 +107,16 @@ class Gauge(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Gauge):
             return NotImplemented
-        if (
-            self._rate != other._rate
-            or self._level != other._level
-            or self._label != other._label
-            or self._flags != other._flags
-        ):
+        if self._rate != other._rate:
+            return False
+        if self._level != other._level:
+            return False
+        if self._label != other._label:
+            return False
+        if self._flags != other._flags:
             return False
         if not _idlc.same(self._samples, other._samples):
             return False
         if not _idlc.same(self._covariance, other._covariance):
             return False
         return bool(self._notes == other._notes)
-
-
-@_idlc.codec_for(Gauge)
-def _gauge_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Gauge in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sfBI*", align=4)
-    write_notes = _idlc.text_block(order, bound=3)
-    buffer_h = _idlc.sequence_writer(order, "h")
-    array = _idlc.array_of(order)
-    write_2 = _idlc.phases(order, "I")
-    bytes_float64_9 = _arrays.array_writer(order, "float64", 9)
-    write_3 = _idlc.phases(order, "9dc")
-    new_gauge = _idlc.maker(Gauge)
-    read_1 = _idlc.layout(order, "fBI", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
-    read_notes = _idlc.texts_reader(order, text)
-    numbers_h = _idlc.sequence_reader(order, "h", reading)
-    array_float64_9 = _arrays.array_reader(order, "float64", 9, reading)
-    read_3 = _idlc.layout(order, "9dc", start=4).unpack_from
-    small = reading.small
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        label = message._label.encode()
-        label_size = len(label)
-        at = label_size + 20 & -4
-        notes = write_notes(message._notes)
-        at = at + len(notes)
-        low = len(notes)
-        samples = message._samples
-        if type(samples) is not array:
-            samples = buffer_h(samples)
-        samples_count = len(samples)
-        at = (at + 3 & -4) + 4
-        at = at + 2 * samples_count
-        parts = [
-            write_1[label_size](
-                encapsulation,
-                message._rate,
-                message._level,
-                label_size + 1,
-                label,
-            ),
-            notes,
-            write_2[low & 3].pack(samples_count),
-            samples,
-            write_3[at & 7].pack(bytes_float64_9(message._covariance), message._flags),
-        ]
-        raw = join(parts)
-        if len(samples) != samples_count:
-            return encode(message, join)
-        return raw
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
-        message = new_gauge()
-        message._rate, message._level, size = read_1(data, 4)
-        end = 15 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._label = text(data[16:end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        if count > 3:
-            raise ValueError("too many elements")
-        message._notes, end = read_notes(data, at + 4, count)
-        at = end + 3 & -4
-        (count,) = read_2(data, at)
-        end = at + 4 + 2 * count
-        message._samples = numbers_h(view[at + 4 : end])
-        at = (end + 3 & -8) + 4
-        covariance, message._flags = read_3(data, at)
-        message._covariance = array_float64_9(covariance)
-        return message
-
-    return _idlc.Codec(encode, decode, bulk=True)

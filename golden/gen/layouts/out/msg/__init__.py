@@ -15,7 +15,15 @@ if TYPE_CHECKING:
     from ._texts import Texts
     from ._titled import Titled
 
-__all__ = ["Everything", "Inner", "Nothing", "Pair", "Row", "Texts", "Titled"]
+__all__ = [
+    "Everything",
+    "Inner",
+    "Nothing",
+    "Pair",
+    "Row",
+    "Texts",
+    "Titled",
+]
 
 _MODULES = {
     "Everything": "_everything",

@@ -16,28 +16,30 @@ from ._row import Row
 with _idlc.importing():
     from builtin_interfaces.msg import Time
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Everything(_idlc.Message):
     """layouts_msgs/msg/Everything.
 
     Attributes:
-        flag: bool.
-        inner: layouts_msgs/Inner.
-        inners: layouts_msgs/Inner[].
-        rows: layouts_msgs/Row[<=4].
-        pair: layouts_msgs/Row[2].
-        nothing: layouts_msgs/Nothing.
-        nothings: layouts_msgs/Nothing[].
-        doubles: float64[].
-        shorts: int16[<=3], -32768 to 32767.
-        flags: bool[].
-        octets: byte[2].
-        texts: string[].
-        wides: wstring[2].
-        stamps: builtin_interfaces/Time[].
-        weights: float32[4].
-        last: int64.
+        flag: bool
+        inner: layouts_msgs/Inner
+        inners: layouts_msgs/Inner[]
+        rows: layouts_msgs/Row[<=4]
+        pair: layouts_msgs/Row[2]
+        nothing: layouts_msgs/Nothing
+        nothings: layouts_msgs/Nothing[]
+        doubles: float64[]
+        shorts: int16[<=3]
+        flags: bool[]
+        octets: byte[2]
+        texts: string[]
+        wides: wstring[2]
+        stamps: builtin_interfaces/Time[]
+        weights: float32[4]
+        last: int64
     """
 
     __match_args__ = (
@@ -116,10 +118,10 @@ class Everything(_idlc.Message):
         last: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or flag.__class__ is not bool) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or flag.__class__ is not bool:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._flag = flag
         self._inner = Inner() if inner is None else inner
         self._inners = [] if inners is None else inners
@@ -149,7 +151,9 @@ class Everything(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Everything):
             return NotImplemented
-        if self._flag != other._flag or self._last != other._last:
+        if self._flag != other._flag:
+            return False
+        if self._last != other._last:
             return False
         if not _idlc.same(self._doubles, other._doubles):
             return False
@@ -172,291 +176,3 @@ class Everything(_idlc.Message):
             and self._wides == other._wides
             and self._stamps == other._stamps
         )
-
-
-@_idlc.codec_for(Everything)
-def _everything_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Everything in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    truths = _idlc.TRUTHS
-    wide_text = _idlc.wide_text(order)
-    write_1 = _idlc.Texts(order, "4s?BdI*I")
-    listed = _idlc.listed
-    write_2 = _idlc.layout(order, "I").pack
-    write_3 = _idlc.text_phases(order, "BdI*I")
-    bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
-    write_4 = _idlc.layout(order, "IH3B", start=4).pack
-    pad4 = _idlc.PAD4
-    write_5 = _idlc.phases(order, "xI")
-    write_6 = _idlc.layout(order, "x", start=4).pack
-    buffer_d = _idlc.sequence_writer(order, "d")
-    array = _idlc.array_of(order)
-    write_7 = _idlc.phases(order, "I")
-    pad8 = _idlc.PAD8
-    buffer_h = _idlc.sequence_writer(order, "h")
-    flags_2 = _idlc.flags
-    octets_2 = _idlc.octets_writer(2)
-    write_8 = _idlc.layout(order, "2B").pack
-    write_texts = _idlc.text_block(order)
-    write_wides = _idlc.wide_block(order, size=2)
-    write_9 = _idlc.layout(order, "iI", start=4).pack
-    bytes_float32_4 = _arrays.array_writer(order, "float32", 4)
-    write_10 = _idlc.phases(order, "4fq")
-    new_everything = _idlc.maker(Everything)
-    new_inner = _idlc.maker(Inner)
-    new_row = _idlc.maker(Row)
-    new_nothing = _idlc.maker(Nothing)
-    new_time = _idlc.maker(Time)
-    read_1 = _idlc.layout(order, "?BdI", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
-    read_wide_text = _idlc.read_wide_text(order)
-    read_3 = _idlc.phases(order, "BdI")
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_4 = _idlc.layout(order, "IH3B").unpack_from
-    read_5 = _idlc.phases(order, "xI")
-    rows_1 = _idlc.layout(order, "x", start=4).iter_unpack
-    numbers_d = _idlc.sequence_reader(order, "d", reading)
-    numbers_h = _idlc.sequence_reader(order, "h", reading)
-    read_flags = _idlc.read_flags
-    read_octets = _idlc.read_octets
-    read_6 = _idlc.phases(order, "2BI")
-    read_texts = _idlc.texts_reader(order, text)
-    read_wides = _idlc.wide_texts_reader(order)
-    rows_2 = _idlc.layout(order, "iI", start=4).iter_unpack
-    array_float32_4 = _arrays.array_reader(order, "float32", 4, reading)
-    read_7 = _idlc.phases(order, "4fq")
-    small = reading.small
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        inner = message._inner
-        c = inner._c.encode()
-        c_size = len(c)
-        d = wide_text(inner._d)
-        at = (c_size + 28 & -4) + 4
-        at = at + len(d)
-        inners = listed(message._inners)
-        at = at + 4
-        parts = [
-            write_1[c_size](
-                encapsulation,
-                truths[message._flag],
-                inner._a,
-                inner._b,
-                c_size + 1,
-                c,
-                len(d) // 4,
-            ),
-            d,
-            write_2(len(inners)),
-        ]
-        put = parts.append
-        for item in inners:
-            item_c = item._c.encode()
-            item_c_size = len(item_c)
-            item_d = wide_text(item._d)
-            put(
-                write_3[at & 7][item_c_size](
-                    item._a,
-                    item._b,
-                    item_c_size + 1,
-                    item_c,
-                    len(item_d) // 4,
-                ),
-            )
-            at = ((at + 4 & -8) + item_c_size + 20 & -4) + 4
-            put(item_d)
-            at = at + len(item_d)
-        rows = listed(message._rows)
-        if len(rows) > 4:
-            raise ValueError("too many elements")
-        at = at + 4
-        rows_block = b"\x00\x00\x00".join(
-            [
-                write_4(item_2._a, item_2._b, bytes_uint8_3(item_2._c))
-                for item_2 in rows
-            ],
-        )
-        low = 0
-        if rows:
-            at = at + 12 * len(rows) - 3
-            low = 12 * len(rows) - 3
-        pair = listed(message._pair)
-        if len(pair) != 2:
-            raise ValueError("wrong number of elements")
-        pair_block = b"\x00\x00\x00".join(
-            [
-                write_4(item_3._a, item_3._b, bytes_uint8_3(item_3._c))
-                for item_3 in pair
-            ],
-        )
-        at = (at + 3 & -4) + 12 * len(pair) - 3
-        put(write_2(len(rows)))
-        put(rows_block)
-        put(pad4[low & 3])
-        put(pair_block)
-        low = 12 * len(pair) - 3
-        nothings = listed(message._nothings)
-        at = (at + 4 & -4) + 4
-        nothings_block = b"".join([write_6() for item_4 in nothings])
-        at = at + len(nothings)
-        put(write_5[low & 3].pack(len(nothings)))
-        put(nothings_block)
-        low = len(nothings)
-        doubles = message._doubles
-        if type(doubles) is not array:
-            doubles = buffer_d(doubles)
-        doubles_count = len(doubles)
-        at = (at + 3 & -4) + 4
-        put(write_7[low & 3].pack(doubles_count))
-        put(pad8[at & 7] if doubles_count else b"")
-        put(doubles)
-        if doubles_count:
-            at = (at + 3 & -8) + 4 + 8 * doubles_count
-        shorts = message._shorts
-        if type(shorts) is not array:
-            shorts = buffer_h(shorts)
-        shorts_count = len(shorts)
-        if shorts_count > 3:
-            raise ValueError("too many elements")
-        at = at + 4
-        at = at + 2 * shorts_count
-        low = 2 * shorts_count
-        flags = flags_2(message._flags)
-        at = (at + 3 & -4) + 4
-        at = at + len(flags)
-        put(write_2(shorts_count))
-        put(shorts)
-        put(write_7[low & 3].pack(len(flags)))
-        put(flags)
-        low = len(flags)
-        at = at + 2
-        low = low + 2
-        texts = write_texts(message._texts)
-        at = (at + 3 & -4) + len(texts)
-        put(write_8(octets_2(message._octets)))
-        put(pad4[low & 3])
-        put(texts)
-        low = len(texts)
-        wides = write_wides(message._wides)
-        at = (at + 3 & -4) + len(wides)
-        stamps = listed(message._stamps)
-        at = at + 4
-        stamps_block = b"".join(
-            [write_9(item_5._sec, item_5._nanosec) for item_5 in stamps],
-        )
-        at = at + 8 * len(stamps)
-        put(pad4[low & 3])
-        put(wides)
-        put(write_2(len(stamps)))
-        put(stamps_block)
-        put(write_10[at & 7].pack(bytes_float32_4(message._weights), message._last))
-        raw = join(parts)
-        if len(doubles) != doubles_count or len(shorts) != shorts_count:
-            return encode(message, join)
-        return raw
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
-        message = new_everything()
-        inner = new_inner()
-        message._inner = inner
-        message._flag, inner._a, inner._b, size = read_1(data, 4)
-        end = 23 + size
-        if data[end]:
-            raise ValueError("text without end")
-        inner._c = text(data[24:end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        end = at + 4 + 4 * count
-        inner._d = read_wide_text(data[at + 4 : end])
-        (count,) = read_2(data, end)
-        if end + 4 + 17 * count > limit:
-            raise ValueError("too short")
-        inners = [new_inner() for _ in range(count)]
-        message._inners = inners
-        end = end + 4
-        for item in inners:
-            struct = read_3[end & 7]
-            item._a, item._b, size = struct.unpack_from(data, end)
-            at = end + struct.size
-            end = at - 1 + size
-            if data[end]:
-                raise ValueError("text without end")
-            item._c = text(data[at:end])
-            at = end + 4 & -4
-            (count,) = read_2(data, at)
-            end = at + 4 + 4 * count
-            item._d = read_wide_text(data[at + 4 : end])
-        (count,) = read_2(data, end)
-        if count > 4:
-            raise ValueError("too many elements")
-        if end + 4 + 9 * count > limit:
-            raise ValueError("too short")
-        rows = [new_row() for _ in range(count)]
-        message._rows = rows
-        at = end + 4
-        for item_2 in rows:
-            at = at + 3 & -4
-            item_2._a, item_2._b, item_2_c = read_4(data, at)
-            item_2._c = array_uint8_3(item_2_c)
-            at = at + 9
-        if at + 18 > limit:
-            raise ValueError("too short")
-        pair = [new_row() for _ in range(2)]
-        message._pair = pair
-        for item_3 in pair:
-            at = at + 3 & -4
-            item_3._a, item_3._b, item_3_c = read_4(data, at)
-            item_3._c = array_uint8_3(item_3_c)
-            at = at + 9
-        nothing = new_nothing()
-        message._nothing = nothing
-        struct = read_5[at & 7]
-        (count,) = struct.unpack_from(data, at)
-        at = at + struct.size
-        nothings: list[_idlc.Any] = []
-        message._nothings = nothings
-        end = at + count
-        for _ in rows_1(view[at:end]):
-            item_4 = new_nothing()
-            nothings.append(item_4)
-        at = end + 3 & -4
-        (count,) = read_2(data, at)
-        at = at + 4
-        if count:
-            at = (at + 3 & -8) + 4
-        end = at + 8 * count
-        message._doubles = numbers_d(view[at:end])
-        (count,) = read_2(data, end)
-        if count > 3:
-            raise ValueError("too many elements")
-        at = end + 4
-        end = at + 2 * count
-        message._shorts = numbers_h(view[at:end])
-        at = end + 3 & -4
-        (count,) = read_2(data, at)
-        end = at + 4 + count
-        message._flags = read_flags(view[at + 4 : end])
-        struct = read_6[end & 7]
-        octets, count = struct.unpack_from(data, end)
-        at = end + struct.size
-        message._octets = read_octets(octets)
-        message._texts, end = read_texts(data, at, count)
-        at = end + 3 & -4
-        message._wides, end = read_wides(data, at, 2)
-        (count,) = read_2(data, end)
-        stamps: list[_idlc.Any] = []
-        message._stamps = stamps
-        at = end + 4
-        end = at + 8 * count
-        for item_5_values in rows_2(view[at:end]):
-            item_5 = new_time()
-            stamps.append(item_5)
-            item_5._sec, item_5._nanosec = item_5_values
-        weights, message._last = read_7[end & 7].unpack_from(data, end)
-        message._weights = array_float32_4(weights)
-        return message
-
-    return _idlc.Codec(encode, decode, bulk=True)

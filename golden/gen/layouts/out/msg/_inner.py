@@ -5,21 +5,28 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Inner(_idlc.Message):
     """layouts_msgs/msg/Inner.
 
     Attributes:
-        a: uint8, 0 to 255.
-        b: float64.
-        c: string.
-        d: wstring.
+        a: uint8
+        b: float64
+        c: string
+        d: wstring
     """
 
     __match_args__ = ("a", "b", "c", "d")
     _fields_and_field_types = _idlc.table(
-        {"a": "uint8", "b": "double", "c": "string", "d": "wstring"},
+        {
+            "a": "uint8",
+            "b": "double",
+            "c": "string",
+            "d": "wstring",
+        },
     )
 
     a: int
@@ -35,10 +42,10 @@ class Inner(_idlc.Message):
         d: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or a.__class__ is not int) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
         self._b = b
         self._c = c
@@ -53,51 +60,3 @@ class Inner(_idlc.Message):
             or self._c != other._c
             or self._d != other._d
         )
-
-
-@_idlc.codec_for(Inner)
-def _inner_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Inner in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    wide_text = _idlc.wide_text(order)
-    write_1 = _idlc.Texts(order, "4sBdI*I")
-    new_inner = _idlc.maker(Inner)
-    read_1 = _idlc.layout(order, "BdI", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
-    read_wide_text = _idlc.read_wide_text(order)
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        c = message._c.encode()
-        c_size = len(c)
-        d = wide_text(message._d)
-        parts = [
-            write_1[c_size](
-                encapsulation,
-                message._a,
-                message._b,
-                c_size + 1,
-                c,
-                len(d) // 4,
-            ),
-            d,
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        message = new_inner()
-        message._a, message._b, size = read_1(data, 4)
-        end = 23 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._c = text(data[24:end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        end = at + 4 + 4 * count
-        message._d = read_wide_text(data[at + 4 : end])
-        if end > limit:
-            raise ValueError("too short")
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Nothing(_idlc.Message):
@@ -17,30 +19,12 @@ class Nothing(_idlc.Message):
         self,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if options and _idlc.construct(self, options, locals()):
-            return
+        if options:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Nothing):
             return NotImplemented
         return True
-
-
-@_idlc.codec_for(Nothing)
-def _nothing_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Nothing in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sx").pack
-    new_nothing = _idlc.maker(Nothing)
-    read_1 = _idlc.layout(order, "x", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation)]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_nothing()
-        read_1(data, 4)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -5,18 +5,25 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Pair(_idlc.Message):
     """layouts_msgs/msg/Pair.
 
     Attributes:
-        key: string.
-        value: string.
+        key: string
+        value: string
     """
 
     __match_args__ = ("key", "value")
-    _fields_and_field_types = _idlc.table({"key": "string", "value": "string"})
+    _fields_and_field_types = _idlc.table(
+        {
+            "key": "string",
+            "value": "string",
+        },
+    )
 
     key: str
     value: str
@@ -27,10 +34,10 @@ class Pair(_idlc.Message):
         value: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or key.__class__ is not str) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or key.__class__ is not str:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._key = key
         self._value = value
 
@@ -38,43 +45,3 @@ class Pair(_idlc.Message):
         if not isinstance(other, Pair):
             return NotImplemented
         return not (self._key != other._key or self._value != other._value)
-
-
-@_idlc.codec_for(Pair)
-def _pair_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Pair in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.Texts(order, "4sI*", align=4)
-    write_2 = _idlc.Texts(order, "I*")
-    new_pair = _idlc.maker(Pair)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        key = message._key.encode()
-        key_size = len(key)
-        value = message._value.encode()
-        value_size = len(value)
-        parts = [
-            write_1[key_size](encapsulation, key_size + 1, key),
-            write_2[value_size](value_size + 1, value),
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_pair()
-        (size,) = read_1(data, 4)
-        end = 7 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._key = text(data[8:end])
-        at = end + 4 & -4
-        (size,) = read_2(data, at)
-        end = at + 3 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._value = text(data[at + 4 : end])
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -6,20 +6,26 @@ from __future__ import annotations
 from .. import _idlc
 from .._idlc import arrays as _arrays
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Row(_idlc.Message):
     """layouts_msgs/msg/Row.
 
     Attributes:
-        a: uint32, 0 to 4294967295.
-        b: uint16, 0 to 65535.
-        c: uint8[3], 0 to 255.
+        a: uint32
+        b: uint16
+        c: uint8[3]
     """
 
     __match_args__ = ("a", "b", "c")
     _fields_and_field_types = _idlc.table(
-        {"a": "uint32", "b": "uint16", "c": "uint8[3]"},
+        {
+            "a": "uint32",
+            "b": "uint16",
+            "c": "uint8[3]",
+        },
     )
 
     a: int
@@ -33,10 +39,10 @@ class Row(_idlc.Message):
         c: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or a.__class__ is not int) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
         self._b = b
         if c is None:
@@ -47,31 +53,8 @@ class Row(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Row):
             return NotImplemented
-        if self._a != other._a or self._b != other._b:
+        if self._a != other._a:
+            return False
+        if self._b != other._b:
             return False
         return _idlc.same(self._c, other._c)
-
-
-@_idlc.codec_for(Row)
-def _row_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Row in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    bytes_uint8_3 = _arrays.array_writer(order, "uint8", 3)
-    write_1 = _idlc.layout(order, "4sIH3B").pack
-    new_row = _idlc.maker(Row)
-    array_uint8_3 = _arrays.array_reader(order, "uint8", 3, reading)
-    read_1 = _idlc.layout(order, "IH3B", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [
-            write_1(encapsulation, message._a, message._b, bytes_uint8_3(message._c)),
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_row()
-        message._a, message._b, c = read_1(data, 4)
-        message._c = array_uint8_3(c)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -7,16 +7,18 @@ from .. import _idlc
 from ._pair import Pair
 from ._titled import Titled
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Texts(_idlc.Message):
     """layouts_msgs/msg/Texts.
 
     Attributes:
-        pairs: layouts_msgs/Pair[].
-        few: layouts_msgs/Pair[<=2].
-        titled: layouts_msgs/Titled[].
-        last: string.
+        pairs: layouts_msgs/Pair[]
+        few: layouts_msgs/Pair[<=2]
+        titled: layouts_msgs/Titled[]
+        last: string
     """
 
     __match_args__ = ("pairs", "few", "titled", "last")
@@ -42,10 +44,10 @@ class Texts(_idlc.Message):
         last: str = "",
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (
-            options or (pairs is not None and pairs.__class__ is not list)
-        ) and _idlc.construct(self, options, locals()):
-            return
+        if options or (pairs is not None and pairs.__class__ is not list):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._pairs = [] if pairs is None else pairs
         self._few = [] if few is None else few
         self._titled = [] if titled is None else titled
@@ -61,209 +63,3 @@ class Texts(_idlc.Message):
             and self._few == other._few
             and self._titled == other._titled
         )
-
-
-@_idlc.codec_for(Texts)
-def _texts_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Texts in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    sized = _idlc.sizes(order)
-    ended = _idlc.ENDS
-    unsized = _idlc.unsized
-    write_1 = _idlc.layout(order, "4sI", align=4).pack
-    write_rows = _idlc.rows_writer(order)
-    listed = _idlc.listed
-    write_2 = _idlc.phases(order, "I")
-    write_3 = _idlc.text_phases(order, "I*", align=4)
-    write_4 = _idlc.Texts(order, "I*")
-    write_5 = _idlc.Texts(order, "BI*I", align=4)
-    write_6 = _idlc.phases(order, "d")
-    new_texts = _idlc.maker(Texts)
-    new_pair = _idlc.maker(Pair)
-    new_titled = _idlc.maker(Titled)
-    read_1 = _idlc.layout(order, "I", start=4).unpack_from
-    strings = _idlc.strings_reader(order, reading.text)
-    read_2 = _idlc.layout(order, "I").unpack_from
-    text = reading.text
-    read_3 = _idlc.layout(order, "BI").unpack_from
-    read_4 = _idlc.layout(order, "d", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        pairs = message._pairs
-        pairs_rows: list[str] = []
-        if len(pairs):
-            try:
-                for item in pairs:
-                    key = item._key
-                    value = item._value
-                    pairs_rows += (
-                        sized[len(key)],
-                        key,
-                        ended[len(key)],
-                        sized[len(value)],
-                        value,
-                        ended[len(value)],
-                    )
-            except IndexError:
-                pairs_rows = unsized(
-                    [each for item in pairs for each in (item._key, item._value)],
-                )
-        pairs_block = write_rows(pairs_rows)
-        at = len(pairs_block) + 8
-        low = len(pairs_block)
-        few = listed(message._few)
-        if len(few) > 2:
-            raise ValueError("too many elements")
-        at = (at + 3 & -4) + 4
-        parts = [
-            write_1(encapsulation, len(pairs_rows) // 6),
-            pairs_block,
-            write_2[low & 3].pack(len(few)),
-        ]
-        put = parts.append
-        low = 0
-        for item_2 in few:
-            item_2_key = item_2._key.encode()
-            item_2_key_size = len(item_2_key)
-            put(write_3[low & 3][item_2_key_size](item_2_key_size + 1, item_2_key))
-            at = (at + 3 & -4) + item_2_key_size + 8 & -4
-            item_2_value = item_2._value.encode()
-            item_2_value_size = len(item_2_value)
-            put(write_4[item_2_value_size](item_2_value_size + 1, item_2_value))
-            at = at + item_2_value_size + 5
-            low = item_2_value_size + 1
-        titled = listed(message._titled)
-        at = (at + 3 & -4) + 4
-        put(write_2[low & 3].pack(len(titled)))
-        for item_3 in titled:
-            title = item_3._title.encode()
-            title_size = len(title)
-            item_3_pairs = item_3._pairs
-            item_3_pairs_rows: list[str] = []
-            if len(item_3_pairs):
-                try:
-                    for item_4 in item_3_pairs:
-                        item_4_key = item_4._key
-                        item_4_value = item_4._value
-                        item_3_pairs_rows += (
-                            sized[len(item_4_key)],
-                            item_4_key,
-                            ended[len(item_4_key)],
-                            sized[len(item_4_value)],
-                            item_4_value,
-                            ended[len(item_4_value)],
-                        )
-                except IndexError:
-                    item_3_pairs_rows = unsized(
-                        [
-                            each_2
-                            for item_4 in item_3_pairs
-                            for each_2 in (item_4._key, item_4._value)
-                        ],
-                    )
-            put(
-                write_5[title_size](
-                    item_3._level,
-                    title_size + 1,
-                    title,
-                    len(item_3_pairs_rows) // 6,
-                ),
-            )
-            at = (at + title_size + 12 & -4) + 4
-            item_3_pairs_block = write_rows(item_3_pairs_rows)
-            put(item_3_pairs_block)
-            at = at + len(item_3_pairs_block)
-            put(write_6[at & 7].pack(item_3._number))
-            at = (at + 3 & -8) + 12
-        last = message._last.encode()
-        last_size = len(last)
-        put(write_4[last_size](last_size + 1, last))
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        message = new_texts()
-        (count,) = read_1(data, 4)
-        if 8 + 8 * count > limit:
-            raise ValueError("too short")
-        pairs = [new_pair() for _ in range(count)]
-        message._pairs = pairs
-        words, chars, to_str = strings(data, 8)
-        end = 7
-        for item in pairs:
-            at = end + 8 & -4
-            end = at - 1 + words[at >> 2]
-            if data[end]:
-                raise ValueError("text without end")
-            item._key = to_str(chars[at:end])
-            at = end + 8 & -4
-            end = at - 1 + words[at >> 2]
-            if data[end]:
-                raise ValueError("text without end")
-            item._value = to_str(chars[at:end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        if count > 2:
-            raise ValueError("too many elements")
-        if at + 4 + 8 * count > limit:
-            raise ValueError("too short")
-        few = [new_pair() for _ in range(count)]
-        message._few = few
-        end = at + 3
-        for item_2 in few:
-            at = end + 4 & -4
-            (size,) = read_2(data, at)
-            end = at + 3 + size
-            if data[end]:
-                raise ValueError("text without end")
-            item_2._key = text(data[at + 4 : end])
-            at = end + 4 & -4
-            (size,) = read_2(data, at)
-            end = at + 3 + size
-            if data[end]:
-                raise ValueError("text without end")
-            item_2._value = text(data[at + 4 : end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        if at + 4 + 17 * count > limit:
-            raise ValueError("too short")
-        titled = [new_titled() for _ in range(count)]
-        message._titled = titled
-        at = at + 4
-        for item_3 in titled:
-            item_3._level, size = read_3(data, at)
-            end = at + 7 + size
-            if data[end]:
-                raise ValueError("text without end")
-            item_3._title = text(data[at + 8 : end])
-            at = end + 4 & -4
-            (count,) = read_2(data, at)
-            if at + 4 + 8 * count > limit:
-                raise ValueError("too short")
-            item_3_pairs = [new_pair() for _ in range(count)]
-            item_3._pairs = item_3_pairs
-            end = at + 3
-            for item_4 in item_3_pairs:
-                at = end + 4 & -4
-                (size,) = read_2(data, at)
-                end = at + 3 + size
-                if data[end]:
-                    raise ValueError("text without end")
-                item_4._key = text(data[at + 4 : end])
-                at = end + 4 & -4
-                (size,) = read_2(data, at)
-                end = at + 3 + size
-                if data[end]:
-                    raise ValueError("text without end")
-                item_4._value = text(data[at + 4 : end])
-            at = (end + 4 & -8) + 4
-            (item_3._number,) = read_4(data, at)
-            at = at + 8
-        (size,) = read_2(data, at)
-        end = at + 3 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._last = text(data[at + 4 : end])
-        return message
-
-    return _idlc.Codec(encode, decode)

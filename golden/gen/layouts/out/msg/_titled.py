@@ -6,16 +6,18 @@ from __future__ import annotations
 from .. import _idlc
 from ._pair import Pair
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Titled(_idlc.Message):
     """layouts_msgs/msg/Titled.
 
     Attributes:
-        level: uint8, 0 to 255.
-        title: string.
-        pairs: layouts_msgs/Pair[].
-        number: float64.
+        level: uint8
+        title: string
+        pairs: layouts_msgs/Pair[]
+        number: float64
     """
 
     __match_args__ = ("level", "title", "pairs", "number")
@@ -41,10 +43,10 @@ class Titled(_idlc.Message):
         number: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or level.__class__ is not int) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or level.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._level = level
         self._title = title
         self._pairs = [] if pairs is None else pairs
@@ -53,100 +55,10 @@ class Titled(_idlc.Message):
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Titled):
             return NotImplemented
-        if (
-            self._level != other._level
-            or self._title != other._title
-            or self._number != other._number
-        ):
+        if self._level != other._level:
+            return False
+        if self._title != other._title:
+            return False
+        if self._number != other._number:
             return False
         return self._pairs == other._pairs
-
-
-@_idlc.codec_for(Titled)
-def _titled_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Titled in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    sized = _idlc.sizes(order)
-    ended = _idlc.ENDS
-    unsized = _idlc.unsized
-    write_1 = _idlc.Texts(order, "4sBI*I", align=4)
-    write_rows = _idlc.rows_writer(order)
-    write_2 = _idlc.phases(order, "d")
-    new_titled = _idlc.maker(Titled)
-    new_pair = _idlc.maker(Pair)
-    read_1 = _idlc.layout(order, "BI", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.layout(order, "I").unpack_from
-    strings = _idlc.strings_reader(order, reading.text)
-    read_3 = _idlc.layout(order, "d", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        title = message._title.encode()
-        title_size = len(title)
-        pairs = message._pairs
-        pairs_rows: list[str] = []
-        if len(pairs):
-            try:
-                for item in pairs:
-                    key = item._key
-                    value = item._value
-                    pairs_rows += (
-                        sized[len(key)],
-                        key,
-                        ended[len(key)],
-                        sized[len(value)],
-                        value,
-                        ended[len(value)],
-                    )
-            except IndexError:
-                pairs_rows = unsized(
-                    [each for item in pairs for each in (item._key, item._value)],
-                )
-        at = (title_size + 16 & -4) + 4
-        pairs_block = write_rows(pairs_rows)
-        at = at + len(pairs_block)
-        parts = [
-            write_1[title_size](
-                encapsulation,
-                message._level,
-                title_size + 1,
-                title,
-                len(pairs_rows) // 6,
-            ),
-            pairs_block,
-            write_2[at & 7].pack(message._number),
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        message = new_titled()
-        message._level, size = read_1(data, 4)
-        end = 11 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._title = text(data[12:end])
-        at = end + 4 & -4
-        (count,) = read_2(data, at)
-        if at + 4 + 8 * count > limit:
-            raise ValueError("too short")
-        pairs = [new_pair() for _ in range(count)]
-        message._pairs = pairs
-        words, chars, to_str = strings(data, at + 4)
-        end = at + 3
-        for item in pairs:
-            at = end + 8 & -4
-            end = at - 1 + words[at >> 2]
-            if data[end]:
-                raise ValueError("text without end")
-            item._key = to_str(chars[at:end])
-            at = end + 8 & -4
-            end = at - 1 + words[at >> 2]
-            if data[end]:
-                raise ValueError("text without end")
-            item._value = to_str(chars[at:end])
-        at = (end + 4 & -8) + 4
-        (message._number,) = read_3(data, at)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -15,7 +15,15 @@ if TYPE_CHECKING:
     from ._point import Point
     from ._text import Text
 
-__all__ = ["Any", "FOOBar", "FooBar", "Hiding", "Odd", "Point", "Text"]
+__all__ = [
+    "Any",
+    "FOOBar",
+    "FooBar",
+    "Hiding",
+    "Odd",
+    "Point",
+    "Text",
+]
 
 _MODULES = {
     "Any": "_any",

@@ -10,17 +10,23 @@ from .. import _idlc
 with _idlc.importing():
     from geometry_msgs.msg import Pose
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Any(_idlc.Message):
     """names_msgs/msg/Any.
 
     Attributes:
-        pose: geometry_msgs/Pose.
+        pose: geometry_msgs/Pose
     """
 
     __match_args__ = ("pose",)
-    _fields_and_field_types = _idlc.table({"pose": "geometry_msgs/Pose"})
+    _fields_and_field_types = _idlc.table(
+        {
+            "pose": "geometry_msgs/Pose",
+        },
+    )
 
     pose: Pose
 
@@ -29,67 +35,13 @@ class Any(_idlc.Message):
         pose: Pose | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (
-            options or (pose is not None and pose.__class__ is not Pose)
-        ) and _idlc.construct(self, options, locals()):
-            return
+        if options or (pose is not None and pose.__class__ is not Pose):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._pose = Pose() if pose is None else pose
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Any):
             return NotImplemented
         return bool(self._pose == other._pose)
-
-
-@_idlc.codec_for(Any)
-def _any_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Any in one byte order."""
-    with _idlc.importing():
-        from geometry_msgs.msg import Point, Quaternion
-
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sddddddd").pack
-    new_any = _idlc.maker(Any)
-    new_pose = _idlc.maker(Pose)
-    new_point = _idlc.maker(Point)
-    new_quaternion = _idlc.maker(Quaternion)
-    read_1 = _idlc.layout(order, "ddddddd", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        pose = message._pose
-        position = pose._position
-        orientation = pose._orientation
-        parts = [
-            write_1(
-                encapsulation,
-                position._x,
-                position._y,
-                position._z,
-                orientation._x,
-                orientation._y,
-                orientation._z,
-                orientation._w,
-            ),
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_any()
-        pose = new_pose()
-        message._pose = pose
-        position = new_point()
-        pose._position = position
-        orientation = new_quaternion()
-        pose._orientation = orientation
-        (
-            position._x,
-            position._y,
-            position._z,
-            orientation._x,
-            orientation._y,
-            orientation._z,
-            orientation._w,
-        ) = read_1(data, 4)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -6,17 +6,23 @@ from __future__ import annotations
 from .. import _idlc
 from ._foo_bar_2 import FooBar
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class FOOBar(_idlc.Message):
     """names_msgs/msg/FOOBar.
 
     Attributes:
-        inner: names_msgs/FooBar.
+        inner: names_msgs/FooBar
     """
 
     __match_args__ = ("inner",)
-    _fields_and_field_types = _idlc.table({"inner": "names_msgs/FooBar"})
+    _fields_and_field_types = _idlc.table(
+        {
+            "inner": "names_msgs/FooBar",
+        },
+    )
 
     inner: FooBar
 
@@ -25,37 +31,13 @@ class FOOBar(_idlc.Message):
         inner: FooBar | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (
-            options or (inner is not None and inner.__class__ is not FooBar)
-        ) and _idlc.construct(self, options, locals()):
-            return
+        if options or (inner is not None and inner.__class__ is not FooBar):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._inner = FooBar() if inner is None else inner
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, FOOBar):
             return NotImplemented
         return self._inner == other._inner
-
-
-@_idlc.codec_for(FOOBar)
-def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads FOOBar in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
-    new_foo_bar = _idlc.maker(FOOBar)
-    new_foo_bar_2 = _idlc.maker(FooBar)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        inner = message._inner
-        parts = [write_1(encapsulation, inner._a)]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_foo_bar()
-        inner = new_foo_bar_2()
-        message._inner = inner
-        (inner._a,) = read_1(data, 4)
-        return message
-
-    return _idlc.Codec(encode, decode)

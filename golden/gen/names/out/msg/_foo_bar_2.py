@@ -5,17 +5,23 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class FooBar(_idlc.Message):
     """names_msgs/msg/FooBar.
 
     Attributes:
-        a: int32, -2147483648 to 2147483647.
+        a: int32
     """
 
     __match_args__ = ("a",)
-    _fields_and_field_types = _idlc.table({"a": "int32"})
+    _fields_and_field_types = _idlc.table(
+        {
+            "a": "int32",
+        },
+    )
 
     a: int
 
@@ -24,33 +30,13 @@ class FooBar(_idlc.Message):
         a: int = 0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or a.__class__ is not int) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or a.__class__ is not int:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._a = a
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, FooBar):
             return NotImplemented
         return bool(self._a == other._a)
-
-
-@_idlc.codec_for(FooBar)
-def _foo_bar_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads FooBar in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4si").pack
-    new_foo_bar = _idlc.maker(FooBar)
-    read_1 = _idlc.layout(order, "i", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._a)]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_foo_bar()
-        (message._a,) = read_1(data, 4)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -10,6 +10,8 @@ from .. import _idlc
 from .._idlc import arrays as _arrays
 from ._point import Point
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Hiding(_idlc.Message):
@@ -20,11 +22,11 @@ class Hiding(_idlc.Message):
     Hiding)` those of the class.
 
     Attributes:
-        validate: names_msgs/Point.
-        serialize: uint8, 0 to 255.
-        deserialize: float32[].
-        from_dict: int32[3], -2147483648 to 2147483647.
-        to_dict: string[].
+        validate: names_msgs/Point
+        serialize: uint8
+        deserialize: float32[]
+        from_dict: int32[3]
+        to_dict: string[]
     """
 
     __match_args__ = ("validate", "serialize", "deserialize", "from_dict", "to_dict")
@@ -55,10 +57,10 @@ class Hiding(_idlc.Message):
         to_dict: list[str] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (
-            options or (validate is not None and validate.__class__ is not Point)
-        ) and _idlc.construct(self, options, locals()):
-            return
+        if options or (validate is not None and validate.__class__ is not Point):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._validate = Point() if validate is None else validate
         self._serialize = serialize
         if deserialize is None:
@@ -86,64 +88,3 @@ class Hiding(_idlc.Message):
         if not _idlc.same(self._from_dict, other._from_dict):
             return False
         return self._validate == other._validate and self._to_dict == other._to_dict
-
-
-@_idlc.codec_for(Hiding)
-def _hiding_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Hiding in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    buffer_f = _idlc.sequence_writer(order, "f")
-    array = _idlc.array_of(order)
-    write_1 = _idlc.layout(order, "4sddBI").pack
-    bytes_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_2 = _idlc.layout(order, "3i", align=4).pack
-    write_to_dict = _idlc.text_block(order)
-    new_hiding = _idlc.maker(Hiding)
-    new_point = _idlc.maker(Point)
-    read_1 = _idlc.layout(order, "ddBI", start=4).unpack_from
-    numbers_f = _idlc.sequence_reader(order, "f", reading)
-    array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_2 = _idlc.layout(order, "3iI").unpack_from
-    text = reading.text
-    read_to_dict = _idlc.texts_reader(order, text)
-    small = reading.small
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        validate = message._validate
-        deserialize = message._deserialize
-        if type(deserialize) is not array:
-            deserialize = buffer_f(deserialize)
-        deserialize_count = len(deserialize)
-        to_dict = write_to_dict(message._to_dict)
-        parts = [
-            write_1(
-                encapsulation,
-                validate._x,
-                validate._y,
-                message._serialize,
-                deserialize_count,
-            ),
-            deserialize,
-            write_2(bytes_int32_3(message._from_dict)),
-            to_dict,
-        ]
-        raw = join(parts)
-        if len(deserialize) != deserialize_count:
-            return encode(message, join)
-        return raw
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        view = data if limit < small else memoryview(data)
-        message = new_hiding()
-        validate = new_point()
-        message._validate = validate
-        validate._x, validate._y, message._serialize, count = read_1(data, 4)
-        end = 28 + 4 * count
-        message._deserialize = numbers_f(view[28:end])
-        from_dict, count = read_2(data, end)
-        message._from_dict = array_int32_3(from_dict)
-        message._to_dict, end = read_to_dict(data, end + 16, count)
-        return message
-
-    return _idlc.Codec(encode, decode, bulk=True)

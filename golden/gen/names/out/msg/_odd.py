@@ -10,31 +10,33 @@ from .. import _idlc
 from .._idlc import arrays as _arrays
 from ._point import Point
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Odd(_idlc.Message):
     """names_msgs/msg/Odd.
 
-    Fields hide the methods of the same name (serialize): `super(Odd, message)` still
-    has them, and `super(Odd, Odd)` those of the class.
+    Fields hide the methods of the same name (serialize): `super(Odd, message)`
+    still has them, and `super(Odd, Odd)` those of the class.
 
     Attributes:
-        class_: int32, -2147483648 to 2147483647.
-        serialize: int32, -2147483648 to 2147483647.
-        self: int32, -2147483648 to 2147483647.
-        fields_and_field_types: int32, -2147483648 to 2147483647.
-        int: int32, -2147483648 to 2147483647.
-        list: string.
-        bytes: byte.
-        bool: bool.
-        float: float32.
-        str: string[].
-        message: int32, -2147483648 to 2147483647.
-        data: int32, -2147483648 to 2147483647.
-        at: int32, -2147483648 to 2147483647.
-        item: names_msgs/Point[].
-        array: names_msgs/Point.
-        order: int32[3], -2147483648 to 2147483647.
+        class_: int32
+        serialize: int32
+        self: int32
+        fields_and_field_types: int32
+        int: int32
+        list: string
+        bytes: byte
+        bool: bool
+        float: float32
+        str: string[]
+        message: int32
+        data: int32
+        at: int32
+        item: names_msgs/Point[]
+        array: names_msgs/Point
+        order: int32[3]
     """
 
     __match_args__ = (
@@ -118,10 +120,10 @@ class Odd(_idlc.Message):
         order: _arrays.Values | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or class_.__class__ is not _builtins.int) and _idlc.construct(
-            _self, options, locals()
-        ):
-            return
+        if options or class_.__class__ is not _builtins.int:
+            _given = locals()
+            if _idlc.construct(_self, options, _given):
+                return
         _self._class = class_
         _self._serialize = serialize
         _self._self = self
@@ -145,20 +147,29 @@ class Odd(_idlc.Message):
     def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Odd):
             return NotImplemented
-        if (
-            _self._class != other._class
-            or _self._serialize != other._serialize
-            or _self._self != other._self
-            or _self._fields_and_field_types_ != other._fields_and_field_types_
-            or _self._int != other._int
-            or _self._list != other._list
-            or _self._bytes != other._bytes
-            or _self._bool != other._bool
-            or _self._float != other._float
-            or _self._message != other._message
-            or _self._data != other._data
-            or _self._at != other._at
-        ):
+        if _self._class != other._class:
+            return False
+        if _self._serialize != other._serialize:
+            return False
+        if _self._self != other._self:
+            return False
+        if _self._fields_and_field_types_ != other._fields_and_field_types_:
+            return False
+        if _self._int != other._int:
+            return False
+        if _self._list != other._list:
+            return False
+        if _self._bytes != other._bytes:
+            return False
+        if _self._bool != other._bool:
+            return False
+        if _self._float != other._float:
+            return False
+        if _self._message != other._message:
+            return False
+        if _self._data != other._data:
+            return False
+        if _self._at != other._at:
             return False
         if not _idlc.same(_self._order, other._order):
             return False
@@ -167,113 +178,3 @@ class Odd(_idlc.Message):
             and _self._item == other._item
             and _self._array == other._array
         )
-
-
-@_idlc.codec_for(Odd)
-def _odd_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Odd in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    truths = _idlc.TRUTHS
-    write_1 = _idlc.Texts(order, "4siiiiiI*c?f", align=4)
-    write_str_2 = _idlc.text_block(order)
-    listed = _idlc.listed
-    write_2 = _idlc.phases(order, "iiiI")
-    write_3 = _idlc.layout(order, "dd", start=4).pack
-    pad8 = _idlc.PAD8
-    bytes_int32_3 = _arrays.array_writer(order, "int32", 3)
-    write_4 = _idlc.phases(order, "dd3i")
-    new_odd = _idlc.maker(Odd)
-    new_point = _idlc.maker(Point)
-    read_1 = _idlc.layout(order, "iiiiiI", start=4).unpack_from
-    text = reading.text
-    read_2 = _idlc.phases(order, "c?fI")
-    read_str_2 = _idlc.texts_reader(order, text)
-    read_3 = _idlc.layout(order, "iiiI").unpack_from
-    rows_1 = _idlc.layout(order, "dd", start=4).iter_unpack
-    array_int32_3 = _arrays.array_reader(order, "int32", 3, reading)
-    read_4 = _idlc.layout(order, "dd3i", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        list_2 = message._list.encode()
-        list_2_size = len(list_2)
-        at = (list_2_size + 34 & -4) + 4
-        str_2 = write_str_2(message._str)
-        at = at + len(str_2)
-        low = len(str_2)
-        item = listed(message._item)
-        at = (at + 3 & -4) + 16
-        item_block = b"".join([write_3(item_2._x, item_2._y) for item_2 in item])
-        parts = [
-            write_1[list_2_size](
-                encapsulation,
-                message._class,
-                message._serialize,
-                message._self,
-                message._fields_and_field_types_,
-                message._int,
-                list_2_size + 1,
-                list_2,
-                message._bytes,
-                truths[message._bool],
-                message._float,
-            ),
-            str_2,
-            write_2[low & 3].pack(
-                message._message,
-                message._data,
-                message._at,
-                len(item),
-            ),
-            pad8[at & 7] if item else b"",
-            item_block,
-        ]
-        put = parts.append
-        if item:
-            at = (at + 3 & -8) + 4 + 16 * len(item)
-        array = message._array
-        put(write_4[at & 7].pack(array._x, array._y, bytes_int32_3(message._order)))
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_odd()
-        (
-            message._class,
-            message._serialize,
-            message._self,
-            message._fields_and_field_types_,
-            message._int,
-            size,
-        ) = read_1(data, 4)
-        end = 27 + size
-        if data[end]:
-            raise ValueError("text without end")
-        message._list = text(data[28:end])
-        struct = read_2[end + 1 & 7]
-        (
-            message._bytes,
-            message._bool,
-            message._float,
-            count,
-        ) = struct.unpack_from(data, end + 1)
-        at = end + 1 + struct.size
-        message._str, end = read_str_2(data, at, count)
-        at = end + 3 & -4
-        message._message, message._data, message._at, count = read_3(data, at)
-        item: list[_idlc.Any] = []
-        message._item = item
-        at = at + 16
-        if count:
-            at = (at + 3 & -8) + 4
-        end = at + 16 * count
-        for item_2_values in rows_1(data[at:end]):
-            item_2 = new_point()
-            item.append(item_2)
-            item_2._x, item_2._y = item_2_values
-        array = new_point()
-        message._array = array
-        at = (end + 3 & -8) + 4
-        array._x, array._y, order_2 = read_4(data, at)
-        message._order = array_int32_3(order_2)
-        return message
-
-    return _idlc.Codec(encode, decode)

@@ -5,18 +5,25 @@ from __future__ import annotations
 
 from .. import _idlc
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Point(_idlc.Message):
     """names_msgs/msg/Point.
 
     Attributes:
-        x: float64.
-        y: float64.
+        x: float64
+        y: float64
     """
 
     __match_args__ = ("x", "y")
-    _fields_and_field_types = _idlc.table({"x": "double", "y": "double"})
+    _fields_and_field_types = _idlc.table(
+        {
+            "x": "double",
+            "y": "double",
+        },
+    )
 
     x: float
     y: float
@@ -27,10 +34,10 @@ class Point(_idlc.Message):
         y: float = 0.0,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (options or x.__class__ is not float) and _idlc.construct(
-            self, options, locals()
-        ):
-            return
+        if options or x.__class__ is not float:
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._x = x
         self._y = y
 
@@ -38,23 +45,3 @@ class Point(_idlc.Message):
         if not isinstance(other, Point):
             return NotImplemented
         return not (self._x != other._x or self._y != other._y)
-
-
-@_idlc.codec_for(Point)
-def _point_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Point in one byte order."""
-    encapsulation = _idlc.HEADERS[order]
-    write_1 = _idlc.layout(order, "4sdd").pack
-    new_point = _idlc.maker(Point)
-    read_1 = _idlc.layout(order, "dd", start=4).unpack_from
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        parts = [write_1(encapsulation, message._x, message._y)]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        message = new_point()
-        message._x, message._y = read_1(data, 4)
-        return message
-
-    return _idlc.Codec(encode, decode)

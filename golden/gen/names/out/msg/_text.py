@@ -12,15 +12,17 @@ from ._point import Point as names_msgs_Point
 with _idlc.importing():
     from geometry_msgs.msg import Point as geometry_msgs_Point
 
+# `dataclass` is for type checkers: at run time it leaves the class as it is.
+
 
 @_idlc.dataclass(init=False, kw_only=True)
 class Text(_idlc.Message):
     """names_msgs/msg/Text.
 
     Attributes:
-        other: geometry_msgs/Point.
-        own: names_msgs/Point.
-        any: names_msgs/Any[<=2].
+        other: geometry_msgs/Point
+        own: names_msgs/Point
+        any: names_msgs/Any[<=2]
     """
 
     __match_args__ = ("other", "own", "any")
@@ -43,11 +45,12 @@ class Text(_idlc.Message):
         any: list[Any] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
-        if (
-            options
-            or (other is not None and other.__class__ is not geometry_msgs_Point)
-        ) and _idlc.construct(self, options, locals()):
-            return
+        if options or (
+            other is not None and other.__class__ is not geometry_msgs_Point
+        ):
+            _given = locals()
+            if _idlc.construct(self, options, _given):
+                return
         self._other = geometry_msgs_Point() if other is None else other
         self._own = names_msgs_Point() if own is None else own
         self._any = [] if any is None else any
@@ -60,99 +63,3 @@ class Text(_idlc.Message):
             and self._own == other._own
             and self._any == other._any
         )
-
-
-@_idlc.codec_for(Text)
-def _text_codec(order: str, reading: _idlc.Reading) -> _idlc.Codec:
-    """Return what writes and reads Text in one byte order."""
-    with _idlc.importing():
-        from geometry_msgs.msg import Pose, Quaternion
-
-    encapsulation = _idlc.HEADERS[order]
-    listed = _idlc.listed
-    write_1 = _idlc.layout(order, "4sdddddI").pack
-    write_2 = _idlc.layout(order, "ddddddd", start=4).pack
-    pad8 = _idlc.PAD8
-    new_text = _idlc.maker(Text)
-    new_point = _idlc.maker(geometry_msgs_Point)
-    new_point_2 = _idlc.maker(names_msgs_Point)
-    new_any = _idlc.maker(Any)
-    new_pose = _idlc.maker(Pose)
-    new_quaternion = _idlc.maker(Quaternion)
-    read_1 = _idlc.layout(order, "dddddI", start=4).unpack_from
-    rows_1 = _idlc.layout(order, "ddddddd", start=4).iter_unpack
-
-    def encode(message: _idlc.Any, join: _idlc.Join) -> _idlc.Any:
-        other = message._other
-        own = message._own
-        any_2 = listed(message._any)
-        if len(any_2) > 2:
-            raise ValueError("too many elements")
-        any_2_block = b"".join(
-            [
-                write_2(
-                    item._pose._position._x,
-                    item._pose._position._y,
-                    item._pose._position._z,
-                    item._pose._orientation._x,
-                    item._pose._orientation._y,
-                    item._pose._orientation._z,
-                    item._pose._orientation._w,
-                )
-                for item in any_2
-            ],
-        )
-        parts = [
-            write_1(
-                encapsulation,
-                other._x,
-                other._y,
-                other._z,
-                own._x,
-                own._y,
-                len(any_2),
-            ),
-            pad8[0] if any_2 else b"",
-            any_2_block,
-        ]
-        return join(parts)
-
-    def decode(data: _idlc.Any) -> _idlc.Any:
-        limit = len(data)
-        message = new_text()
-        other = new_point()
-        message._other = other
-        own = new_point_2()
-        message._own = own
-        other._x, other._y, other._z, own._x, own._y, count = read_1(data, 4)
-        if count > 2:
-            raise ValueError("too many elements")
-        any_2: list[_idlc.Any] = []
-        message._any = any_2
-        at = 48
-        if count:
-            at = (at + 3 & -8) + 4
-        end = at + 56 * count
-        for item_values in rows_1(data[at:end]):
-            item = new_any()
-            any_2.append(item)
-            pose = new_pose()
-            item._pose = pose
-            position = new_point()
-            pose._position = position
-            orientation = new_quaternion()
-            pose._orientation = orientation
-            (
-                position._x,
-                position._y,
-                position._z,
-                orientation._x,
-                orientation._y,
-                orientation._z,
-                orientation._w,
-            ) = item_values
-        if end > limit:
-            raise ValueError("too short")
-        return message
-
-    return _idlc.Codec(encode, decode)

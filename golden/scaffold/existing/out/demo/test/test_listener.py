@@ -1,4 +1,4 @@
-"""The node listener does what it is for, on the real rclpy."""
+"""Tests of the node listener, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -18,7 +18,7 @@ Start = Callable[..., Any]
 
 
 def test_it_receives_chatter(start: Start, observer: Node) -> None:
-    """The node says something for each message on chatter."""
+    """The node logs each message on chatter."""
     publisher = observer.create_publisher(String, 'chatter', 10)
     node = start(MODULE)
 
@@ -31,7 +31,7 @@ def test_it_receives_chatter(start: Start, observer: Node) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE)
     node.until(lambda: 'listener' in observer.get_node_names())
     assert node.end(how) == 0, node.output

@@ -12,11 +12,11 @@ import sys
 import time
 from typing import Any
 
+from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.task import Future
-from rclpy.utilities import ok, remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 from std_msgs.msg import Empty
 from std_srvs.srv import Empty as std_srvs_srv_Empty
 from std_srvs.srv import SetBool
@@ -26,7 +26,7 @@ class Keeper(LifecycleNode):
     """The lifecycle node keeper."""
 
     def __init__(self, given: argparse.Namespace) -> None:
-        """Create what the node consists of."""
+        """Create the node; `on_configure` creates its endpoints."""
         super().__init__('keeper')
         self.given = given
         self.timeout: float = given.server_timeout
@@ -36,7 +36,7 @@ class Keeper(LifecycleNode):
         self.pauses: set[Future] = set()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Create what is there in every state but the first."""
+        """Create publishers, clients and action servers."""
         self.beat_publisher = self.create_lifecycle_publisher(Empty, 'beat', 10)
         self.undo_configure.callback(self.destroy_lifecycle_publisher, self.beat_publisher)
         self.switch_client = self.create_client(SetBool, 'switch')
@@ -44,7 +44,7 @@ class Keeper(LifecycleNode):
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start to work."""
+        """Start to work: timers, subscriptions and services."""
         self.activation = object()
         self.undo_activate.callback(self.wake)
         self.beat_timer = self.create_timer(1.0, self.publish_beat)
@@ -64,12 +64,12 @@ class Keeper(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Remove what `on_configure` created."""
+        """Destroy what `on_configure` created."""
         self.undo_configure.close()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Stop working and remove everything, whatever the state was."""
+        """Stop working and destroy everything, whatever the state was."""
         self.undo_activate.close()
         self.undo_configure.close()
         return super().on_shutdown(state)
@@ -87,7 +87,7 @@ class Keeper(LifecycleNode):
         self.beat_publisher.publish(message)
 
     def receive_beat(self, message: Empty) -> None:
-        """Act on a message from beat."""
+        """Handle a message from beat."""
         self.get_logger().info('beat: message received')
 
     def handle_reset(
@@ -115,11 +115,11 @@ class Keeper(LifecycleNode):
         return True
 
     def tick(self) -> None:
-        """Do what is to be done again and again."""
+        """Run once per timer period."""
         self.get_logger().info('tick')
 
     async def until(self, condition: Callable[[], bool]) -> bool:
-        """Wait until a condition holds; return whether it did in time, and while active."""
+        """Wait until a condition holds; return whether it did so in time and while active."""
         activation = self.activation
         deadline = time.monotonic() + self.timeout
         while activation is not None and activation is self.activation:
@@ -131,7 +131,7 @@ class Keeper(LifecycleNode):
         return False
 
     async def pause(self, seconds: float) -> None:
-        """Wait without blocking; when the node is deactivated, no longer."""
+        """Wait without blocking, until the node is deactivated at the latest."""
         over: Future = Future()
         self.pauses.add(over)
         timer = self.create_timer(seconds, lambda: over.set_result(None))
@@ -140,19 +140,19 @@ class Keeper(LifecycleNode):
         self.destroy_timer(timer)
 
     def wake(self) -> None:
-        """End all pauses: what waits has to see that the node is not active any more."""
+        """End all pauses, so that coroutines see that the node is no longer active."""
         self.activation = None
         for over in self.pauses:
             over.set_result(None)
 
     def spawn(self, work: Callable[[Any], Coroutine[Any, Any, object]], what: Any) -> None:
-        """Let a coroutine run beside the callbacks."""
+        """Run a coroutine concurrently with the callbacks."""
         if self.executor is not None:
             self.executor.create_task(work, what)
 
 
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
-    """Return what the command line says, ROS 2's own arguments left out."""
+    """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
         description='The lifecycle node keeper.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
@@ -175,34 +175,20 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def switch_request(given: argparse.Namespace) -> SetBool.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return SetBool.Request(
         data=given.data,
     )
 
 
+@until_shutdown
 def main(args: list[str] | None = None) -> None:
-    """Run the node until it is asked to end."""
+    """Run the node until Ctrl-C or SIGTERM."""
     given = parse_arguments(args)
-    try:
-        rclpy.init(args=args)
-        executor = SingleThreadedExecutor()
-        node = Keeper(given)
-        executor.add_node(node)
-        # a signal that comes while rclpy starts can fail to wake it, so it waits a second at most
-        while ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():
-            raise
-        # otherwise it was asked to end before it was complete
-    finally:
-        try:
-            try_shutdown()
-        except RuntimeError:
-            pass  # the signal that ended the node is shutting rclpy down at this very moment
+    rclpy.init(args=args)
+    node = Keeper(given)
+    executor = WakingExecutor()
+    rclpy.spin(node, executor)
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""The node keeper does what it is for, on the real rclpy."""
+"""Tests of the node keeper, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -23,7 +23,7 @@ OFFERED = {'/beat', '/reset', '/switch'}
 
 
 def change(node: Any, observer: Node, *steps: int) -> None:
-    """Take the node through transitions, all of which succeed."""
+    """Take the node through transitions that must all succeed."""
     client = observer.create_client(ChangeState, 'keeper/change_state')
     node.until(client.service_is_ready)
     for step in steps:
@@ -38,7 +38,7 @@ def activate(node: Any, observer: Node) -> None:
 
 
 def offered(observer: Node) -> set[str]:
-    """Return which of its topics, services and actions the node has now."""
+    """Return the topics, services and actions that the node has now."""
     ask = (
         observer.get_publisher_names_and_types_by_node,
         observer.get_subscriber_names_and_types_by_node,
@@ -57,7 +57,7 @@ def offered(observer: Node) -> set[str]:
     ids=['cleaned up', 'shut down'],
 )
 def test_nothing_is_left_when_it_is(start: Start, observer: Node, steps: list[int]) -> None:
-    """Neither a clean-up nor a shutdown leaves anything that the node offered."""
+    """Neither a clean-up nor a shutdown leaves an endpoint."""
     node = start(MODULE)
     activate(node, observer)
     node.until(lambda: offered(observer) == OFFERED)
@@ -77,7 +77,7 @@ def test_it_publishes_beat(start: Start, observer: Node) -> None:
 
 
 def test_it_receives_beat(start: Start, observer: Node) -> None:
-    """The node says something for each message on beat."""
+    """The node logs each message on beat."""
     publisher = observer.create_publisher(Empty, 'beat', 10)
     node = start(MODULE)
     activate(node, observer)
@@ -102,7 +102,7 @@ def test_it_answers_reset(start: Start, observer: Node) -> None:
 
 
 def test_it_calls_switch(start: Start, observer: Node) -> None:
-    """The node calls switch and says what is answered."""
+    """The node calls switch and logs the response."""
     requests: list[object] = []
 
     def answer(request: object, response: object) -> object:
@@ -117,7 +117,7 @@ def test_it_calls_switch(start: Start, observer: Node) -> None:
 
 
 def test_it_goes_on_with_tick(start: Start, observer: Node) -> None:
-    """The node does something again and again."""
+    """The timer tick calls its method repeatedly."""
     node = start(MODULE)
     activate(node, observer)
     node.until(lambda: node.said('tick\n', 2), 29.0)
@@ -125,7 +125,7 @@ def test_it_goes_on_with_tick(start: Start, observer: Node) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE)
     node.until(lambda: 'keeper' in observer.get_node_names())
     assert node.end(how) == 0, node.output

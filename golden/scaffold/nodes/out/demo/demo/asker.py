@@ -7,25 +7,21 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-import signal
 import sys
-from threading import Event
 import time
 
+from demo.node_main import interruptible
 from demo.srv import Ask
-import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 
 
 class Asker(Node):
     """The node asker calls ask."""
 
     def __init__(self, timeout: float) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('asker')
         self.timeout = timeout
         self.ask_client = self.create_client(Ask, 'ask')
@@ -63,7 +59,7 @@ class Asker(Node):
 
 
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
-    """Return what the command line says, ROS 2's own arguments left out."""
+    """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
         description='The node asker calls ask.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
@@ -88,7 +84,7 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def ask_request(given: argparse.Namespace) -> Ask.Request:
-    """Return the request that the command line asks for."""
+    """Return the request that the command line describes."""
     return Ask.Request(
         question=given.question,
         loud=given.loud,
@@ -97,26 +93,12 @@ def ask_request(given: argparse.Namespace) -> Ask.Request:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if all went well."""
+    """Do what the command line asks for; return 0 if it succeeded."""
     given = parse_arguments(args)
-    interrupted = Event()
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: interrupted.set())
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        executor = SingleThreadedExecutor()
+    with interruptible(args) as once:
         node = Asker(given.server_timeout)
-        executor.add_node(node)
-        well = True
-        task = executor.create_task(node.call_ask, ask_request(given))
-        while not (task.done() or interrupted.is_set()):
-            executor.spin_once(timeout_sec=0.1)
-        well = well and bool(task.result())
-        return 130 if interrupted.is_set() else 0 if well else 1
-    except ExternalShutdownException:
-        return 1
-    finally:
-        try_shutdown()
+        once.run(node, node.call_ask, ask_request(given))
+    return once.status
 
 
 if __name__ == '__main__':

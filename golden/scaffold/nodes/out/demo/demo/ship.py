@@ -7,28 +7,24 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-import signal
 import sys
-from threading import Event
 import time
 from typing import Any
 
 from action_msgs.msg import GoalStatus
 from demo.action import Dock
-import rclpy
+from demo.node_main import interruptible
 from rclpy.action.client import ActionClient, ClientGoalHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args, try_shutdown
+from rclpy.utilities import remove_ros_args
 
 
 class Ship(Node):
     """The node ship sends goals to dock."""
 
     def __init__(self, timeout: float) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('ship')
         self.timeout = timeout
         self.dock_sent: Future | None = None
@@ -60,12 +56,12 @@ class Ship(Node):
         return bool(ending.result().status == GoalStatus.STATUS_SUCCEEDED)
 
     def follow_dock(self, message: Any) -> None:
-        """Act on what the server reports about the goal."""
+        """Log the feedback that the server sends about the goal."""
         feedback: Dock.Feedback = message.feedback
         self.get_logger().info(f'dock: distance={feedback.distance!r}')
 
     async def cancel_dock(self) -> None:
-        """Ask the server to cancel the goal that it was sent."""
+        """Ask the server to cancel the goal."""
         sent = self.dock_sent
         if sent is not None and await self.until(sent.done):
             answer = sent.result().cancel_goal_async()
@@ -90,7 +86,7 @@ class Ship(Node):
 
 
 def parse_arguments(args: list[str] | None) -> argparse.Namespace:
-    """Return what the command line says, ROS 2's own arguments left out."""
+    """Parse the command line, without ROS 2's own arguments."""
     parser = argparse.ArgumentParser(
         description='The node ship sends goals to dock.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
@@ -108,35 +104,19 @@ def parse_arguments(args: list[str] | None) -> argparse.Namespace:
 
 
 def dock_request(given: argparse.Namespace) -> Dock.Goal:
-    """Return the goal that the command line asks for."""
+    """Return the goal that the command line describes."""
     return Dock.Goal(
         station=given.station,
     )
 
 
 def main(args: list[str] | None = None) -> int:
-    """Do what the command line asks for; return 0 if all went well."""
+    """Do what the command line asks for; return 0 if it succeeded."""
     given = parse_arguments(args)
-    interrupted = Event()
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, lambda *_: interrupted.set())
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        executor = SingleThreadedExecutor()
+    with interruptible(args) as once:
         node = Ship(given.server_timeout)
-        executor.add_node(node)
-        well = True
-        task = executor.create_task(node.send_dock, dock_request(given))
-        while not (task.done() or interrupted.is_set()):
-            executor.spin_once(timeout_sec=0.1)
-        well = well and bool(task.result())
-        if interrupted.is_set():
-            executor.spin_until_future_complete(executor.create_task(node.cancel_dock))
-        return 130 if interrupted.is_set() else 0 if well else 1
-    except ExternalShutdownException:
-        return 1
-    finally:
-        try_shutdown()
+        once.run(node, node.send_dock, dock_request(given), node.cancel_dock)
+    return once.status
 
 
 if __name__ == '__main__':

@@ -6,19 +6,18 @@
 from __future__ import annotations
 
 from demo.action import Dock
+from demo.node_main import until_shutdown, WakingExecutor
 import rclpy
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
-from rclpy.utilities import ok, try_shutdown
 
 
 class Station(Node):
     """The node station works on goals for dock."""
 
     def __init__(self) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('station')
         self.dock_goal: ServerGoalHandle | None = None
         self.dock_server = ActionServer(
@@ -36,7 +35,7 @@ class Station(Node):
         return GoalResponse.ACCEPT
 
     def begin_dock(self, goal_handle: ServerGoalHandle) -> None:
-        """Begin to work on an accepted goal; it takes the place of the one before it."""
+        """Start an accepted goal, which replaces the one before it."""
         before = self.dock_goal
         if before is not None and before.is_active:
             self.get_logger().info('dock: a newer goal takes over')
@@ -45,12 +44,12 @@ class Station(Node):
         goal_handle.execute()
 
     def cancel_dock(self, goal_handle: ServerGoalHandle) -> CancelResponse:
-        """Let a goal be cancelled, whichever it is."""
-        self.get_logger().info('dock: asked to cancel')
+        """Allow every goal to be cancelled."""
+        self.get_logger().info('dock: cancel requested')
         return CancelResponse.ACCEPT
 
     async def execute_dock(self, goal_handle: ServerGoalHandle) -> Dock.Result:
-        """Work on a goal, step by step, until it is reached, cancelled or given up."""
+        """Work on a goal step by step, until it succeeds or is cancelled or aborted."""
         result = Dock.Result(
             docked=False,
         )
@@ -64,7 +63,7 @@ class Station(Node):
             goal_handle.publish_feedback(feedback)
             await self.pause(1.0)
             if not goal_handle.is_active:
-                self.get_logger().info('dock: given up')
+                self.get_logger().info('dock: aborted')
                 return result
             if goal_handle.is_cancel_requested:
                 goal_handle.canceled()
@@ -82,27 +81,13 @@ class Station(Node):
         self.destroy_timer(timer)
 
 
+@until_shutdown
 def main(args: list[str] | None = None) -> None:
-    """Run the node until it is asked to end."""
-    try:
-        rclpy.init(args=args)
-        executor = SingleThreadedExecutor()
-        node = Station()
-        executor.add_node(node)
-        # a signal that comes while rclpy starts can fail to wake it, so it waits a second at most
-        while ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():
-            raise
-        # otherwise it was asked to end before it was complete
-    finally:
-        try:
-            try_shutdown()
-        except RuntimeError:
-            pass  # the signal that ended the node is shutting rclpy down at this very moment
+    """Run the node until Ctrl-C or SIGTERM."""
+    rclpy.init(args=args)
+    node = Station()
+    executor = WakingExecutor()
+    rclpy.spin(node, executor)
 
 
 if __name__ == '__main__':

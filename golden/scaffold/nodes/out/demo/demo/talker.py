@@ -6,12 +6,11 @@
 from __future__ import annotations
 
 from demo.msg import Command
+from demo.node_main import until_shutdown, WakingExecutor
 from geometry_msgs.msg import Twist, Vector3
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
-from rclpy.utilities import ok, try_shutdown
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -21,7 +20,7 @@ class Talker(Node):
     """The node talker publishes command and listens to ~/words."""
 
     def __init__(self) -> None:
-        """Create what the node consists of."""
+        """Create the node and its endpoints."""
         super().__init__('talker')
         self.declare_parameter('speed', 0.5)
         self.declare_parameter('names', ['a', 'b'])
@@ -37,13 +36,13 @@ class Talker(Node):
 
     @property
     def param_speed(self) -> float:
-        """Return the parameter `speed`, as it is now."""
+        """Return the current value of the parameter `speed`."""
         value: float = self.get_parameter('speed').value
         return value
 
     @property
     def param_names(self) -> list[str]:
-        """Return the parameter `names`, as it is now."""
+        """Return the current value of the parameter `names`."""
         value: list[str] = list(self.get_parameter('names').value)
         return value
 
@@ -69,35 +68,21 @@ class Talker(Node):
         self.command_publisher.publish(message)
 
     def receive_words(self, message: String) -> None:
-        """Act on a message from ~/words."""
+        """Handle a message from ~/words."""
         self.get_logger().info(f'~/words: data={message.data!r}')
 
     def tick(self) -> None:
-        """Do what is to be done again and again."""
+        """Run once per timer period."""
         self.get_logger().info('tick')
 
 
+@until_shutdown
 def main(args: list[str] | None = None) -> None:
-    """Run the node until it is asked to end."""
-    try:
-        rclpy.init(args=args)
-        executor = SingleThreadedExecutor()
-        node = Talker()
-        executor.add_node(node)
-        # a signal that comes while rclpy starts can fail to wake it, so it waits a second at most
-        while ok():
-            executor.spin_once(timeout_sec=1.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except Exception:
-        if ok():
-            raise
-        # otherwise it was asked to end before it was complete
-    finally:
-        try:
-            try_shutdown()
-        except RuntimeError:
-            pass  # the signal that ended the node is shutting rclpy down at this very moment
+    """Run the node until Ctrl-C or SIGTERM."""
+    rclpy.init(args=args)
+    node = Talker()
+    executor = WakingExecutor()
+    rclpy.spin(node, executor)
 
 
 if __name__ == '__main__':

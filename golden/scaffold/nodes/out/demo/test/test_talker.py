@@ -1,4 +1,4 @@
-"""The node talker does what it is for, on the real rclpy."""
+"""Tests of the node talker, on the real rclpy."""
 
 # Only some of the functions of rclpy have types.
 # mypy: disallow-untyped-calls=False
@@ -19,24 +19,20 @@ from std_msgs.msg import String
 
 MODULE = 'demo.talker'
 Start = Callable[..., Any]
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PARAMETERS = {'speed': 0.5, 'names': ['a', 'b']}
 
 
 def test_it_publishes_command(start: Start, observer: Node) -> None:
     """Messages arrive on command, one after the other."""
     received: list[Command] = []
-    observer.create_subscription(
-        Command,
-        'command',
-        received.append,
-        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
-    )
+    observer.create_subscription(Command, 'command', received.append, LATCHED)
     node = start(MODULE)
     node.until(lambda: len(received) > 1, 20.3)
 
 
 def test_it_receives_words(start: Start, observer: Node) -> None:
-    """The node says something for each message on words."""
+    """The node logs each message on words."""
     publisher = observer.create_publisher(String, 'talker/words', qos_profile_sensor_data)
     node = start(MODULE)
 
@@ -48,7 +44,7 @@ def test_it_receives_words(start: Start, observer: Node) -> None:
 
 
 def test_it_goes_on_with_tick(start: Start, observer: Node) -> None:
-    """The node does something again and again."""
+    """The timer tick calls its method repeatedly."""
     node = start(MODULE)
     node.until(lambda: node.said('tick\n', 2), 20.8)
 
@@ -66,7 +62,7 @@ def test_it_has_its_parameters(start: Start, observer: Node) -> None:
 
 @pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGTERM])
 def test_it_ends_when_it_is_asked_to(start: Start, observer: Node, how: signal.Signals) -> None:
-    """Neither Ctrl-C nor a polite request to end leaves a traceback."""
+    """The node ends without a traceback on Ctrl-C and on SIGTERM."""
     node = start(MODULE)
     node.until(lambda: 'talker' in observer.get_node_names())
     assert node.end(how) == 0, node.output

@@ -1,0 +1,125 @@
+"""Every rule, with the codes that it reports; a rule whose codes nobody wants is not asked.
+
+Each list is a function, so that a run imports only the rules that it asks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.model.link import Model
+
+if TYPE_CHECKING:
+    from idlc.checks.package.facts import Facts
+    from idlc.checks.select import Selection
+
+Check: TypeAlias = Callable[[Model, Report], None]
+PackageCheck: TypeAlias = "Callable[[Facts, Model, Report], None]"
+
+
+class Rule(NamedTuple):
+    """A function that looks at a model, and what it may report."""
+
+    check: Check
+    codes: tuple[codes.Code, ...]
+
+
+class PackageRule(NamedTuple):
+    """A function that looks at the package around a model, and what it may report."""
+
+    check: PackageCheck
+    codes: tuple[codes.Code, ...]
+
+
+def verdicts() -> tuple[Rule, ...]:
+    """Return the rules that every command asks, those with the most helpful messages first."""
+    from idlc.checks import names, reserved, values
+
+    return (
+        Rule(names.package_name, (codes.INVALID_PACKAGE_NAME,)),
+        Rule(names.interface_names, (codes.INVALID_INTERFACE_NAME,)),
+        Rule(names.unique_fields, (codes.DUPLICATE_FIELD,)),
+        Rule(names.unique_constants, (codes.DUPLICATE_CONSTANT,)),
+        Rule(names.unique_modules, (codes.SAME_PYTHON_MODULE,)),
+        Rule(
+            reserved.field_names,
+            (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C, codes.BREAKS_CPP),
+        ),
+        Rule(reserved.constant_names, (codes.BREAKS_CPP,)),
+        Rule(reserved.interface_names, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
+        Rule(reserved.package_name, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_CPP)),
+        Rule(reserved.derived_suffixes, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
+        Rule(
+            values.constants_and_defaults,
+            (
+                codes.BREAKS_ROSIDL_PYTHON,
+                codes.NON_FINITE_VALUE,
+                codes.FLOAT32_RANGE,
+                codes.MANGLED_TEXT,
+                codes.ODD_TEXT,
+            ),
+        ),
+    )
+
+
+def advice() -> tuple[Rule, ...]:
+    """Return the rules that only `idlc check` asks; all of them warn."""
+    from idlc.checks import portability, style
+
+    return (
+        Rule(style.stamped, (codes.STAMPED_WITHOUT_HEADER,)),
+        Rule(style.documented_interfaces, (codes.UNDOCUMENTED_INTERFACE,)),
+        Rule(style.documented_fields, (codes.UNDOCUMENTED_FIELD,)),
+        Rule(style.missing_units, (codes.MISSING_UNIT,)),
+        Rule(style.unusual_units, (codes.UNUSUAL_UNIT,)),
+        Rule(style.constant_prefixes, (codes.CONSTANT_WITHOUT_PREFIX,)),
+        Rule(style.suffixes, (codes.REDUNDANT_SUFFIX,)),
+        Rule(portability.wide_strings, (codes.WIDE_STRING,)),
+        Rule(portability.chars, (codes.CHAR_TYPE,)),
+        Rule(portability.nested_bounds, (codes.UNENFORCED_BOUND,)),
+        Rule(portability.several_units, (codes.SEVERAL_UNITS,)),
+        Rule(portability.removed_types, (codes.REMOVED_STANDARD_TYPE,)),
+        Rule(portability.changed_types, (codes.CHANGED_STANDARD_TYPE,)),
+    )
+
+
+def package_advice() -> tuple[PackageRule, ...]:
+    """Return the rules on the package around the interfaces: the tutorials' troubleshooting."""
+    from idlc.checks.package import installation, manifest
+
+    return (
+        PackageRule(manifest.declared_dependencies, (codes.MISSING_DEPENDENCY,)),
+        PackageRule(manifest.used_dependencies, (codes.UNUSED_DEPENDENCY,)),
+        PackageRule(manifest.interface_group, (codes.NOT_IN_INTERFACE_GROUP,)),
+        PackageRule(manifest.generators, (codes.NO_INTERFACE_GENERATORS,)),
+        PackageRule(manifest.declared_imports, (codes.UNDECLARED_IMPORT,)),
+        PackageRule(installation.installed_interfaces, (codes.INTERFACES_NOT_INSTALLED,)),
+        PackageRule(installation.resource_marker, (codes.NO_RESOURCE_MARKER,)),
+        PackageRule(installation.installed_libraries, (codes.NO_LIBRARY_INSTALLED,)),
+        PackageRule(installation.entry_points, (codes.BAD_ENTRY_POINT,)),
+        PackageRule(installation.names, (codes.NAME_MISMATCH,)),
+        PackageRule(installation.current_output, (codes.STALE_GENERATED_CODE,)),
+    )
+
+
+def check(model: Model, report: Report) -> None:
+    """Report what the rules on meaning find in the model's own interfaces."""
+    for rule in verdicts():
+        rule.check(model, report)
+
+
+def advise(model: Model, report: Report, selection: Selection) -> None:
+    """Report what wanted advice there is on the model's own interfaces."""
+    for rule in advice():
+        if any(map(selection.has, rule.codes)):
+            rule.check(model, report)
+
+
+def check_package(facts: Facts, model: Model, report: Report, selection: Selection) -> None:
+    """Report what wanted advice there is on the package that holds a model's interfaces."""
+    for rule in package_advice():
+        if any(map(selection.has, rule.codes)):
+            rule.check(facts, model, report)

@@ -1,0 +1,120 @@
+"""The body of `idlc breaking`: what it says, and its exit status."""
+
+from __future__ import annotations
+
+import datetime
+import sys
+from typing import TYPE_CHECKING
+
+import click
+import msgspec
+
+from idlc.cli import output, reports
+from idlc.diagnostics.formats.github import notice
+from idlc.diagnostics.formats.terminal import counted
+from idlc.diagnostics.report import Report, first_few
+from idlc.disk import command_settings, pyproject
+from idlc.disk.scope import scope
+from idlc.driver.breaking import BreakingOptions, Verdict, breaking
+from idlc.driver.breaking_distro import is_distro
+from idlc.driver.check import Checked
+
+if TYPE_CHECKING:
+    from idlc.driver.graph import GraphVerdict
+
+GRAPH = "graph"
+PATIENCE = 5.0
+
+
+class BreakingWishes(msgspec.Struct, frozen=True):
+    """What was typed."""
+
+    paths: tuple[str, ...]
+    against: str | None
+    timeout: float | None
+    levels: tuple[str, ...]
+    package: str | None
+    include: tuple[str, ...]
+    exclude: tuple[str, ...]
+    distro: str | None
+    style: str
+
+
+def compare(typed: BreakingWishes) -> int:
+    """Compare versions, show what breaks and return the exit status."""
+    report = Report()
+    settings = pyproject.load(report)
+    against = typed.against or command_settings.against(settings, report)
+    allowed = command_settings.allowances(settings, report)
+    if against is None and not report.had_errors:
+        raise click.UsageError("give --against DIR, git:REF, idlc.lock, distro:NAME or graph")
+    if typed.timeout is not None and against != GRAPH:
+        raise click.UsageError("--timeout is for --against graph")
+    verdict: Verdict | GraphVerdict | None = None
+    if against is not None and not report.had_errors:
+        wanted = BreakingOptions(
+            paths=typed.paths or settings.paths or (() if is_distro(against) else (".",)),
+            against=against,
+            scope=scope(settings, typed.package, typed.include, typed.exclude, typed.distro),
+            levels=typed.levels,
+            allowed=allowed,
+            allowed_in=settings.source.path if settings.source else "",
+            today=datetime.datetime.now().astimezone().date().isoformat(),
+        )
+        verdict = _compared(wanted, typed, report)
+    _show(report, verdict, typed.style)
+    return output.status(report)
+
+
+def _compared(
+    wanted: BreakingOptions, typed: BreakingWishes, report: Report
+) -> Verdict | GraphVerdict | None:
+    if wanted.against != GRAPH:
+        return breaking(wanted, report)
+    from idlc.driver.graph import compare_with_graph
+
+    patience = typed.timeout or PATIENCE
+    return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))
+
+
+def _show(report: Report, verdict: Verdict | GraphVerdict | None, style: str) -> None:
+    if style == "json":
+        output.show(report, style, sys.stdout)
+        facts = verdict._asdict() if verdict else {}
+        for endpoint in facts.pop("endpoints", ()):
+            output.fact(sys.stdout, "endpoint", **endpoint._asdict())
+        output.fact(sys.stdout, "summary", **output.counts(report), **facts)
+    elif style == "text":
+        output.show(report, style, sys.stdout)
+        if verdict:
+            sys.stdout.write(f"{_summary(verdict)}\n")
+    else:
+        reports.write(report, style, Checked(()), sys.stdout, command="breaking")
+        if style == "github" and verdict:
+            sys.stdout.write(notice("idlc breaking", _summary(verdict)))
+
+
+def _summary(verdict: Verdict | GraphVerdict) -> str:
+    parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
+    text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
+    if verdict.allowed:
+        text += f"; allowed: {verdict.allowed}"
+    return text + (_next(verdict) if isinstance(verdict, Verdict) else _seen(verdict))
+
+
+def _seen(verdict: GraphVerdict) -> str:
+    """Return what was looked at."""
+    seen = [counted(number, noun) for noun, number in verdict.seen.items()]
+    text = f"; looked at {', '.join(seen)}"
+    return f"{text}; without type hash: {verdict.silent}" if verdict.silent else text
+
+
+def _next(verdict: Verdict) -> str:
+    """Return what was added, and which version comes next."""
+    text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
+    if verdict.part is None:
+        same = not (any(verdict.levels.values()) or verdict.allowed or verdict.added)
+        return f"{text}; the versions are the same" if same else text
+    if verdict.next_version:
+        return f"{text}; the next version after {verdict.version} is {verdict.next_version}"
+    return f"{text}; raise the {verdict.part} version"

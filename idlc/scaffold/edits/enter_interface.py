@@ -1,0 +1,59 @@
+"""Entering an interface in its package: the files that must list it or what it depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from idlc.emit.render import support_packages
+from idlc.model import catalog, derive, ir
+from idlc.model.link import Model
+from idlc.scaffold import new_interface
+from idlc.scaffold.edits import cmake, data_files, package_xml
+from idlc.scaffold.edits.outcome import Outcome
+
+CMAKE = "CMakeLists.txt"
+MANIFEST = "package.xml"
+SETUP = "setup.py"
+
+
+def enter(
+    model: Model, texts: Mapping[str, str], keys: Iterable[str], *, tested: bool
+) -> dict[str, Outcome]:
+    """Return the edits of a package that has got the interfaces of a model.
+
+    `texts` are those of the package's files that exist, `keys` all its interfaces as
+    `kind/Name.kind`. The package needs pytest if it is `tested`.
+    """
+    needed = depends(model)
+    tests = ["python3-pytest"] if tested else []
+    edits: dict[str, Outcome] = {
+        MANIFEST: package_xml.add(texts.get(MANIFEST, ""), depends=needed, tests=tests, group=True)
+    }
+    if CMAKE in texts:
+        edits[CMAKE] = cmake.add_dependencies(texts[CMAKE], needed)
+        return edits
+    if SETUP in texts:
+        parts = [*support_packages(), *sorted({key.partition("/")[0] for key in keys})]
+        packages = [model.package, *(f"{model.package}.{part}" for part in parts)]
+        wired = data_files.add_libraries(texts[SETUP])
+        edits[SETUP] = data_files.add_packages(wired, packages)
+    return edits
+
+
+def index(model: Model, texts: Mapping[str, str], keys: Iterable[str]) -> dict[str, str]:
+    """Return the index of interfaces, for a package that no CMake installs."""
+    return {} if CMAKE in texts else dict([new_interface.index(model.package, set(keys))])
+
+
+def depends(model: Model) -> list[str]:
+    """Return the packages that a package depends on for its own interfaces."""
+    implied = {p for one in model.own for p in derive.IMPLICIT_PACKAGES[one.name.kind]}
+    implied &= {*catalog.packages(model.distro)}  # older distributions lack some
+    used = {
+        element.target.package
+        for one in model.own
+        for message in derive.sections(one)
+        for field in message.fields
+        if isinstance(element := ir.element_of(field.type), ir.Ref)
+    }
+    return sorted((implied | used) - {model.package})

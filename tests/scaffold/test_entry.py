@@ -1,0 +1,88 @@
+"""What entering a node makes of the texts of a package's files."""
+
+import pytest
+
+from idlc.scaffold import spec
+from idlc.scaffold.edits import enter_node
+from idlc.scaffold.edits.outcome import Edited, Refused
+from idlc.scaffold.planned import Plan, plan
+from idlc.scaffold.roles.timer import TIMER
+from idlc.scaffold.templates import Templates
+
+SETUP = """\
+from setuptools import setup
+
+setup(
+    name='demo',
+    data_files=[('share/demo', ['package.xml'])],
+    entry_points={'console_scripts': []},
+)
+"""
+TEXTS = {"package.xml": '<package format="3"><name>demo</name></package>', "setup.py": SETUP}
+FILES = {"demo/heart.py": "from demo.node_main import until_shutdown\n"}
+
+
+def heart(*, lifecycle: bool = False) -> Plan:
+    endpoints = (spec.endpoint(TIMER, "1"),)
+    return plan(spec.Node("heart", "demo", endpoints, lifecycle=lifecycle), [None], {})
+
+
+def entered(texts, files=FILES, **options) -> enter_node.Entry:
+    entry = enter_node.enter(heart(**options), texts, files, Templates())
+    return enter_node.launch(heart(**options), texts, entry, Templates())
+
+
+def test_a_package_gets_what_its_nodes_share_once():
+    entry = entered(TEXTS)
+    assert set(entry.added) == {
+        "demo/__init__.py",
+        "demo/node_main.py",
+        "launch/demo_launch.py",
+        "test/conftest.py",
+    }
+    again = entered({**TEXTS, **entry.added})
+    assert again.added == {}
+    assert set(again.edits) == {"setup.py", "package.xml", "launch/demo_launch.py"}
+
+
+def test_what_nodes_do_not_import_is_not_added():
+    assert "demo/node_main.py" not in entered(TEXTS, {"demo/heart.py": "import rclpy\n"}).added
+
+
+def test_another_module_of_the_name_is_in_the_way():
+    """It is added, so that the folder refuses to replace what differs."""
+    entry = entered({**TEXTS, "demo/node_main.py": "def other(): ...\n"})
+    assert "def until_shutdown" in entry.added["demo/node_main.py"]
+
+
+def test_a_new_launch_file_is_installed_and_lists_the_node():
+    entry = entered(TEXTS, lifecycle=True)
+    setup = entry.edits["setup.py"]
+    assert isinstance(setup, Edited)
+    assert "'heart = demo.heart:main'" in setup.text
+    assert "('share/demo/launch', ['launch/demo_launch.py'])" in setup.text
+    assert "LifecycleNode(" in entry.added["launch/demo_launch.py"]
+
+
+def test_what_cannot_be_edited_is_refused_but_for_the_launch_file():
+    launch = "x = LaunchDescription(nodes())\n"
+    texts = {**TEXTS, "setup.py": "def f(:", "launch/some.launch.py": launch}
+    entry = entered(texts)
+    assert isinstance(entry.edits["setup.py"], Refused)
+    ((path, note),) = entry.notes
+    assert path == "launch/some.launch.py"
+    assert "Node(package='demo', executable='heart', output='screen')" in note
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ([], "launch/demo_launch.py"),
+        (["demo.launch.py", "other.launch.py"], "launch/demo.launch.py"),
+        (["demo.launch.py", "demo_launch.py"], "launch/demo_launch.py"),
+        (["other.launch.py", "notes.md"], "launch/other.launch.py"),
+        (["one.launch.py", "two.launch.py"], "launch/demo_launch.py"),
+    ],
+)
+def test_the_launch_file_of_the_package_is_chosen(names, expected):
+    assert expected in enter_node.paths("demo", names)
