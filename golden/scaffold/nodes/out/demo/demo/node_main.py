@@ -24,6 +24,9 @@ Main = Callable[..., None]
 class WakingExecutor(SingleThreadedExecutor):
     """An executor that wakes up once a second: rclpy can miss a signal while it starts."""
 
+    # `__del__` asks for it even where a signal ended `__init__` before it was there
+    _sigint_gc: Any = None
+
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for one callback and run it, but never wait without end."""
         super().spin_once(1.0 if timeout_sec is None else timeout_sec)
