@@ -20,31 +20,25 @@ os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
 from my_robot_controller.action import Countdown
 from my_robot_controller.msg import RobotCommand
 from my_robot_controller.srv import AddTwoInts
-from rich.console import Console
-from rich.panel import Panel
-from rich.text import Text
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-console = Console(highlight=False, width=min(100, Console().width))
-
 
 def stop(title: str) -> None:
-    console.print()
-    console.rule(f"[bold]{title}", align="left")
+    print()
+    print(f"{title}\n{'-' * len(title)}")
 
 
 def show(code: str, result: object) -> None:
     """Print an expression and what it gave."""
-    console.print(Text(f">>> {code}", "cyan"))
-    console.print(Text(str(result)), soft_wrap=True)
+    print(f">>> {code}")
+    print(result)
 
 
 def a_class_with_documentation() -> None:
     stop("1  A message is a documented, typed dataclass")
-    documentation = Text(inspect.getdoc(RobotCommand) or "")
-    console.print(Panel(documentation, title="RobotCommand.__doc__", expand=False))
+    print(f"RobotCommand.__doc__:\n\n{inspect.getdoc(RobotCommand)}\n")
     show("RobotCommand()", RobotCommand())
     show(
         "RobotCommand(command_type=RobotCommand.MOVE, linear_velocity_x=0.5)",
@@ -171,4 +165,4 @@ if __name__ == "__main__":
     a_class_with_documentation()
     the_wire_without_ros()
     with_rclpy(publish_and_subscribe, call_a_service, run_an_action, meet_rosidl)
-    console.print("\n[green]All of it agreed.[/] Look into build/demo to see what was written.")
+    print("\nAll of it agreed. Look into build/demo to see what was written.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from idlc.cli import output
@@ -18,8 +18,8 @@ from idlc.disk.scope import scope
 from idlc.disk.setup_command import distribution_class
 from idlc.driver.gen import GenOptions, gen
 from idlc.driver.libraries import Libraries, libraries_of
-from idlc.driver.query import describe
 from idlc.driver.stages import models_of
+from idlc.model.link import Model
 from idlc.scaffold import new_interface
 
 
@@ -65,17 +65,22 @@ def _compile(package: str) -> tuple[Iterable[str], Libraries]:
         return (), Libraries({})
     (given,) = found
     gen(GenOptions(paths=(".",), out=package, scope=where), report)
-    project = Project(".", report)
+    ((_, model),) = models_of(found, where, Report())
     files = dict([new_interface.index(package, given.digests)])
-    for one in given.files:
-        if not report.had_errors:
-            content = json.dumps(describe(one.file.shown, where, report), indent=2)
-            files[f"{new_interface.RESOURCE}/{one.file.kind}/{one.file.name}.json"] = content + "\n"
-    planned = None if report.had_errors else project.plan({}, files)
-    if planned is not None:
-        project.apply(planned[0])
+    if not report.had_errors:
+        files |= dict(_described(model))
+        project = Project(".", report)
+        planned = project.plan({}, files)
+        if planned is not None:
+            project.apply(planned[0])
     output.show(report, "text", sys.stderr)
     if report.had_errors:
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    ((_, model),) = models_of(found, where, Report())
     return files, libraries_of(model)
+
+
+def _described(model: Model) -> Iterator[tuple[str, str]]:
+    """Yield the description of each interface that ROS 2 installs, and its path."""
+    for own in model.own:
+        content = json.dumps(model.describer.installed(str(own.name)), indent=2)
+        yield f"{new_interface.RESOURCE}/{own.name.kind}/{own.name.name}.json", content + "\n"

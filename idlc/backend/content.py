@@ -56,7 +56,6 @@ def compiled(
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
     if report.had_errors or manifest is None:
         return None
-    (classes / "__init__.py").write_text(f'"""Interfaces of {name}."""\n', encoding="utf-8")
     ((_, model),) = models_of((given,), where, Report())
     libraries = libraries_of(model, distribution)
     files = shared(model, manifest, libraries, report)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-import sysconfig
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -18,7 +17,7 @@ from idlc.cli import output
 from idlc.cli.exit_status import ended
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject
+from idlc.disk import environment, pyproject
 from idlc.disk.distribution import Distribution
 from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.read import reason
@@ -131,8 +130,7 @@ def _packed(
 
     class Builder(WheelBuilder):
         def get_default_build_data(self) -> dict[str, Any]:
-            platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
-            tag = f"py3-none-{platform if content.native else 'any'}"
+            tag = f"py3-none-{environment.wheel_platform() if content.native else 'any'}"
             return {**super().get_default_build_data(), "tag": tag}
 
     for path, data in content.prefix.items():

@@ -145,6 +145,5 @@ def _held(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
         one = waiting.pop()
         if one not in found:
             found.add(one)
-            elements = (ir.element_of(field.type) for field in model.messages[one].fields)
-            waiting += [each.target for each in elements if isinstance(each, ir.Ref)]
+            waiting += model.messages[one].references
     return found

@@ -7,6 +7,9 @@ import sys
 from importlib.machinery import PathFinder
 from pathlib import Path
 
+#: Where a prefix lists what is installed in it, by kind and name.
+INDEX = "share/ament_index/resource_index"
+
 
 def ament_prefixes() -> tuple[Path, ...]:
     """Return the folders that ROS packages are installed in, in order of precedence."""
@@ -44,3 +47,10 @@ def machine() -> str:
     import platform  # slow to import, for what few runs ask
 
     return platform.machine()
+
+
+def wheel_platform() -> str:
+    """Return how the tags of wheels call this machine, such as `linux_x86_64`."""
+    import sysconfig
+
+    return sysconfig.get_platform().replace("-", "_").replace(".", "_")

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
+from idlc.disk.environment import INDEX
 from idlc.disk.read import is_file, is_folder, read_bytes, shown
 from idlc.model.names import is_package_name
-
-_INDEX = Path("share", "ament_index", "resource_index")
 
 
 class Installed(NamedTuple):
@@ -36,21 +35,21 @@ class Installed(NamedTuple):
 
 def prefixes(folder: Path) -> list[Path]:
     """Return the prefixes that a folder is or holds: colcon makes one for each package."""
-    if is_folder(folder / _INDEX):
+    if is_folder(folder / INDEX):
         return [folder]
     try:
         inner = sorted(folder.iterdir())
     except OSError:
         return []
-    return [path for path in inner if is_folder(path / _INDEX)]
+    return [path for path in inner if is_folder(path / INDEX)]
 
 
 def installed(prefix: Path) -> Iterator[Installed]:
     """Yield the packages of a prefix that have interfaces and are in its index."""
     try:
-        names = sorted(path.name for path in (prefix / _INDEX / "rosidl_interfaces").iterdir())
+        names = sorted(path.name for path in (prefix / INDEX / "rosidl_interfaces").iterdir())
     except OSError:
         return
     for name in names:
-        if is_package_name(name) and is_file(prefix / _INDEX / "packages" / name):
+        if is_package_name(name) and is_file(prefix / INDEX / "packages" / name):
             yield Installed(prefix, name)

@@ -20,7 +20,8 @@ class Scope(msgspec.Struct, frozen=True):
     """The package's name if it was given, folders with other packages, files that are left out.
 
     `out` is the folder that [tool.idlc] compiles `paths` into; its name may be the package's.
-    `distros` are the distributions of ROS 2 that files are read for, one except for `check`.
+    `distros` are the distributions of ROS 2 that files are read for, one except for `check`;
+    none means the one that is installed.
     """
 
     package: str | None = None
@@ -28,12 +29,12 @@ class Scope(msgspec.Struct, frozen=True):
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
-    distros: tuple[Distro, ...] = (DEFAULT,)
+    distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros(()))
 
     @property
     def distro(self) -> Distro:
         """The distribution that files are read for where that is one."""
-        return self.distros[0]
+        return self.distros[0] if self.distros else _installed()
 
 
 def scope(
@@ -58,6 +59,10 @@ def scope(
 
 
 def _distros(names: Sequence[str]) -> tuple[Distro, ...]:
-    """Return the distributions with these names; for none, the one that is installed here."""
-    found = dict.fromkeys(BY_NAME[name] for name in names or (distribution().name,) if name)
-    return tuple(found) or (DEFAULT,)
+    """Return the distributions with these names, each once."""
+    return tuple(dict.fromkeys(BY_NAME[name] for name in names))
+
+
+def _installed() -> Distro:
+    """Return the distribution that is installed here, or the default for an unknown one."""
+    return BY_NAME.get(distribution().name, DEFAULT)

@@ -8,16 +8,16 @@ from __future__ import annotations
 import os
 import re
 import sys
-import sysconfig
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from idlc.disk import environment
 from idlc.disk.read import reason
 
 #: By an entry here, recorders and others take a package for one whose library can be loaded.
-INDEX = "share/ament_index/resource_index/packages"
+INDEX = f"{environment.INDEX}/packages"
 #: How a file is called until it is whole.
 NEW = ".new"
 #: The commands of setup.py by which pip installs.
@@ -43,7 +43,7 @@ def distribution_class(package: str, libraries: Mapping[str, bytes], missing: st
         if _WHEELS & set(self.commands):
             added |= _launchers(package, self.entry_points)
         if libraries:
-            tag = ("idlc", re.sub(r"[-.]", "_", sysconfig.get_platform()))
+            tag = ("idlc", environment.wheel_platform())
             self.get_option_dict("bdist_wheel").setdefault("plat_name", tag)
         listed = list(self.data_files or ())
         if missing:

@@ -82,7 +82,7 @@ def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnost
             report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
     found: dict[str, Report] = {}
     texts: dict[str, Source] = {}
-    for distro in scope.distros:
+    for distro in scope.distros or (scope.distro,):
         found[distro.name] = Report()
         narrowed = msgspec.structs.replace(scope, distros=(distro,))
         alone = msgspec.structs.replace(options, scope=narrowed)

@@ -6,15 +6,15 @@ import json
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
+from idlc.disk.environment import INDEX
 from idlc.driver.libraries import Libraries
 from idlc.export.idl import idl
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
 
-_INDEX = "share/ament_index/resource_index"
 #: The list of the packages that have interfaces, each a file with their names.
-INTERFACES = f"{_INDEX}/rosidl_interfaces"
+INTERFACES = f"{INDEX}/rosidl_interfaces"
 
 
 def shared(
@@ -34,7 +34,7 @@ def shared(
         described = model.describer.installed(str(own.name))
         found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
     found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
-    found[f"{_INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
+    found[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
     found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
     if libraries.missing:
         report.notes.append(
@@ -42,7 +42,7 @@ def shared(
             f"without a library: {libraries.missing}"
         )
     else:
-        found[f"{_INDEX}/packages/{name}"] = ""
+        found[f"{INDEX}/packages/{name}"] = ""
     return found
 
 

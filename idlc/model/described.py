@@ -67,19 +67,12 @@ def _messages(
             raise NotBelievedError(f"it describes `{message.name}` twice")
         messages[message.name] = message
     for message in messages.values():
-        for _, target in _references(message):
+        for target in message.references:
             if target not in messages:
                 raise NotBelievedError(f"it does not describe `{target}`")
-    if next(circles(messages, lambda name: _references(messages[name]), set()), None):
+    if next(circles(messages, lambda name: messages[name].holders, set()), None):
         raise NotBelievedError("it describes a message that contains itself")
     yield from messages.items()
-
-
-def _references(message: ir.Message) -> Iterator[tuple[ir.Field, ir.TypeName]]:
-    for field in message.fields:
-        element = ir.element_of(field.type)
-        if isinstance(element, ir.Ref):
-            yield field, element.target
 
 
 def _message(part: IndividualDict, who: str) -> ir.Message:

@@ -185,10 +185,15 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
         return self.fields or (Field(name=DUMMY_FIELD, type=Primitive("uint8")),)
 
     @property
+    def holders(self) -> tuple[tuple[Field, TypeName], ...]:
+        """The fields whose types name structures, each with that structure, in order."""
+        elements = ((field, element_of(field.type)) for field in self.fields)
+        return tuple((field, one.target) for field, one in elements if isinstance(one, Ref))
+
+    @property
     def references(self) -> tuple[TypeName, ...]:
         """The structures that the fields' types name, once for each field, in order."""
-        elements = (element_of(field.type) for field in self.fields)
-        return tuple(element.target for element in elements if isinstance(element, Ref))
+        return tuple(target for _, target in self.holders)
 
 
 class Service(msgspec.Struct, frozen=True, kw_only=True):

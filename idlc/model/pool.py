@@ -96,10 +96,7 @@ class Pool:
 def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
     """Yield the fields that hold messages of other files, derived structures' included."""
     for message in derive.messages(interface):
-        for field in message.fields:
-            element = ir.element_of(field.type)
-            if isinstance(element, ir.Ref) and element.target.kind == "msg":
-                yield field, element.target
+        yield from (one for one in message.holders if one[1].kind == "msg")
 
 
 def check_packages(pool: Pool, report: Report) -> None:

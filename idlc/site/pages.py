@@ -9,7 +9,7 @@ from idlc.diagnostics.visible import printable
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.site.front import About, first_line, front
-from idlc.site.view import Pages, page, prefix, targets
+from idlc.site.view import Pages, page, prefix
 from idlc.templating import RenderedFile, html, verbatim
 
 
@@ -52,7 +52,7 @@ def _path(name: ir.TypeName) -> str:
 def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
     found: dict[ir.TypeName, set[ir.TypeName]] = {}
     for interface in interfaces:
-        for target in targets(interface):
+        for target in derive.references(interface):
             found.setdefault(target, set()).add(interface.name)
     return found
 

@@ -99,7 +99,7 @@ def page(interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pa
         what=KINDS[own.kind],
         words=words(own.name),
         sections=[_section(title, part, prefix(interface, part), pages) for title, part in parts],
-        picture=picture(own, users, set(targets(interface)), pages),
+        picture=picture(own, users, derive.references(interface), pages),
         users=[_link(user, str(user), pages) for user in sorted(users)],
         hash=model.describer.hash(str(own)),
         source="\n".join(interface.source.text.splitlines()) if interface.source else "",
@@ -109,13 +109,6 @@ def page(interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pa
 def words(name: str) -> list[str]:
     """Return the pieces of a name between which it may break."""
     return re.split(r"(?<=[_/.])|(?<=[a-z0-9])(?=[A-Z])", name)
-
-
-def targets(interface: ir.Interface) -> set[ir.TypeName]:
-    """Return the types that an interface refers to."""
-    fields = (field for part in derive.sections(interface) for field in part.fields)
-    elements = (ir.element_of(field.type) for field in fields)
-    return {element.target for element in elements if isinstance(element, ir.Ref)}
 
 
 def prefix(interface: ir.Interface, part: ir.Message) -> str:

@@ -32,12 +32,9 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
     seen = {facts.name, *declared}
     for message in sections(model):
-        for field in message.fields:
-            element = ir.element_of(field.type)
-            if not isinstance(element, ir.Ref) or field.type_span is None:
-                continue
-            package = element.target.package
-            if package not in seen:
+        for field, target in message.holders:
+            package = target.package
+            if field.type_span is not None and package not in seen:
                 seen.add(package)
                 found = codes.MISSING_DEPENDENCY.at(
                     field.type_span,

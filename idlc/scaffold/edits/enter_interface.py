@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from idlc.emit.render import support_packages
-from idlc.model import catalog, derive, ir
+from idlc.model import catalog, derive
 from idlc.model.link import Model
 from idlc.scaffold import new_interface
 from idlc.scaffold.edits import cmake, data_files, package_xml
@@ -49,11 +49,5 @@ def depends(model: Model) -> list[str]:
     """Return the packages that a package depends on for its own interfaces."""
     implied = {p for one in model.own for p in derive.IMPLICIT_PACKAGES[one.name.kind]}
     implied &= {*catalog.packages(model.distro)}  # older distributions lack some
-    used = {
-        element.target.package
-        for one in model.own
-        for message in derive.sections(one)
-        for field in message.fields
-        if isinstance(element := ir.element_of(field.type), ir.Ref)
-    }
+    used = {target.package for one in model.own for target in derive.references(one)}
     return sorted((implied | used) - {model.package})
