@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
@@ -19,6 +21,8 @@ def types_and_paths(
     context: click.Context, _: click.Parameter, word: str
 ) -> list[CompletionItem[str]]:
     """Offer types and, in the shell's own way, files."""
+    from click.shell_completion import CompletionItem  # the other commands need none
+
     from idlc.driver import completion
 
     found = completion.types(word, _include(context))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
-from idlc.emit.pynames import why_not_package
+from idlc.emit.package_name import why_not_package
 from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"
