@@ -14,7 +14,7 @@ def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]
     """Offer packages."""
     from idlc.driver import completion
 
-    return completion.packages(word, _include(context))
+    return completion.packages(word, _include(context), context.params.get("distro"))
 
 
 def types_and_paths(
@@ -25,7 +25,7 @@ def types_and_paths(
 
     from idlc.driver import completion
 
-    found = completion.types(word, _include(context))
+    found = completion.types(word, _include(context), distro=context.params.get("distro"))
     # bash forgets what was offered before files
     return [CompletionItem(word, type="file"), *map(CompletionItem, found)]
 
