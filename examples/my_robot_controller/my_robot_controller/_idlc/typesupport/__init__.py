@@ -52,10 +52,10 @@ def _road() -> ModuleType:
             "with colcon"
         )
     if middleware in _OPAQUE:
-        from . import fastrtps as road
+        from . import fastrtps as implementation
     else:
-        from . import structs as road  # type: ignore[no-redef]
-    return road
+        from . import structs as implementation  # type: ignore[no-redef]
+    return implementation
 
 
 def _name(cls: Any) -> str:
