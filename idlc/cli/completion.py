@@ -28,6 +28,15 @@ def types_and_paths(
     return [_item(word, "file"), *map(_item, found)]
 
 
+def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
+    """Offer the topics of the recordings that were typed."""
+    from idlc.driver import completion
+
+    typed: Any = context.params.get("paths") or (context.params.get("wanted"),)
+    # what comes before an option without its value is left as it was typed
+    return completion.topics(word, [path for path in (*typed, *context.args) if path])
+
+
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
     from idlc.driver import completion

@@ -1,0 +1,143 @@
+"""What is in a .db3 file of rosbag2, which is an SQLite database.
+
+Such a file can come from anybody. It is opened for reading only, nothing that it defines besides
+tables is accepted, and values are taken only of the types that a recorder writes.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import quote
+
+from idlc.recordings.errors import RecordingError
+
+MAGIC = b"SQLite format 3\0"
+#: Hidden columns of these kinds are computed by the file.
+COMPUTED = {2, 3}
+
+
+class Db3Topic(NamedTuple):
+    """A row of `topics`, with the definition that goes with it."""
+
+    id: int
+    name: str
+    type: str
+    encoding: str
+    hash: str
+    schema_encoding: str
+    text: str
+    messages: int
+
+
+class Db3:
+    """An open .db3 file."""
+
+    def __init__(self, path: Path) -> None:
+        self.name = str(path)
+        # what a recorder has not yet written back stands in a second file
+        written_back = not _has_content(path.with_name(path.name + "-wal"))
+        mode = "mode=ro&immutable=1" if written_back else "mode=ro"
+        with self.errors():
+            location = f"file:{quote(str(path.resolve()))}?{mode}"
+            self._db = sqlite3.connect(location, uri=True, check_same_thread=False)
+            for pragma in ("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON"):
+                self._db.execute(f"PRAGMA {pragma}")
+        try:
+            self.columns = self._tables()
+        except RecordingError:
+            self._db.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._db.close()
+
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Turn what SQLite finds wrong into an error about the recording."""
+        try:
+            yield
+        except (sqlite3.Error, OverflowError, UnicodeError) as error:
+            raise RecordingError(f"`{self.name}` cannot be read: {error}") from None
+
+    def rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+        """Yield what a query finds."""
+        with self.errors():
+            yield from self._db.execute(query, values)
+
+    def _tables(self) -> dict[str, set[str]]:
+        """Return each table's columns; raise RecordingError if there are others than plain ones."""
+        found: dict[str, set[str]] = {}
+        for kind, name, text in self.rows("SELECT type, name, sql FROM sqlite_master"):
+            if kind == "index":
+                continue
+            if kind != "table" or str(text).split()[1:2] != ["TABLE"]:
+                kind = kind if kind != "table" else "virtual table"
+                raise RecordingError(
+                    f"`{self.name}` holds a {kind}, `{name}`, as no recording does"
+                )
+            quoted = '"' + str(name).replace('"', '""') + '"'
+            columns = list(self.rows(f"PRAGMA table_xinfo({quoted})"))
+            if any(column[6] in COMPUTED for column in columns):
+                raise RecordingError(f"`{self.name}`: columns of `{name}` are computed")
+            found[str(name)] = {str(column[1]) for column in columns}
+        for table, needed in (
+            ("topics", {"id", "name", "type"}),
+            ("messages", {"topic_id", "data"}),
+        ):
+            if not needed <= found.get(table, set()):
+                raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
+        return found
+
+    def topics(self) -> list[Db3Topic]:
+        """Return the topics, with their definitions where the file has any."""
+        columns = self.columns["topics"]
+        encoding = "serialization_format" if "serialization_format" in columns else "'cdr'"
+        digest = "type_description_hash" if "type_description_hash" in columns else "''"
+        query = f"SELECT id, name, type, {encoding}, {digest} FROM topics ORDER BY id"  # noqa: S608 # ours
+        definitions, counts = self._definitions(), self._counts()
+        topics = []
+        for number, *texts in self.rows(query):
+            if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
+                raise RecordingError(f"`{self.name}`: a topic has values of other types")
+            name, kind, encoding, digest = texts
+            # the definition of a service goes with its events
+            known = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
+            schema_encoding, text, other = known or ("", "", "")
+            definition = (digest or other, schema_encoding, text, counts.get(number, 0))
+            topics.append(Db3Topic(number, name, kind, encoding, *definition))
+        return topics
+
+    def _definitions(self) -> dict[str, tuple[str, str, str]]:
+        """Return encoding, text and hash of each type."""
+        columns = self.columns.get("message_definitions", set())
+        if not {"topic_type", "encoding", "encoded_message_definition"} <= columns:
+            return {}
+        digest = "type_description_hash" if "type_description_hash" in columns else "''"
+        # the text may be in any encoding, as comments are
+        names = f"topic_type, encoding, CAST(encoded_message_definition AS BLOB), {digest}"
+        found: dict[str, tuple[str, str, str]] = {}
+        for kind, *texts in self.rows(f"SELECT {names} FROM message_definitions ORDER BY rowid"):  # noqa: S608 # ours
+            encoding, text, other = (
+                str(one, "utf-8", "replace") if isinstance(one, bytes) else str(one or "")
+                for one in texts
+            )
+            if not found.get(kind, ("", "", ""))[1]:
+                found[kind] = ("" if encoding == "unknown" else encoding, text, other)
+        return found
+
+    def _counts(self) -> dict[int, int]:
+        return dict(
+            self.rows("SELECT topic_id, COUNT(*) FROM messages NOT INDEXED GROUP BY topic_id")
+        )
+
+
+def _has_content(path: Path) -> bool:
+    try:
+        return path.stat().st_size > 0
+    except OSError:
+        return False

@@ -1,0 +1,207 @@
+"""What is in an MCAP file: from its summary, or from a walk over its records where that has none.
+
+The summary is at the end, so a recorder that died wrote none, and other writers leave parts of it
+out. It is believed only if it accounts for all that its own statistics count.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from idlc.recordings import mcap_records as mcap
+from idlc.recordings.compression import decompressed
+from idlc.recordings.errors import RecordingError
+from idlc.recordings.mcap_records import HEAD, MAGIC, Channel, Chunk, McapSchema
+from idlc.recordings.source import Source
+
+END_OF_TIME = (1 << 64) - 1
+
+
+@dataclass
+class McapFacts:
+    """What a file holds; `counts` is by channel and None if nothing counted them."""
+
+    schemas: dict[int, McapSchema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[Chunk] = field(default_factory=list)
+    counts: dict[int, int] | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, op: int, data: memoryview) -> None:
+        """Take note of a schema or a channel; the first of an id counts."""
+        if op == mcap.SCHEMA_OP:
+            schema = mcap.schema(data)
+            self.schemas.setdefault(schema.id, schema)
+        elif op == mcap.CHANNEL_OP:
+            channel = mcap.channel(data)
+            self.channels.setdefault(channel.id, channel)
+
+
+def read_facts(source: Source, index: bool = True, check: bool = False) -> McapFacts:
+    """Return what a file holds; without `index`, whatever its summary says.
+
+    `check` compares the summary's checksum.
+    """
+    if source.size < len(MAGIC) or source.view(0, len(MAGIC)) != MAGIC:
+        raise RecordingError(f"`{source.name}` is no MCAP file: it begins with other bytes")
+    reason = "its index is not used"
+    if index:
+        try:
+            return _summary(source, check)
+        except RecordingError as error:
+            reason = error.message
+    return _walk(source, reason)
+
+
+def _summary(source: Source, check: bool) -> McapFacts:
+    """Return what the summary says; raise RecordingError if it is not to be relied on."""
+    end = source.size - mcap.FOOTER.size - len(MAGIC)
+    if end < len(MAGIC) or source.view(source.size - len(MAGIC), len(MAGIC)) != MAGIC:
+        raise RecordingError("it was not closed")
+    op, size, start, _, crc = mcap.FOOTER.unpack(source.view(end, mcap.FOOTER.size))
+    if (op, size) != (mcap.FOOTER_OP, mcap.FOOTER.size - HEAD.size):
+        raise RecordingError("it has no footer")
+    if not len(MAGIC) <= start <= end:
+        raise RecordingError("it has no summary")
+    data = source.view(start, end - start)
+    if check and crc:
+        covered = source.view(start, source.size - len(MAGIC) - 4 - start)
+        if zlib.crc32(covered) != crc:
+            raise RecordingError("the checksum of its summary is wrong")
+    facts, statistics = McapFacts(), None
+    for op, _, content in mcap.records(data):
+        facts.add(op, content)
+        if op == mcap.CHUNK_INDEX_OP:
+            facts.chunks.append(mcap.chunk_index(content))
+        elif op == mcap.STATISTICS_OP:
+            statistics = mcap.statistics(content)
+    _believe(facts, statistics, start)
+    return facts
+
+
+def _believe(facts: McapFacts, statistics: mcap.Statistics | None, start: int) -> None:
+    """Raise RecordingError if a summary leaves something out, by its own count."""
+    if statistics is None:
+        raise RecordingError("its summary has no statistics")
+    if statistics.chunks != len(facts.chunks):
+        raise RecordingError("its summary names other chunks than it counts")
+    if not statistics.counts.keys() <= facts.channels.keys():
+        raise RecordingError("its summary does not name all channels")
+    if any(one.schema and one.schema not in facts.schemas for one in facts.channels.values()):
+        raise RecordingError("its summary does not name all schemas")
+    if statistics.messages != sum(statistics.counts.values()):
+        raise RecordingError("its summary counts messages in two ways")
+    if any(chunk.at + chunk.size > start for chunk in facts.chunks):
+        raise RecordingError("its summary names chunks that are not there")
+    facts.chunks.sort(key=lambda chunk: chunk.at)
+    if statistics.messages and not facts.chunks:
+        facts.chunks = [Chunk(len(MAGIC), start - len(MAGIC), 0, END_OF_TIME, None, None)]
+    facts.counts = dict.fromkeys(facts.channels, 0) | statistics.counts
+
+
+class _Walk:
+    """A walk over all records of a file, which goes from head to head and opens what it must."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.facts = McapFacts(counts={})
+        self.loose: tuple[int, int] | None = None
+        self.last: Chunk | None = None
+        self.offsets = bytearray()
+
+    def heads(self) -> Iterator[tuple[int, int, int]]:
+        """Yield kind, place and size, with the head, of each record that is there as a whole."""
+        at = len(MAGIC)
+        while at + HEAD.size <= self.source.size:
+            op, size = HEAD.unpack(self.source.view(at, HEAD.size))
+            if not op or at + HEAD.size + size > self.source.size:
+                return
+            yield op, at, HEAD.size + size
+            at += HEAD.size + size
+            if op == mcap.DATA_END_OP:
+                return
+
+    def content(self, at: int, size: int) -> memoryview:
+        """Return what a record holds."""
+        return self.source.view(at + HEAD.size, size - HEAD.size)
+
+    def count(self, channel: int, messages: int) -> None:
+        """Count messages of a channel."""
+        assert self.facts.counts is not None
+        self.facts.counts[channel] = self.facts.counts.get(channel, 0) + messages
+
+    def message(self, at: int, size: int) -> None:
+        """Take note of a message outside of any chunk."""
+        if size >= HEAD.size + 2:
+            self.count(int.from_bytes(self.source.view(at + HEAD.size, 2), "little"), 1)
+        start = self.loose[0] if self.loose else at
+        self.loose = (start, at + size)
+
+    def end_of_loose(self) -> None:
+        """Make one stretch of the messages outside of chunks until here."""
+        if self.loose:
+            start, end = self.loose
+            chunk = Chunk(start, end - start, 0, END_OF_TIME, None, None)
+            self.facts.chunks.append(chunk)
+            self.loose = None
+
+    def chunk(self, at: int, size: int) -> None:
+        """Take note of a chunk."""
+        head = mcap.chunk_head(self.content(at, size))
+        self.last = Chunk(at, size, head.first, head.last, head.compression, None)
+
+    def index(self, at: int, size: int) -> None:
+        """Take note of the index of one channel in the chunk before it."""
+        fields = mcap.Fields(self.content(at, size), "the index of a chunk")
+        channel, entries = fields.number(2), fields.number(4)
+        self.count(channel, entries // 16)
+        self.offsets += mcap.INDEX_OFFSET.pack(channel, at)
+
+    def end_of_chunk(self) -> None:
+        """Keep the chunk before; open it if it alone can say what its channels are."""
+        if self.last is None:
+            return
+        known = self.facts.channels.keys()
+        named = {found for found, _ in mcap.INDEX_OFFSET.iter_unpack(self.offsets)}
+        if not named or not named <= known:
+            self.open(self.last, counting=not named)
+        self.facts.chunks.append(self.last._replace(indexes=bytes(self.offsets) or None))
+        self.last, self.offsets = None, bytearray()
+
+    def open(self, chunk: Chunk, counting: bool) -> None:
+        """Take note of what stands in a chunk."""
+        head = mcap.chunk_head(self.content(chunk.at, chunk.size))
+        for op, _, data in mcap.records(decompressed(head.records, head.compression, head.size)):
+            self.facts.add(op, data)
+            if counting and op == mcap.MESSAGE_OP and len(data) >= 2:
+                self.count(int.from_bytes(data[:2], "little"), 1)
+
+
+def _walk(source: Source, reason: str) -> McapFacts:
+    """Return what the whole records of a file say; `reason` is why its summary is not used."""
+    walk, ended, end = _Walk(source), False, len(MAGIC)
+    for op, at, size in walk.heads():
+        end = at + size
+        if op == mcap.MESSAGE_INDEX_OP and walk.last:
+            walk.index(at, size)
+            continue
+        walk.end_of_chunk()
+        if op == mcap.MESSAGE_OP:
+            walk.message(at, size)
+        elif op == mcap.CHUNK_OP:
+            walk.end_of_loose()
+            walk.chunk(at, size)
+        elif op in (mcap.SCHEMA_OP, mcap.CHANNEL_OP):
+            walk.facts.add(op, walk.content(at, size))
+        ended = op == mcap.DATA_END_OP
+    walk.end_of_chunk()
+    walk.end_of_loose()
+    if ended:
+        walk.facts.notes.append(f"{reason}: read from its records")
+    else:
+        left = source.size - end
+        rest = f", {left:,} bytes are left out" if left else ""
+        walk.facts.notes.append(f"{reason}: read to its last whole record{rest}")
+    return walk.facts

@@ -1,0 +1,86 @@
+"""The bytes of a file, wherever it is: mapped into memory, or read in ranges."""
+
+from __future__ import annotations
+
+import mmap
+import threading
+from pathlib import Path
+from typing import Any, Protocol
+
+from idlc.recordings.errors import RecordingError
+
+
+class Source(Protocol):
+    """A file that does not change."""
+
+    name: str
+    size: int
+
+    def view(self, start: int, size: int) -> memoryview:
+        """Return so many bytes; raise RecordingError if the file has fewer."""
+
+    def close(self) -> None:
+        """Release the file; views that somebody holds stay valid."""
+
+
+class MappedFile:
+    """A local file, of which nothing is copied."""
+
+    def __init__(self, path: Path) -> None:
+        self.name = str(path)
+        try:
+            with path.open("rb") as file:
+                self.size = file.seek(0, 2)
+                mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if self.size else b""
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise RecordingError(f"`{path}` cannot be read: {reason}") from None
+        self._bytes = memoryview(mapped)
+
+    def view(self, start: int, size: int) -> memoryview:
+        """Return a view of the mapped file."""
+        within(self, start, size)
+        return self._bytes[start : start + size]
+
+    def close(self) -> None:
+        """Forget the map, which lives as long as views of it."""
+        self._bytes = memoryview(b"")
+        self.size = 0
+
+
+class OpenedFile:
+    """A binary file object that can seek, such as fsspec's on an object store."""
+
+    def __init__(self, file: Any, name: str) -> None:
+        self.name = name
+        self._file = file
+        self._lock = threading.Lock()
+        try:
+            self.size = int(file.seek(0, 2))
+        except (OSError, ValueError) as error:
+            raise RecordingError(f"`{name}` cannot be read: {error}") from None
+
+    def view(self, start: int, size: int) -> memoryview:
+        """Return bytes that are read now."""
+        within(self, start, size)
+        try:
+            with self._lock:
+                self._file.seek(start)
+                found = self._file.read(size)
+        except (OSError, ValueError) as error:
+            raise RecordingError(f"`{self.name}` cannot be read: {error}") from None
+        if len(found) != size:
+            raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
+        return memoryview(found)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+def within(source: Source, start: int, size: int) -> None:
+    """Raise RecordingError if a file does not have these bytes."""
+    if min(start, size) < 0 or start + size > source.size:
+        raise RecordingError(
+            f"`{source.name}`: {size} bytes expected at byte {start}, the file has {source.size}"
+        )
