@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from idlc.recordings import bag
 from idlc.recordings.db3 import MAGIC as DB3_MAGIC
-from idlc.recordings.db3 import Db3
-from idlc.recordings.errors import RecordingError
+from idlc.recordings.db3 import Db3, Rows
+from idlc.recordings.errors import RecordingError, of_file
 from idlc.recordings.mcap import McapFacts, read_facts
 from idlc.recordings.mcap_records import MAGIC as MCAP_MAGIC
 from idlc.recordings.mcap_records import Chunk
 from idlc.recordings.source import MappedFile, OpenedFile, Source
+
+if TYPE_CHECKING:
+    from idlc.recordings.messages import Messages, Window
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -49,13 +52,10 @@ class McapFile:
 
     def __init__(self, source: Source, index: bool, check: bool) -> None:
         self.source = source
+        self.check = check
         self.name = source.name
-        try:
+        with of_file(self.name):
             self.facts: McapFacts = read_facts(source, index, check)
-        except RecordingError as error:
-            if source.name in error.message:
-                raise
-            raise RecordingError(f"`{source.name}`: {error.message}", error.hint) from None
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
         self.topics: list[tuple[Topic, int]] = [self._topic(one) for one in self.facts.channels]
 
@@ -69,10 +69,19 @@ class McapFile:
         digest = channel.metadata.get("topic_type_hash") or None
         return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
 
-    @property
-    def chunks(self) -> list[Chunk]:
-        """Where messages are."""
-        return self.facts.chunks
+    def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
+        """Return where messages of some channels may be."""
+        from idlc.recordings.mcap_messages import may_have
+
+        return [one for one in self.facts.chunks if may_have(one, channels, window)]
+
+    def messages(
+        self, channels: Collection[int], pieces: Iterable[Chunk], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some channels in some chunks."""
+        from idlc.recordings.mcap_messages import messages
+
+        return messages(self.source, pieces, channels, window, self.check)
 
     def close(self) -> None:
         """Release the file."""
@@ -93,6 +102,18 @@ class Db3File:
             topic = Topic(one.name, name, one.messages, one.hash or None, one.encoding, schema)
             self.topics.append((topic, one.id))
 
+    def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
+        """Return where messages of some topics may be."""
+        return self.database.rows_of_messages()
+
+    def messages(
+        self, topics: Collection[int], pieces: Iterable[Rows], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some topics in some rows."""
+        from idlc.recordings.db3_messages import messages
+
+        return messages(self.database, pieces, topics, window)
+
     def close(self) -> None:
         """Close the file."""
         self.database.close()
@@ -106,6 +127,18 @@ class Container:
         self.files = files
         self.notes = (*notes, *(note for file in files for note in file.notes))
         self.topics: tuple[Topic, ...] = tuple(_merged(files))
+
+    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int]]]:
+        """Yield each file that has messages of a topic, and what it calls the topic."""
+        for file in self.files:
+            ids = [number for one, number in file.topics if _is_part_of(one, topic)]
+            if ids:
+                yield file, ids
+
+    def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
+        """Yield the messages of a topic, many at a time, in the order of the recording."""
+        for file, ids in self.ids_of(topic):
+            yield from file.messages(ids, file.pieces(ids, window), window)  # type: ignore[arg-type]
 
     def close(self) -> None:
         """Close all files."""
@@ -173,6 +206,12 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
+def _is_part_of(one: Topic, whole: Topic) -> bool:
+    """Return whether a channel belongs to a topic: definitions may be left out."""
+    same = (one.name, one.type, one.encoding) == (whole.name, whole.type, whole.encoding)
+    return same and one.schema in (whole.schema, None)
+
+
 def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     """Yield each topic once: several channels and files may have it."""
     found: dict[tuple[str, str, str], list[Topic]] = {}
@@ -182,12 +221,12 @@ def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     for same in found.values():
         texts = dict.fromkeys(topic.schema for topic in same if topic.schema)
         for schema in texts or [None]:
-            mine = [one for one in same if one.schema in (schema, None)]
+            whole = replace(same[0], schema=schema)
+            mine = [one for one in same if _is_part_of(one, whole)]
             counts = [one.count for one in mine]
             hashes = [one.hash for one in mine if one.hash]
             yield replace(
-                mine[0],
+                whole,
                 count=None if None in counts else sum(filter(None, counts)),
                 hash=hashes[0] if hashes else None,
-                schema=schema,
             )

@@ -33,6 +33,13 @@ class Db3Topic(NamedTuple):
     messages: int
 
 
+class Rows(NamedTuple):
+    """Messages from one row to another, which belongs to them."""
+
+    first: int
+    last: int
+
+
 class Db3:
     """An open .db3 file."""
 
@@ -109,6 +116,15 @@ class Db3:
             definition = (digest or other, schema_encoding, text, counts.get(number, 0))
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics
+
+    def rows_of_messages(self) -> list[Rows]:
+        """Return the rows that there are, in one piece; none if there are no messages."""
+        query = "SELECT MIN(rowid), MAX(rowid) FROM messages NOT INDEXED"
+        return [
+            Rows(first, last)
+            for first, last in self.rows(query)
+            if isinstance(first, int) and isinstance(last, int)
+        ]
 
     def _definitions(self) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""

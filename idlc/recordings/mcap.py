@@ -93,9 +93,14 @@ def _believe(facts: McapFacts, statistics: mcap.Statistics | None, start: int) -
         raise RecordingError("its summary does not name all schemas")
     if statistics.messages != sum(statistics.counts.values()):
         raise RecordingError("its summary counts messages in two ways")
-    if any(chunk.at + chunk.size > start for chunk in facts.chunks):
-        raise RecordingError("its summary names chunks that are not there")
     facts.chunks.sort(key=lambda chunk: chunk.at)
+    end = len(MAGIC)
+    for chunk in facts.chunks:
+        if chunk.at < end:
+            raise RecordingError("its summary names a chunk twice")
+        end = chunk.at + chunk.size
+    if end > start:
+        raise RecordingError("its summary names chunks that are not there")
     if statistics.messages and not facts.chunks:
         facts.chunks = [Chunk(len(MAGIC), start - len(MAGIC), 0, END_OF_TIME, None, None)]
     facts.counts = dict.fromkeys(facts.channels, 0) | statistics.counts

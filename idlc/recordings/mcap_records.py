@@ -164,13 +164,14 @@ def statistics(data: memoryview) -> Statistics:
 
 
 class ChunkHead(NamedTuple):
-    """What stands before the records of a chunk."""
+    """What stands before the records of a chunk, and these; they begin at `start`."""
 
     first: int
     last: int
     size: int
     crc: int
     compression: str
+    start: int
     records: memoryview
 
 
@@ -179,4 +180,5 @@ def chunk_head(data: memoryview) -> ChunkHead:
     fields = Fields(data, "a chunk")
     first, last, size, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
     compression = fields.name()
-    return ChunkHead(first, last, size, crc, compression, fields.take(fields.number(8)))
+    found = fields.take(fields.number(8))
+    return ChunkHead(first, last, size, crc, compression, fields.at - len(found), found)
