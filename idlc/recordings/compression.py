@@ -105,7 +105,7 @@ def _newer_zstd(data: memoryview, target: memoryview) -> int:
 
 def _lz4(data: memoryview, target: memoryview) -> int:
     try:
-        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+        from lz4.frame import LZ4FrameDecompressor
     except ImportError:
         raise missing("lz4", "chunks are compressed with lz4") from None
     try:

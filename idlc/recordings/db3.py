@@ -45,6 +45,7 @@ class Db3:
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
+        self.size = path.stat().st_size
         # what a recorder has not yet written back stands in a second file
         written_back = not _has_content(path.with_name(path.name + "-wal"))
         mode = "mode=ro&immutable=1" if written_back else "mode=ro"
@@ -125,6 +126,11 @@ class Db3:
             for first, last in self.rows(query)
             if isinstance(first, int) and isinstance(last, int)
         ]
+
+    def start(self) -> int | None:
+        """Return when the first message came."""
+        ((found,),) = self.rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
+        return found if isinstance(found, int) else None
 
     def _definitions(self) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""

@@ -64,6 +64,7 @@ class Statistics(NamedTuple):
 
     messages: int
     chunks: int
+    start: int
     counts: dict[int, int]
 
 
@@ -154,13 +155,13 @@ def statistics(data: memoryview) -> Statistics:
     fields = Fields(data, "the statistics")
     messages = fields.number(8)
     fields.take(2 + 4 + 4 + 4)
-    chunks = fields.number(4)
-    fields.take(8 + 8)
+    chunks, start = fields.number(4), fields.number(8)
+    fields.take(8)
     part, counts = fields.part(), {}
     while part.more():
         number = part.number(2)
         counts[number] = part.number(8)
-    return Statistics(messages, chunks, counts)
+    return Statistics(messages, chunks, start, counts)
 
 
 class ChunkHead(NamedTuple):

@@ -25,6 +25,12 @@ class Window(NamedTuple):
         before = self.end is not None and first >= self.end
         return not before and (self.start is None or last >= self.start)
 
+    def narrowed(self, start: int | None, end: int | None) -> Window:
+        """Return what this and another window have in common."""
+        starts = [one for one in (self.start, start) if one is not None]
+        ends = [one for one in (self.end, end) if one is not None]
+        return Window(max(starts, default=None), min(ends, default=None))
+
     def holds(self, times: Any) -> Any:
         """Return which of these times are in it, or None if all are."""
         if self.start is None and self.end is None:
@@ -36,6 +42,10 @@ class Window(NamedTuple):
         if self.end is not None and self.end < END_OF_TIME:
             inside &= times < max(self.end, 0)
         return inside
+
+
+#: The window that leaves nothing out.
+ALWAYS = Window()
 
 
 @dataclass(frozen=True)
