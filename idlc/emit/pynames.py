@@ -42,7 +42,7 @@ CODEC_NAMES = frozenset(
 #: The methods that a message class inherits; a field of such a name hides the method.
 METHODS = frozenset(
     {"deserialize", "deserialize_many", "from_dict", "get_fields_and_field_types", "serialize"}
-    | {"serialize_many", "to_columns", "to_dict", "validate"}
+    | {"serialize_many", "to_arrow", "to_columns", "to_dict", "validate"}
 )
 
 #: Modules that a starting Python has loaded, frozen or not, before it looks anywhere else.

@@ -10,6 +10,7 @@ from .typing_stub import Generic, TypeVar
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from dataclasses import Field
     from typing import Any
 
 Value = TypeVar("Value")
@@ -75,3 +76,24 @@ class OnDemand:
             return self._make(owner)
         except Exception as error:
             raise AttributeError(str(error)) from error
+
+
+def slot_types(kind: type) -> tuple[Any, ...]:
+    """Return SLOT_TYPES of a message class."""
+    from .on_demand import typeinfo
+
+    return typeinfo.slot_types(kind)
+
+
+def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
+    """Return what the module dataclasses asks a message class for."""
+    from .on_demand import fields
+
+    return fields.dataclass_fields(kind)
+
+
+def dataclass_params(_kind: type) -> Any:
+    """Return how dataclasses would have made a message class."""
+    from .on_demand.fields import PARAMETERS
+
+    return PARAMETERS

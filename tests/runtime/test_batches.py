@@ -216,17 +216,17 @@ def test_any_byte_but_zero_is_true_in_a_column(msg):
 
 def test_what_columns_cannot_hold_is_said(msg, runtime):
     two = [msg.Joints(position=[1.0] * count).serialize() for count in (2, 2, 3)]
-    with pytest.raises(ValueError, match=r"\[2\]\.position: has 3 elements and 2 in a message"):
-        msg.Joints.to_columns(two)
+    with pytest.raises(ValueError, match=r"\[2\]\.position: has 3 elements and 2 before"):
+        msg.Joints.to_columns(two, ragged=False)
     with pytest.raises(ValueError, match="text is a wstring"):
-        msg.Wide.to_columns([msg.Wide().serialize()])
+        msg.Wide.to_columns([msg.Wide().serialize()], ragged=False)
     good = msg.Header(frame_id="map").serialize()
-    with pytest.raises(runtime.DecodeError, match=r"^\[1\]\.frame_id: 4 bytes expected"):
+    with pytest.raises(runtime.DecodeError, match=r"^\[1\]\.frame_id: 4 bytes of text expected"):
         msg.Header.to_columns([good, good[:-4]])
     with pytest.raises(runtime.DecodeError, match=r"^\[0\]: the encapsulation header"):
         msg.Header.to_columns([b"\0"])
     huge = good[:12] + struct.pack("<I", 0xFFFF_FFFF) + good[16:]
-    with pytest.raises(runtime.DecodeError, match="bytes expected"):
+    with pytest.raises(runtime.DecodeError, match="bytes of text expected"):
         msg.Header.to_columns([huge])
 
 
@@ -242,11 +242,9 @@ def test_mutated_buffers_end_in_rows_or_in_an_error(msg, runtime):
                 assert len(cls.to_columns([raw])) == 1
 
 
-def test_thousands_of_layouts_are_refused(msg):
+def test_thousands_of_layouts(msg):
     buffers = [msg.Header(frame_id="x" * size).serialize() for size in range(1001)]
-    with pytest.raises(ValueError, match="more than 1000 different layouts"):
-        msg.Header.to_columns(buffers)
-    assert len(msg.Header.to_columns(buffers[:1000])) == 1000
+    assert msg.Header.to_columns(buffers)["frame_id"][-1] == b"x" * 1000
 
 
 # views

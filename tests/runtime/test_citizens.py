@@ -554,6 +554,7 @@ float32[] deserialize
 string to_dict
 int32[3] from_dict
 bool to_columns
+bool[] to_arrow
 Part[] serialize_many
 Part deserialize_many
 int8 get_fields_and_field_types
@@ -580,7 +581,9 @@ def hiding(tmp_path_factory):
 
 def test_fields_are_free_to_have_the_names_of_methods(hiding):
     kind, part = hiding.Hiding, hiding.Part
-    message = kind(1, 2, [3.5], "4", [5, 6, 7], True, [part(1, 2, [3], 4)], part(6), 8, 9, 10)
+    message = kind(
+        1, 2, [3.5], "4", [5, 6, 7], True, [False], [part(1, 2, [3], 4)], part(6), 8, 9, 10
+    )
     message.validate = 100
     message.deserialize = [4.5]
     assert (message.validate, message.serialize, message.to_dict) == (100, 2, "4")

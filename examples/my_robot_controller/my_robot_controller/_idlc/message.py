@@ -11,7 +11,7 @@ import sys
 
 from . import codec
 from .construction import CHECK_FIELDS, call_checked, is_checked
-from .lazy import OnDemand
+from .lazy import OnDemand, dataclass_fields, dataclass_params, slot_types
 from .names import public_name, slot_name
 from .objects import copied, deeply_copied, pretty, represented
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from typing import Any, ClassVar, Literal
 
     import typing_extensions
+
+    from .on_demand.columns import Batch
 else:
 
     def dataclass(**_options):
@@ -31,24 +33,6 @@ else:
 
 #: What generated classes call `dict`; linters take a display for a mistake there.
 table = dict
-
-
-def _slot_types(kind: type) -> tuple[Any, ...]:
-    from .on_demand.typeinfo import slot_types
-
-    return slot_types(kind)
-
-
-def _dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    from .on_demand.fields import dataclass_fields
-
-    return dataclass_fields(kind)
-
-
-def _dataclass_params(_kind: type) -> Any:
-    from .on_demand.fields import PARAMETERS
-
-    return PARAMETERS
 
 
 class InterfaceMeta(type):
@@ -141,9 +125,9 @@ class Message(metaclass=MessageMeta):
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
         _codec_ = OnDemand(codec.codecs_of)
-        SLOT_TYPES = OnDemand(_slot_types)
-        __dataclass_fields__ = OnDemand(_dataclass_fields)
-        __dataclass_params__ = OnDemand(_dataclass_params)
+        SLOT_TYPES = OnDemand(slot_types)
+        __dataclass_fields__ = OnDemand(dataclass_fields)
+        __dataclass_params__ = OnDemand(dataclass_params)
 
     @property
     def _check_fields(self) -> bool:
@@ -191,8 +175,7 @@ class Message(metaclass=MessageMeta):
     ) -> list[bytes]:
         """Return what `serialize` returns of each message.
 
-        A ValidationError's path begins with the message's index. `delimited`, of
-        `_idlc.on_demand.batches`, makes one stream of the buffers.
+        A ValidationError's path begins with the message's index.
         """
         from .on_demand.batches import serialize_many
 
@@ -202,26 +185,45 @@ class Message(metaclass=MessageMeta):
     def deserialize_many(
         cls, buffers: Iterable[bytes | bytearray | memoryview], *, copy: bool = True
     ) -> list[typing_extensions.Self]:
-        """Return what `deserialize` returns of each buffer: a rosbag's rows, for example.
-
-        A DecodeError's path begins with the buffer's index. `_idlc.on_demand.batches` splits
-        length-delimited streams and the chunks of MCAP files into buffers.
-        """
+        """Return what `deserialize` returns of each; a DecodeError's path begins with the index."""
         from .on_demand.batches import deserialize_many
 
         return deserialize_many(cls, buffers, copy)
 
     @classmethod
-    def to_columns(cls, buffers: Iterable[bytes | bytearray | memoryview]) -> Any:
-        """Return many serialized messages as a `numpy.ndarray`, without making messages.
+    def to_columns(
+        cls,
+        messages: Iterable[bytes | bytearray | memoryview] | Batch,
+        *,
+        fields: Iterable[str] | None = None,
+        ragged: bool | None = None,
+        datetimes: bool = False,
+    ) -> Any:
+        """Return many serialized messages as columns of numpy, without making messages.
 
-        It is a structured array with a row for each buffer: `rows["pose"]["position"]["x"]`.
-        Names are those on the wire, texts are UTF-8 bytes. Raises DecodeError, and ValueError
-        where a sequence has another number of elements than in the messages before.
+        They are a structured array; or Columns, where that cannot hold them or if `ragged`.
         """
-        from .on_demand.columns import to_columns
+        from .on_demand.columns.rows import to_columns
 
-        return to_columns(cls, buffers)
+        return to_columns(cls, messages, fields, ragged, datetimes)
+
+    @classmethod
+    def to_arrow(
+        cls,
+        messages: Iterable[bytes | bytearray | memoryview] | Batch,
+        *,
+        fields: Iterable[str] | None = None,
+        flat: bool = False,
+        datetimes: bool = False,
+        dictionary: bool = False,
+    ) -> Any:
+        """Return many serialized messages as a `pyarrow.Table`, without making messages.
+
+        With `flat`, nested messages are columns with names such as "header.stamp.sec".
+        """
+        from .on_demand.columns.arrow import to_arrow
+
+        return to_arrow(cls, messages, fields, flat, datetimes, dictionary)
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""

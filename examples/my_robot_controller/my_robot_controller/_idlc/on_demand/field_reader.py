@@ -7,19 +7,35 @@ terminating zero), and says of everything else which field cannot be read, and w
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
 from functools import cache
 from struct import Struct
+from types import SimpleNamespace
 from typing import Any
 
 from ..cdr import NATIVE
-from ..codec import maker
+from ..codec import maker, order_of
 from ..errors import DecodeError
 from .typeinfo import FieldInfo, class_of, fields_of, type_name
 
 
 def read_carefully(kind: type, data: bytes, order: str) -> Any:
     """Return the message in `data`; raise DecodeError naming the field and the byte."""
-    return _Reader(data, order).message(kind, type_name(kind), "")
+    name = type_name(kind)
+
+    def make(other: str) -> Any:
+        # what a constructor makes may be larger than the buffer
+        return maker(kind if other == name else class_of(other))()
+
+    return _Reader(data, order, make).message(name, "")
+
+
+def check(name: str, data: bytes) -> None:
+    """Raise DecodeError, as `deserialize` does, unless `data` is a message of a type.
+
+    No class is needed, so that those of other packages need not be installed.
+    """
+    _Reader(data, order_of(data), lambda _: SimpleNamespace()).message(name, "")
 
 
 @cache
@@ -40,18 +56,20 @@ def least_element(field: FieldInfo) -> int:
 
 
 class _Reader:
-    """Goes over a buffer and never further than it has bytes for."""
+    """Goes over a buffer and never further than it has bytes for.
 
-    def __init__(self, data: bytes, order: str) -> None:
+    `make` returns what takes the values of a structure, by its name.
+    """
+
+    def __init__(self, data: bytes, order: str, make: Callable[[str], Any]) -> None:
         self.data = data
         self.order = order
+        self.make = make
         self.at = 4
 
-    def message(self, kind: Any, name: str, path: str) -> Any:
+    def message(self, name: str, path: str) -> Any:
         """Read a structure."""
-        message = maker(
-            kind
-        )()  # what a constructor makes may be larger than the buffer
+        message = self.make(name)
         fields = fields_of(name)
         if not fields:
             self.take(1, 1, path or name)
@@ -93,7 +111,7 @@ class _Reader:
     def element(self, field: FieldInfo, path: str) -> Any:
         """Read one value."""
         if field.nested:
-            return self.message(class_of(field.nested), field.nested, path)
+            return self.message(field.nested, path)
         if field.primitive is not None:
             size = field.primitive.size
             raw = self.take(size, size, path)

@@ -1,0 +1,205 @@
+"""Columns out of what a scan found: everything in the order of the messages again."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .gather import Place, blocks, ranges, rows_of
+from .lanes import Found
+from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings
+from .texts import narrow_texts, offsets_of, wide_texts
+from .values import Batch, Columns, Ragged, Texts
+
+
+class Elements(NamedTuple):
+    """The elements of a level.
+
+    `order` has the place of each, in the order in which they were found; None if that is the
+    order. `big` says which are big-endian, where there are both.
+    """
+
+    level: Level
+    total: int
+    order: Any
+    big: Any
+
+
+class Table:
+    """What was found in messages, by column. `order` is theirs, or "<" if there are both."""
+
+    def __init__(self, batch: Batch, order: str, found: Found) -> None:
+        self.buffer = batch.buffer
+        self.size = int((batch.stops - batch.starts).sum())
+        self.order = order
+        self.found = found
+        self.texts: dict[int, Texts] = {}
+        self.lists: dict[int, tuple[Any, Elements]] = {}
+
+    def sorted(self, elements: Elements, parts: list[Any]) -> Any:
+        """Return what was found of elements in their order."""
+        found = joined(parts)
+        if elements.order is None:
+            return found
+        result = np.empty_like(found)
+        result[elements.order] = found
+        return result
+
+    def text(self, elements: Elements, node: Strings) -> Texts:
+        """Return a column of strings."""
+        key = node.text.key
+        assert key is not None
+        if key not in self.texts:
+            starts = self.sorted(elements, self.found.at[key])
+            sizes = self.sorted(elements, self.found.size[key])
+            if node.text.wide:
+                big = elements.big
+                made = wide_texts(self.buffer, starts, sizes, self.order, big)
+            else:
+                made = narrow_texts(self.buffer, starts, sizes)
+            self.texts[key] = made
+        return self.texts[key]
+
+    def list(self, elements: Elements, step: List) -> tuple[Any, Elements]:
+        """Return the offsets of a column of sequences, and what the elements are."""
+        assert step.key is not None
+        if step.key not in self.lists:
+            counts = self.sorted(elements, self.found.size[step.key])
+            offsets = offsets_of(counts)
+            level, order = step.level, None
+            if not level.packed:
+                parent = joined(self.found.parent[level.key])
+                if elements.order is not None:
+                    parent = elements.order[parent]
+                order = offsets[parent] + joined(self.found.index[level.key])
+                if (order == np.arange(len(order))).all():
+                    order = None
+            big = None if elements.big is None else np.repeat(elements.big, counts)
+            made = Elements(level, int(offsets[-1]), order, big)
+            self.lists[step.key] = offsets, made
+        return self.lists[step.key]
+
+    def numbers(self, elements: Elements) -> dict[int, Any]:
+        """Return the numbers of a level, perhaps as views of the buffer, by their keys."""
+        result: dict[int, Any] = {}
+        for step in elements.level.steps:
+            if isinstance(step, Segment) and step.leaves:
+                starts = self.sorted(elements, self.found.at[step.key])
+                place = blocks(self.buffer, starts, step.size)
+                self.cut(step, place, result)
+        return result
+
+    def inside(
+        self, around: Elements, step: List, elements: Elements, even: bool = False
+    ) -> dict[int, Any]:
+        """Return the same for the elements of sequences.
+
+        If there are as many in each sequence, and `even`, there may be another dimension.
+        """
+        packed = step.level.packed
+        if not packed:
+            return self.numbers(elements)
+        assert step.key is not None
+        result: dict[int, Any] = {}
+        if packed.leaves:
+            starts = self.sorted(around, self.found.at[step.key])
+            counts = self.sorted(around, self.found.size[step.key])
+            size = packed.size
+            place = rows_of(self.buffer, starts, counts, size) if even else None
+            if place is None:
+                made = ranges(self.buffer, starts, counts * size, size)
+                place = Place(made, 0, (elements.total,), (size,))
+            self.cut(packed, place, result)
+        return result
+
+    def native(self, numbers: Any, code: str, big: Any) -> Any:
+        """Return numbers as this machine has them, outside of the buffer.
+
+        Those at `big` are big-endian; of bools, every byte but zero is true.
+        """
+        if code == "?":
+            return numbers != 0
+        if np.may_share_memory(numbers, self.buffer):
+            numbers = numbers.copy()
+        result = np.ascontiguousarray(numbers, code)
+        if big is not None:
+            result[big] = result[big].byteswap()
+        return result
+
+    def cut(self, segment: Segment, place: Place, result: dict[int, Any]) -> None:
+        """Add the numbers of a segment at a place."""
+        for leaf in segment.leaves:
+            shape = (*place.shape, *(count for count, _ in leaf.repeats))
+            strides = (*place.strides, *(distance for _, distance in leaf.repeats))
+            dtype = np.dtype(self.order + leaf.code.replace("?", "u1"))
+            if 0 in shape:
+                made: Any = np.empty(shape, dtype)
+            else:
+                start = place.offset + leaf.offset
+                made = np.ndarray(shape, dtype, place.buffer, start, strides)
+            result[leaf.key] = made
+
+
+def columns_of(table: Table, top: Elements) -> Columns:
+    """Return the columns of all messages."""
+    making = _Making(table, top, table.numbers(top))
+    columns: Columns = making.column(top.level.node, top.total)
+    return columns
+
+
+class _Making:
+    """Makes columns of the elements of one level."""
+
+    def __init__(
+        self, table: Table, elements: Elements, numbers: dict[int, Any]
+    ) -> None:
+        self.table = table
+        self.elements = elements
+        self.numbers = numbers
+
+    def column(self, node: Node, count: int, depth: int = 0) -> Any:
+        """Return a column of `count` values, which are in arrays of so many dimensions."""
+        if isinstance(node, Numbers):
+            made = self.table.native(
+                self.numbers[node.key], node.code, self.elements.big
+            )
+            return made.reshape(count, *made.shape[1 + depth :])
+        if isinstance(node, Strings):
+            return self.table.text(self.elements, node)
+        if isinstance(node, Instant):
+            parts = (node.seconds, node.nanoseconds)
+            return instants(node, *(self.column(one, count, depth) for one in parts))
+        if isinstance(node, Lists):
+            return self.lists(node, count, depth)
+        columns = {
+            name: self.column(inner, count, depth)
+            for name, inner in node.fields.items()
+        }
+        return Columns(columns, count)
+
+    def lists(self, node: Lists, count: int, depth: int) -> Ragged:
+        """Return a column of sequences or arrays."""
+        if node.step is None:
+            assert node.size is not None
+            offsets: Any = np.arange(count + 1) * node.size
+            inner = self.column(node.element, count * node.size, depth + 1)
+            return Ragged(offsets, inner)
+        offsets, elements = self.table.list(self.elements, node.step)
+        numbers = self.table.inside(self.elements, node.step, elements)
+        making = _Making(self.table, elements, numbers)
+        return Ragged(offsets, making.column(node.element, elements.total))
+
+
+def instants(node: Instant, seconds: Any, nanoseconds: Any) -> Any:
+    """Return times of numpy."""
+    return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
+
+
+def joined(parts: list[Any]) -> Any:
+    """Return parts as one array."""
+    if len(parts) == 1:
+        return np.asarray(parts[0], np.int64)
+    return np.concatenate(
+        [np.empty(0, np.int64), *(np.asarray(p, np.int64) for p in parts)]
+    )

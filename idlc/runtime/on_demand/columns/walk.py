@@ -1,0 +1,99 @@
+"""Finding where everything is, in one message after the other.
+
+It finds what a scan finds, and is faster where only few messages still have more to read.
+"""
+
+from __future__ import annotations
+
+from struct import Struct
+from typing import Any
+
+import numpy as np
+
+from .lanes import Found, Lanes, UnreadableError, aligned, repeat_fixed
+from .plan import Level, List, Segment, Text
+
+
+class Walk:
+    """Goes over one message at a time.
+
+    `end` is where it ends, and values align relative to `phase`.
+    """
+
+    def __init__(self, buffer: Any, order: str, found: Found) -> None:
+        self.view = memoryview(buffer)
+        self.unpack = Struct(order + "I").unpack_from
+        self.found = found
+        self.end = 0
+        self.phase = 0
+
+    def repeat(self, level: Level, at: int, parent: int, indices: range) -> int:
+        """Go over elements of a sequence; return the position after them."""
+        first = self.found.enter(level, [parent] * len(indices), indices)
+        for number in range(first, first + len(indices)):
+            at = self.level(level, at, number)
+        return at
+
+    def level(self, level: Level, at: int, number: int) -> int:
+        """Go over a structure, which has a number in its level."""
+        for step in level.steps:
+            if isinstance(step, Segment):
+                at = aligned(at, self.phase, step.align)
+                if step.leaves:
+                    add(self.found.at[step.key], at)
+                at = self.take(at, step.size)
+            elif isinstance(step, Text):
+                at = self.text(step, at)
+            else:
+                at = self.list(step, at, number)
+        return at
+
+    def take(self, at: int, size: int) -> int:
+        """Go over some bytes."""
+        at += size
+        if at > self.end:
+            raise UnreadableError
+        return at
+
+    def number(self, at: int) -> tuple[int, int]:
+        """Read a size or count; return it and the position after it."""
+        at = aligned(at, self.phase, 4)
+        after = self.take(at, 4)
+        value: int = self.unpack(self.view, at)[0]
+        return value, after
+
+    def text(self, step: Text, at: int) -> int:
+        """Go over a string."""
+        size, at = self.number(at)
+        if step.key is not None:
+            add(self.found.at[step.key], at)
+            add(self.found.size[step.key], size)
+        return self.take(at, size * 4 if step.wide else size)
+
+    def list(self, step: List, at: int, number: int) -> int:
+        """Go over a sequence."""
+        count, at = self.number(at) if step.size is None else (step.size, at)
+        if step.bound is not None and count > step.bound:
+            raise UnreadableError
+        self.take(at, count * step.least)
+        if step.key is not None:
+            add(self.found.size[step.key], count)
+        level = step.level
+        packed = level.packed
+        if packed:
+            at = aligned(at, self.phase, packed.align) if count else at
+            if step.key is not None:
+                add(self.found.at[step.key], at)
+            return self.take(at, count * packed.size)
+        if not level.fixed:
+            return self.repeat(level, at, number, range(count))
+        lane = Lanes(*(np.array([one]) for one in (at, self.end, self.phase)))
+        repeat_fixed(level, lane, np.array([count]), self.found, number)
+        return int(lane.at[0])
+
+
+def add(parts: list[Any], value: int) -> None:
+    """Add a value to the last part, if that is no array."""
+    if not parts or type(parts[-1]) is not list:
+        parts.append([])
+    parts[-1].append(value)
