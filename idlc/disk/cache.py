@@ -17,7 +17,8 @@ from idlc.templating import RenderedFile
 def folder() -> Path:
     """Return the folder of this user's cache, or one for this process if there can be none."""
     try:
-        found = _home() / "idlc"
+        chosen = os.environ.get("IDLC_CACHE")
+        found = Path(chosen) if chosen else _home() / "idlc"
         found.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=found):
             return found
@@ -54,3 +55,17 @@ def keep(name: str, files: Iterable[RenderedFile]) -> None:
                 raise
     finally:
         rmtree(made, ignore_errors=True)
+
+
+def has(name: str) -> bool:
+    """Return whether the cache has a folder."""
+    return (folder() / name).is_dir()
+
+
+@cache
+def newest() -> int:
+    """Return when idlc itself was changed last: its version does not change with each edit."""
+    package = Path(__file__).parents[1]
+    templates = (package / "templates", package.parent / "templates")
+    files = [*package.rglob("*.py"), *(file for one in templates for file in one.rglob("*.jinja"))]
+    return max(file.stat().st_mtime_ns for file in files)

@@ -1,17 +1,168 @@
-"""Classes without files: compiled when a program asks for them, and kept in a cache."""
+"""Classes without files of one's own: compiled when a program asks, and kept in a cache."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-from idlc.recordings.container import Topic
+from idlc import __version__
+from idlc.diagnostics.report import Report
+from idlc.disk import cache
+from idlc.recordings.errors import RecordingError
+from idlc.runtime.names import public_name
+
+if TYPE_CHECKING:
+    from idlc.model import ir
+    from idlc.model.link import Model
+    from idlc.recordings.container import Topic
+    from idlc.templating import RenderedFile
+
+#: The package that all loaded ones are in.
+LOADED = "idlc.loaded"
+#: The support package of each: idlc's own modules under another name, with data of its own.
+SUPPORT = '''\
+"""The support code of idlc, for this package."""
+
+from importlib.util import find_spec
+
+_spec = find_spec("idlc.runtime")
+__path__ += _spec.submodule_search_locations
+exec(_spec.loader.get_code(_spec.name))
+'''
+
+
+class CompileError(ValueError):
+    """What was to be loaded has errors, or does not exist; its text is that of the problems."""
+
+
+class Loaded(ModuleType):
+    """Packages that were compiled together, and by their own names the interfaces asked for."""
+
+    def __init__(self, name: str, packages: Iterable[str], asked: Iterable[ir.TypeName]) -> None:
+        super().__init__(name, "What `idlc.load` compiled.")
+        self._packages = sorted(packages)
+        self._asked = {public_name(one.name): one for one in asked}
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._packages:
+            return import_module(f"{self.__name__}.{name}")
+        if name in self._asked:
+            return self[str(self._asked[name])]
+        raise AttributeError(f"no `{name}` was loaded, but {', '.join(dir(self))}")
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a class by its full name, such as "std_msgs/msg/Header"."""
+        return _class(self.__name__, name)
+
+    def __dir__(self) -> list[str]:
+        return [*self._packages, *sorted(self._asked)]
+
+    def __repr__(self) -> str:
+        return f"<loaded: {', '.join(dir(self))}>"
+
+
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> Loaded:
+    """Compile interfaces, and return their classes.
+
+    `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
+    package that is known here. `include` are folders in which other packages are looked for first.
+    The classes can be pickled, where the same cache is seen; type checkers do not know them, so
+    programs are better off with `idlc gen`.
+    """
+    from idlc.driver.loading import asked_models
+
+    report = Report()
+    models, asked = asked_models(str(what), tuple(include), distro, report)
+    _raise_for(report)
+    name = _kept(models)
+    return Loaded(f"{LOADED}.{name}", models, asked)
 
 
 def class_of(topic: Topic) -> Any:
     """Return the class of a topic's messages, compiled from what was recorded."""
-    raise NotImplementedError
+    key = topic.schema and _key([topic.type, topic.schema.encoding, topic.schema.text])
+    if not key or not cache.has(key):
+        from idlc.driver.loading import topic_models
+
+        models, is_recorded = topic_models(topic)
+        # what was borrowed from around here may be another thing tomorrow
+        key = _kept(models, key if is_recorded else None)
+    return _class(f"{LOADED}.{key}", topic.type)
 
 
 def accepted(kind: Any, topic: Topic) -> Any:
-    """Return a class that a program gave, if its messages are those of a topic."""
+    """Return a class that a program gave; raise RecordingError if messages are of another type."""
+    try:
+        home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
+        info = import_module(f"{home}._idlc.on_demand.typeinfo")
+        name = info.type_name(kind)
+        mine = info.types()["hashes"][name]
+    except (AttributeError, ImportError, KeyError):
+        hint = "leave it out, or give one that `idlc gen` made"
+        raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
+    if name != topic.type:
+        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {name}")
+    if mine != topic.hash:
+        from idlc.driver.loading import recorded_hash
+
+        found = recorded_hash(topic)
+        if mine != found:
+            raise RecordingError(
+                f"{name} was another type when `{topic.name}` was recorded: its hash is "
+                f"{found or topic.hash or 'not known'}, that of the class is {mine}",
+                "leave the class out to read what was recorded",
+            )
     return kind
+
+
+def _class(home: str, name: str) -> Any:
+    package, kind, short = name.split("/")
+    found: Any = import_module(f"{home}.{package}.{kind}")
+    return getattr(found, public_name(short))
+
+
+def _kept(models: Mapping[str, Model], key: str | None = None) -> str:
+    """Return the name under which the packages are kept, after they are written if need be."""
+    if key is None:
+        texts = [
+            text
+            for model in models.values()
+            for own in model.own
+            for text in (str(own.name), own.source.text if own.source else "")
+        ]
+        key = _key(texts)
+    if not cache.has(key):
+        cache.keep(key, _files(models, f"{LOADED}.{key}"))
+    return key
+
+
+def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
+    """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.emit.render import render_package
+    from idlc.templating import RenderedFile
+
+    for package, model in models.items():
+        yield RenderedFile(f"{package}/_idlc/__init__.py", SUPPORT)
+        for file in render_package(model, around):
+            if not file.path.startswith("_idlc/") or file.path == "_idlc/type_data.py":
+                yield RenderedFile(f"{package}/{file.path}", file.text)
+
+
+def _key(texts: Iterable[str]) -> str:
+    """Return a name for packages that are compiled from these texts by this idlc."""
+    from hashlib import sha256
+
+    digest = sha256(f"{__version__} {cache.newest()}".encode())
+    for text in texts:
+        raw = text.encode("utf-8", "surrogatepass")
+        digest.update(b"%d " % len(raw) + raw)
+    return f"h{digest.hexdigest()[:12]}"
+
+
+def _raise_for(report: Report) -> None:
+    if report.had_errors:
+        from idlc.diagnostics.formats import terminal
+
+        raise CompileError("\n" + "\n".join(terminal.text(report)))

@@ -130,7 +130,7 @@ def _empty(kind: Any, options: Any) -> pa.Table:
 def _with_times(table: pa.Table, batch: Messages) -> pa.Table:
     """Return a table with the times of its messages in front."""
     pa = arrow()
-    kind = pa.timestamp("ns", "UTC")
+    kind = pa.timestamp("ns")
     names = _names(table.column_names)
     for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
         if times is None:
