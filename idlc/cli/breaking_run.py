@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
+from idlc.breaking.change import LEVELS
 from idlc.cli import output, reports
 from idlc.diagnostics.formats.github import notice
 from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report, first_few
 from idlc.disk import command_settings, pyproject
 from idlc.disk.scope import scope
-from idlc.driver.breaking import BreakingOptions, Verdict, breaking
+from idlc.driver.breaking import GIT, BreakingOptions, Verdict, breaking
 from idlc.driver.breaking_distro import is_distro
 from idlc.driver.check import Checked
 
 if TYPE_CHECKING:
+    from idlc.driver.breaking_recorded import RecordedVerdict
     from idlc.driver.graph import GraphVerdict
 
 GRAPH = "graph"
@@ -47,28 +49,47 @@ def compare(typed: BreakingWishes) -> int:
     against = typed.against or command_settings.against(settings, report)
     allowed = command_settings.allowances(settings, report)
     if against is None and not report.had_errors:
-        raise click.UsageError("give --against DIR, git:REF, idlc.lock, distro:NAME or graph")
+        raise click.UsageError(
+            "give --against DIR, git:REF, idlc.lock, a recording, distro:NAME or graph"
+        )
     if typed.timeout is not None and against != GRAPH:
         raise click.UsageError("--timeout is for --against graph")
-    verdict: Verdict | GraphVerdict | None = None
+    verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
     if against is not None and not report.had_errors:
+        recordings, paths = _recordings(against, typed.paths)
+        needs_none = recordings or is_distro(against)
         wanted = BreakingOptions(
-            paths=typed.paths or settings.paths or (() if is_distro(against) else (".",)),
+            paths=paths or settings.paths or (() if needs_none else (".",)),
             against=against,
             scope=scope(settings, typed.package, typed.include, typed.exclude, typed.distro),
-            levels=typed.levels,
+            levels=typed.levels or (() if recordings else LEVELS),
             allowed=allowed,
             allowed_in=settings.source.path if settings.source else "",
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
-        verdict = _compared(wanted, typed, report)
+        verdict = _compared(wanted, recordings, typed, report)
+        if recordings:
+            output.notes(report, sys.stderr)
     _show(report, verdict, typed.style)
     return output.status(report)
 
 
+def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the recordings to compare with, and the paths that are none of them."""
+    if against == GRAPH or is_distro(against) or against.startswith(GIT):
+        return (), paths
+    from idlc.recordings.find import recordings_of
+
+    return recordings_of(against, paths)
+
+
 def _compared(
-    wanted: BreakingOptions, typed: BreakingWishes, report: Report
-) -> Verdict | GraphVerdict | None:
+    wanted: BreakingOptions, recordings: tuple[str, ...], typed: BreakingWishes, report: Report
+) -> Verdict | GraphVerdict | RecordedVerdict | None:
+    if recordings:
+        from idlc.driver.breaking_recorded import compare_with_recordings
+
+        return compare_with_recordings(wanted, recordings, report)
     if wanted.against != GRAPH:
         return breaking(wanted, report)
     from idlc.driver.graph import compare_with_graph
@@ -77,7 +98,9 @@ def _compared(
     return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))
 
 
-def _show(report: Report, verdict: Verdict | GraphVerdict | None, style: str) -> None:
+def _show(
+    report: Report, verdict: Verdict | GraphVerdict | RecordedVerdict | None, style: str
+) -> None:
     if style == "json":
         output.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
@@ -94,7 +117,7 @@ def _show(report: Report, verdict: Verdict | GraphVerdict | None, style: str) ->
             sys.stdout.write(notice("idlc breaking", _summary(verdict)))
 
 
-def _summary(verdict: Verdict | GraphVerdict) -> str:
+def _summary(verdict: Verdict | GraphVerdict | RecordedVerdict) -> str:
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
     if verdict.allowed:
@@ -102,11 +125,16 @@ def _summary(verdict: Verdict | GraphVerdict) -> str:
     return text + (_next(verdict) if isinstance(verdict, Verdict) else _seen(verdict))
 
 
-def _seen(verdict: GraphVerdict) -> str:
-    """Return what was looked at."""
+def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
+    """Return what was looked at, and what of it was not told."""
     seen = [counted(number, noun) for noun, number in verdict.seen.items()]
     text = f"; looked at {', '.join(seen)}"
-    return f"{text}; without type hash: {verdict.silent}" if verdict.silent else text
+    facts = verdict._asdict()
+    if silent := facts.get("silent"):
+        text += f"; without type hash: {silent}"
+    if others := facts.get("others"):
+        text += f"; {counted(others, 'change')} that no reader sees, which --level tells"
+    return text
 
 
 def _next(verdict: Verdict) -> str:

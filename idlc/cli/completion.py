@@ -26,6 +26,14 @@ def types_and_paths(
     return [CompletionItem(word, type="file"), *map(CompletionItem, found)]
 
 
+def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
+    """Offer the topics of the recordings that were typed."""
+    from idlc.driver import completion
+
+    typed: Any = context.params.get("paths") or (context.params.get("wanted"),)
+    return completion.topics(word, [path for path in typed if path])
+
+
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
     from idlc.driver import completion

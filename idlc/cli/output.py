@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import TextIO
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.formats import terminal
 from idlc.diagnostics.report import Report, Severity
-from idlc.diagnostics.visible import one_line
+from idlc.diagnostics.visible import one_line, visible
 
 
 def colours(stream: TextIO) -> bool:
@@ -40,6 +41,14 @@ def fact(stream: TextIO, kind: str, **facts: object) -> None:
     import json
 
     stream.write(json.dumps({"type": kind, **facts}) + "\n")
+
+
+def texts(found: Iterable[str], style: str, stream: TextIO) -> None:
+    """Write interfaces, one after the other."""
+    text = "\n".join(found)
+    if style == "text" or stream.isatty():  # other formats are for other tools
+        text = "\n".join(map(visible, text.split("\n")))
+    stream.write(text)
 
 
 def counts(report: Report) -> dict[str, int]:

@@ -84,6 +84,7 @@ UNUSUAL_LINE_END = Code("IDL110", "unusual-line-end", WARNING)
 OPTIONAL_WITHOUT_EFFECT = Code("IDL111", "optional-without-effect", WARNING)
 OPTIONAL_NEEDS_LYRICAL = Code("IDL112", "optional-needs-lyrical", ERROR)
 REPEATED_OPTIONAL = Code("IDL113", "repeated-optional", ERROR)
+FOREIGN_IDL = Code("IDL114", "foreign-idl", ERROR)
 
 # names and references
 UNKNOWN_TYPE = Code("IDL201", "unknown-type", ERROR)
@@ -209,6 +210,13 @@ DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR, usage=True)
 UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
 NO_RCLPY = Code("IDL640", "no-rclpy", ERROR, usage=True)
 EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR, usage=True)
+
+# recordings
+UNREADABLE_RECORDING = Code("IDL651", "unreadable-recording", ERROR)
+MISSING_DEFINITION = Code("IDL652", "missing-definition", WARNING)
+SEVERAL_DEFINITIONS = Code("IDL653", "several-definitions", ERROR)
+RECORDED_HASH_DIFFERS = Code("IDL654", "recorded-hash-differs", WARNING)
+NO_SUCH_TOPIC = Code("IDL655", "no-such-topic", ERROR, usage=True)
 
 # idlc itself
 INTERNAL_ERROR = Code("IDL901", "internal-error", ERROR)

@@ -21,6 +21,11 @@ class Source:
     def __repr__(self) -> str:
         return f"Source({self.path!r})"
 
+    @property
+    def is_idl(self) -> bool:
+        """Whether it is IDL, which ROS 2 makes of interface files, instead of one of them."""
+        return self.path.endswith(".idl")
+
     @cached_property
     def lines(self) -> tuple[str, ...]:
         """The lines with their ends, split as `str.splitlines` does (language 1.1)."""

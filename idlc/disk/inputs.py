@@ -13,7 +13,7 @@ from idlc.diagnostics.source import Source
 from idlc.disk.find import InterfaceFile
 from idlc.disk.output.lock_file import digest, meaning
 from idlc.disk.package_names import by_home, locks, name_of
-from idlc.disk.read import decode, read_bytes, shown
+from idlc.disk.read import decode, is_folder, read_bytes, shown
 from idlc.disk.scope import Scope
 from idlc.model.ir import TypeName
 
@@ -51,6 +51,11 @@ class Inputs(msgspec.Struct, frozen=True):
         if self.borrowed:
             return {o.file.key: meaning(o.data.decode(), self.package) for o in self.files}
         return {one.file.key: digest(one.data) for one in self.files}
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether a folder was given, so that what is not in it does not exist."""
+        return any(is_folder(Path(one.file.given)) for one in self.files)
 
     @property
     def names(self) -> frozenset[TypeName]:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
@@ -98,8 +99,8 @@ class Library:
     """Interfaces of all packages that can be found, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
-    a single file finds its neighbours, unless they are excluded. Files that cannot be read are
-    reported. `distro` is the distribution that files are read for.
+    a single file finds its neighbours, unless they are excluded. `texts` come before all others.
+    Files that cannot be read are reported. `distro` is the distribution that files are read for.
     """
 
     def __init__(
@@ -110,8 +111,10 @@ class Library:
         own: Mapping[str, Sequence[Path]] | None = None,
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
+        texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
     ) -> None:
         self.distro = distro
+        self.texts = texts
         places = [Folder(path) for path in folders]
         for path in folders:
             if not is_folder(Path(path)):
@@ -153,6 +156,8 @@ class Library:
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if there is none of that name."""
+        if name in self.texts:
+            return self.texts[name]
         if name not in self._sources:
             path = self.path(name)
             self._sources[name] = (
@@ -167,14 +172,15 @@ class Library:
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
+        told = [one.name for one in self.texts if (one.package, one.kind) == (package, "msg")]
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
-        return on_disk or catalog.names(package, self.distro)
+        return [*told, *(on_disk or catalog.names(package, self.distro))]
 
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
         known = on_disk or (*catalog.interfaces(self.distro), derive.SERVICE_EVENT_INFO)
-        return tuple(sorted({name for name in known if name.package == package}))
+        return tuple(sorted({name for name in (*known, *self.texts) if name.package == package}))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, from the first place that has any.
@@ -204,6 +210,7 @@ class Library:
         """Return the names of all packages, sorted."""
         if self._packages is None:
             found = set(catalog.packages(self.distro)) | set(self._own)
+            found |= {name.package for name in self.texts}
             self._packages = sorted(found.union(*(place.packages() for place in self._places)))
         return self._packages
 

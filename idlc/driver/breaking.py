@@ -8,7 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.breaking.allow import Allowance, without_allowed
-from idlc.breaking.change import LEVELS
+from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.packages import (
     Comparison,
     added_package,
@@ -89,6 +89,16 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     )
 
 
+def not_allowed(
+    changes: Sequence[Change], options: BreakingOptions, report: Report
+) -> tuple[Change, ...]:
+    """Return the changes that nobody allowed; allowances may be for other comparisons."""
+    found = Report()
+    left = without_allowed(changes, options.allowed, options.today, options.allowed_in, found)
+    report.extend(one for one in found if one.code != codes.UNUSED_ALLOWANCE.id)
+    return left
+
+
 def _against(
     options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
@@ -128,8 +138,8 @@ def _compare(
             scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
         )
     old = _named_alike(inputs.packages(files, scope, report), given, files, scope, report)
-    after = _models(given, options.scope, report)
-    before = _models(old, scope, report)
+    after = sound_ones(given, options.scope, report)
+    before = sound_ones(old, scope, report)
     if report.had_errors:
         return None
     with stage("compare", options.against):
@@ -156,7 +166,7 @@ def _named_alike(
     return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
 
-def _models(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Model]:
+def sound_ones(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Model]:
     """Return the packages' models; only errors are reported, warnings are `check`'s."""
     found = Report()
     models = {model.package: model for _, model in models_of(given, scope, found)}
@@ -182,7 +192,7 @@ def _compare_with_lock(
         named = msgspec.structs.replace(options.scope, package=known.package)
         files = find(options.paths, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
-    models = _models(mine, options.scope, report)
+    models = sound_ones(mine, options.scope, report)
     if report.had_errors:
         return None
     model = models.get(known.package) or Model(known.package, (), {})

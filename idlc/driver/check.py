@@ -10,7 +10,7 @@ import msgspec
 from idlc.checks.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk import inputs
-from idlc.disk.find import look, nothing_in
+from idlc.disk.find import KINDS, look, nothing_in
 from idlc.disk.library import Library
 from idlc.disk.package_facts import facts
 from idlc.disk.read import absolute
@@ -48,6 +48,12 @@ def check(options: CheckOptions, report: Report) -> Checked:
 
     With `fix`, what can be fixed without harm is fixed, and the rest reported.
     """
+    if not all(path.endswith(tuple(KINDS)) for path in options.paths):
+        from idlc.recordings.find import divided
+
+        recordings, others = divided(options.paths)
+        if recordings:
+            return _with_recordings(recordings, others, options, report)
     fixed = 0
     if options.fix:
         from idlc.disk.output.rewrite import edit
@@ -58,6 +64,22 @@ def check(options: CheckOptions, report: Report) -> Checked:
     checked, found = _once(options, report)
     report.extend(found)
     return msgspec.structs.replace(checked, fixed=fixed)
+
+
+def _with_recordings(
+    recordings: Sequence[str], others: Sequence[str], options: CheckOptions, report: Report
+) -> Checked:
+    """Report what is wrong with recordings, and with other paths if there are any."""
+    from idlc.driver.recorded_models import check_recordings
+
+    found = Report()
+    check_recordings(recordings, options.scope, found)
+    report.extend(one for one in found if options.selection.wants(one))
+    report.notes += found.notes
+    checked = Checked(())
+    if others:
+        checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
+    return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
 
 
 def _tidied(name: str, old: str, new: str) -> str:

@@ -44,6 +44,16 @@ def types(
     return [*sorted(named), *(f"{name}/" for name in holding)]
 
 
+def topics(word: str, paths: Sequence[str]) -> list[str]:
+    """Return the topics of recordings that a beginning fits."""
+    from idlc.driver.recorded import read
+    from idlc.recordings.find import divided
+
+    found = (read(path, Report()) for path in divided(paths)[0])
+    names = {one.topic.name for recording in found if recording for one in recording.topics}
+    return sorted(name for name in names if name.startswith(word))
+
+
 def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind]) -> Iterator[str]:
     """Yield the types of a package that a beginning fits, with their kind if it names one."""
     for one in library.interfaces(package):

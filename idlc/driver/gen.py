@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
 from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
@@ -16,14 +17,19 @@ from idlc.driver.gen_result import Generated, generated, up_to_date, with_needs
 from idlc.driver.gen_vendored import planned
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import ir
+from idlc.recordings.find import divided
 from idlc.syntax.tree import OPTIONAL
 
 
 class GenOptions(NamedTuple):
-    """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both."""
+    """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both.
+
+    `topics` are those of recordings whose types are wanted; none means all.
+    """
 
     paths: tuple[str, ...]
     out: str = ""
+    topics: tuple[str, ...] = ()
     scope: Scope = Scope()
     check: bool = False
     vendor_deps: bool = False
@@ -43,9 +49,16 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
 
 def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    paths = [word for word in options.paths if not _is_name(word)]
-    words = [word for word in options.paths if _is_name(word)]
+    recordings, others = divided(options.paths)
+    paths = [word for word in others if not _is_name(word)]
+    words = [word for word in others if _is_name(word)]
     named = _named(words, options.scope, report, whole=bool(options.ament))
+    texts: Mapping[ir.TypeName, Source] = {}
+    if recordings and not report.had_errors:
+        from idlc.driver.gen_recorded import recorded_packages
+
+        recorded, texts = recorded_packages(recordings, options, report)
+        named += recorded
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
@@ -53,7 +66,7 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if not found:
         return ()
     with found[0].alone(beside=options.vendor_deps or len(found) > 1):
-        done = _made(dict(zip(found, given, strict=True)), options, report)
+        done = _made(dict(zip(found, given, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.driver.overlay import enter
 
@@ -105,9 +118,12 @@ def _named(
 
 
 def _made(
-    wanted: Mapping[Target, inputs.Inputs], options: GenOptions, report: Report
+    wanted: Mapping[Target, inputs.Inputs],
+    texts: Mapping[ir.TypeName, Source],
+    options: GenOptions,
+    report: Report,
 ) -> tuple[Generated, ...]:
-    library = library_for(tuple(wanted.values()), options.scope, report)
+    library = library_for(tuple(wanted.values()), options.scope, report, texts)
     if not (options.check or report.had_errors or _may_be_refused(wanted.values(), options)):
         current = [
             up_to_date(target, given.digests, library, options.vendor_deps)
@@ -120,7 +136,7 @@ def _made(
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
     if not report.had_errors and (more := completed(wanted.values(), needed, library)):
-        return _made(dict(zip(wanted, more, strict=True)), options, report)
+        return _made(dict(zip(wanted, more, strict=True)), texts, options, report)
     packages = []
     if not report.had_errors:
         packages = planned(

@@ -8,7 +8,6 @@ from itertools import chain
 from typing import NamedTuple, get_args
 
 from idlc.breaking import versions as comparison
-from idlc.breaking.allow import without_allowed
 from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.graph import (
     Endpoint,
@@ -28,7 +27,7 @@ from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
 from idlc.disk.scope import Scope
-from idlc.driver.breaking import BreakingOptions
+from idlc.driver.breaking import BreakingOptions, not_allowed
 from idlc.driver.stages import Compiler, models_of, stage
 from idlc.model import ir
 from idlc.model.described import NotBelievedError
@@ -80,7 +79,7 @@ def compare_with_graph(
     with stage("compare", "graph"):
         problems = _learn(questions, answers, known)
         changes = [*several_types(endpoints), *_changes(found, known, problems)]
-    left = _without_allowed(changes, options, report)
+    left = not_allowed(changes, options, report)
     wanted = [change for change in left if change.levels & set(options.levels)]
     report.extend(change.diagnostic for change in wanted)
     return GraphVerdict(
@@ -218,13 +217,3 @@ def _changes(
     seen: comparison.Seen = set()
     for versions in found:
         yield from comparison.changes(versions, known, problems, seen)
-
-
-def _without_allowed(
-    changes: Sequence[Change], options: BreakingOptions, report: Report
-) -> tuple[Change, ...]:
-    """Return the changes that nobody allowed; allowances may be for what does not run now."""
-    found = Report()
-    left = without_allowed(changes, options.allowed, options.today, options.allowed_in, found)
-    report.extend(one for one in found if one.code != codes.UNUSED_ALLOWANCE.id)
-    return left

@@ -13,6 +13,7 @@ from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.stages import compile_package, derived_names, sound_models, stage
 from idlc.model.distro import Distro, later
+from idlc.recordings.find import divided
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -73,6 +74,11 @@ def wanted_models(
             found = Report()
             yield from _named(one, scope, found)
             report.extend(found)
+    recordings, paths = divided(paths)
+    if recordings:
+        from idlc.driver.recorded_models import recorded_models
+
+        yield from recorded_models(recordings, scope, report)
     if paths:
         there = Report()
         given = inputs.packages(find(paths, there, scope.exclude), scope, there)

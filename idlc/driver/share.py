@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from idlc.diagnostics.report import Report
 from idlc.disk.environment import INDEX
 from idlc.driver.libraries import Libraries
+from idlc.export.file_text import file_text
 from idlc.export.idl import idl
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def shared(
     interfaces = {}
     for own in model.own:
         key = f"{own.name.kind}/{own.name.name}"
-        interfaces[f"{key}.{own.name.kind}"] = own.source.text if own.source else ""
+        interfaces[f"{key}.{own.name.kind}"] = file_text(own)
         interfaces[f"{key}.idl"] = idl(own)
         described = model.describer.installed(str(own.name))
         found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)

@@ -26,7 +26,7 @@ def show(wanted: str, style: str, scope: Scope, report: Report) -> list[str]:
             wholes.append(own.name)
             if str(own.name) in names:
                 with stage("show", str(own.name)):
-                    texts.append(_text(own, model, style))
+                    texts.append(shown(own, model, style))
     if not texts and not report.had_errors:
         message = f"`{wanted}` is a part of a service or action"
         hint = f"`idlc show {wholes[0]}` shows the whole" if wholes else None
@@ -34,7 +34,8 @@ def show(wanted: str, style: str, scope: Scope, report: Report) -> list[str]:
     return texts
 
 
-def _text(interface: ir.Interface, model: Model, style: str) -> str:
+def shown(interface: ir.Interface, model: Model, style: str) -> str:
+    """Return an interface in a format."""
     from idlc.export import idl, outline, schemas
 
     match style:

@@ -5,9 +5,10 @@ The passes are imported where they are used, so that a run with nothing to do co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
@@ -60,12 +61,12 @@ class Compiler:
     ) -> tuple[ir.Interface, ...]:
         """Return what texts define; from now on, references to their names mean these."""
         from idlc.model.lowering.file import lower
-        from idlc.syntax.parse import parse
+        from idlc.syntax.parse import parse_any
 
         own = []
         for name, source in sources:
             with stage("parse", source.path):
-                tree = parse(source)
+                tree = parse_any(source)
             with stage("lower", source.path):
                 found = Report()
                 own.append(lower(tree, name, found, self.library.distro))
@@ -83,6 +84,18 @@ class Compiler:
         with stage("check", package):
             check(model, report)
         return model
+
+    def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
+        """Return interfaces and all that they refer to, but for what is nowhere to be found."""
+        found: dict[ir.TypeName, ir.Interface] = {}
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
+            entry = None if name in found else self._pool.get(name)
+            if entry is not None:
+                found[name] = entry.interface
+                waiting += (target for _, target in entry.references)
+        return found
 
     def all(
         self, packages: Iterable[inputs.Inputs], report: Report
@@ -115,10 +128,17 @@ def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeNa
             yield ir.TypeName(given.package, one.file.kind, one.file.name), source
 
 
-def library_for(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> Library:
+def library_for(
+    packages: Sequence[inputs.Inputs],
+    scope: Scope,
+    report: Report,
+    texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+) -> Library:
     """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
-    return Library(scope.include, report, own=own, exclude=scope.exclude, distro=scope.distro)
+    return Library(
+        scope.include, report, own=own, exclude=scope.exclude, distro=scope.distro, texts=texts
+    )
 
 
 def models_of(

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any, TypedDict
 
 from idlc.emit import literals
+from idlc.export.file_text import file_text
 from idlc.model import derive, link
 from idlc.model.describe import IndividualDict
 
@@ -39,7 +40,7 @@ def content(model: link.Model) -> TypesDict:
             for one in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[one["type_name"]] = one
     sources = {
-        str(interface.name): interface.source.text
+        str(interface.name): file_text(interface)
         for interface in model.own
         if interface.source is not None
     }

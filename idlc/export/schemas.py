@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from idlc.export.file_text import file_text
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.model.spelling import spell
@@ -139,7 +140,7 @@ def mcap(interface: ir.Interface, model: Model) -> str:
     """Return a message's MCAP schema of encoding `ros2msg`: its text and those that it uses."""
     used = [model.interfaces[name] for name in _used(derive.sections(interface), model)]
     heads = [f"{MCAP_LINE}\nMSG: {one.name.package}/{one.name.name}\n" for one in used]
-    texts = [_ended(one.source.text if one.source else "") for one in (interface, *used)]
+    texts = [_ended(file_text(one)) for one in (interface, *used)]
     return "".join(head + text for head, text in zip(("", *heads), texts, strict=True))
 
 

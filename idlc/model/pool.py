@@ -13,7 +13,7 @@ from idlc.diagnostics.report import Diagnostic, Report, Severity
 from idlc.model import derive, ir
 from idlc.model.circles import circles
 from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.syntax.parse import parse_any
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -60,7 +60,7 @@ class Pool:
             self._entries[name] = None
             if source is not None:
                 found = Report()
-                self.add(lower(parse(source), name, found, self.library.distro), found)
+                self.add(lower(parse_any(source), name, found, self.library.distro), found)
         return self._entries[name]
 
     def __getitem__(self, name: ir.TypeName) -> Entry:

@@ -113,7 +113,9 @@ class Db3:
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")
             name, kind, encoding, digest = texts
-            schema_encoding, text, other = definitions.get(kind, ("", "", ""))
+            # the definition of a service goes with its events
+            known = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
+            schema_encoding, text, other = known or ("", "", "")
             definition = (digest or other, schema_encoding, text, counts.get(number, 0))
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics

@@ -60,10 +60,17 @@ def read_back(literal: str, text: str) -> str:
     if _end_of_literal(literal) != len(literal):
         raise EscapeError("a backslash that swallows the closing quote", *_place(text, r"\\+"))
     try:
-        once = re.sub(_READ, _reread, literal)
+        return inside_literal(literal)
     except ValueError:
         raise EscapeError(r"an incomplete `\x` escape", *_place(text, r"\\+x")) from None
-    return re.sub(r'\\(["\\])', r"\1", once)
+
+
+def inside_literal(literal: str) -> str:
+    """Return what rosidl's parser makes of the inside of a literal in an .idl file (step F).
+
+    Raises ValueError for an incomplete escape.
+    """
+    return re.sub(r'\\(["\\])', r"\1", re.sub(_READ, _reread, literal))
 
 
 def plain_meaning(text: str) -> str:

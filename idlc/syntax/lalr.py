@@ -13,7 +13,8 @@ from idlc.syntax import tree
 from idlc.syntax.grammar import grammar
 
 
-def _piece(token: Token) -> tree.Piece:
+def piece(token: Token) -> tree.Piece:
+    """Return a token as a piece."""
     return tree.Piece(str(token), _start(token))
 
 
@@ -45,19 +46,19 @@ class _Builder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x on
         return parts
 
     def string_bound(self, _: Token, size: Token) -> tree.Piece:
-        return _piece(size)
+        return piece(size)
 
     def array(self, *tokens: Token) -> _Array:
-        return _Array(len(tokens) == 2, _piece(tokens[-1]) if tokens else None)
+        return _Array(len(tokens) == 2, piece(tokens[-1]) if tokens else None)
 
     def type(self, name: Token, *parts: Any) -> tuple[Any, ...]:
-        return (_piece(name), *parts)
+        return (piece(name), *parts)
 
     def field(self, name: Token, default: Token | None = None) -> tuple[Any, ...]:
-        return _piece(name), None if default is None else _piece(default)
+        return piece(name), None if default is None else piece(default)
 
     def constant(self, *tokens: Token) -> dict[str, tree.Piece]:
-        return {token.type: _piece(token) for token in tokens}
+        return {token.type: piece(token) for token in tokens}
 
     def definition(self, type_: tuple[Any, ...], body: Any) -> tuple[Any, ...]:
         return type_, body

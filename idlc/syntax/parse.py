@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from idlc.diagnostics.source import Source
 from idlc.syntax import quick, tree
 from idlc.syntax.grammar import LINE_ENDS
+
+if TYPE_CHECKING:
+    from idlc.syntax import idl_tree
 
 #: Longer lines are parsed again rather than remembered.
 SHARED_LENGTH = 1000
@@ -34,6 +37,15 @@ def parse(source: Source) -> tree.File:
         tuple(tree.Section(start, lines) for start, lines in zip(starts, sections, strict=True)),
         separators,
     )
+
+
+def parse_any(source: Source) -> tree.File | idl_tree.File:
+    """Return the syntax of a file of either language; always succeeds."""
+    if not source.is_idl:
+        return parse(source)
+    from idlc.syntax.idl import parse_idl  # only recordings hold IDL
+
+    return parse_idl(source)
 
 
 def parse_definition(text: str) -> tree.Body:

@@ -39,6 +39,7 @@ READS_ITS_OWN = {
     "idlc/model/catalog.py",
     "idlc/scaffold/new_package.py",
     "idlc/syntax/grammar.py",
+    "idlc/syntax/idl.py",
     "idlc/templating.py",
 }
 

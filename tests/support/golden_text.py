@@ -10,6 +10,7 @@ expects nothing, and status 0. Besides idlc there are a few commands that make w
     fifo PATH           a named pipe                  link PATH TARGET   a symbolic link
     break STAGE         let a stage of idlc fail      list DIR           print the files in DIR
     graph [PATH]        let idlc see the nodes of a file, or have no rclpy
+    record PATH TEXT    an MCAP file of what a text says (recorded_text.py)
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import NamedTuple
 
 from idlc import __version__
 from idlc.cli.main import main
+from tests.support import recorded_text
 from tests.support.recorded_graph import RecordedGraph, end, take_the_place
 
 EXPECTED = ("stdout", "stderr", "exit")
@@ -128,6 +130,10 @@ def _fifo(path: str) -> None:
     os.mkfifo(path)
 
 
+def _record(path: str, text: str) -> None:
+    recorded_text.write(path, Path(text).read_text(encoding="utf-8"))
+
+
 def _list(folder: str) -> None:
     for path in sorted(path.as_posix() for path in Path(folder).rglob("*") if path.is_file()):
         print(path)
@@ -141,4 +147,5 @@ _PREPARATIONS = {
     "remove": lambda path: Path(path).unlink(),
     "link": lambda path, target: Path(path).symlink_to(target),
     "list": _list,
+    "record": _record,
 }

@@ -36,16 +36,22 @@ class Siblings:
         return catalog.source(name) if text is None else Source(str(name), text)
 
 
+def text_of(case):
+    """Return the text of a case, `None` for bytes that are no UTF-8."""
+    if "bytes_hex" not in case:
+        return case["text"]
+    try:
+        return bytes.fromhex(case["bytes_hex"]).decode("utf-8")
+    except UnicodeDecodeError:
+        return None
+
+
 def compile_case(case) -> tuple[Model | None, Report]:
     """Return the model of a case, `None` for bytes that are no UTF-8, and what was reported."""
     report = Report()
-    if "bytes_hex" in case:
-        try:
-            text = bytes.fromhex(case["bytes_hex"]).decode("utf-8")
-        except UnicodeDecodeError:
-            return None, report
-    else:
-        text = case["text"]
+    text = text_of(case)
+    if text is None:
+        return None, report
     name = ir.TypeName(case["pkg"], case["kind"], case["name"])
     source = Source(f"{case['name']}.{case['kind']}", text)
     interface = lower(parse(source), name, report, BY_NAME[case.get("distro", "jazzy")])

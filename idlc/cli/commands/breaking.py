@@ -31,10 +31,11 @@ LEVELS = ("wire", "hash", "source", "behaviour")
 @click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
 @click.option(
     "--against",
-    metavar="DIR|git:REF|idlc.lock|distro:NAME|graph",
-    help="The version to compare with: a folder, a git revision, the type hashes in a lock, the "
-    "standard interfaces of a distribution, or what the nodes of the running ROS 2 graph use "
-    "(a folder of that name is ./graph).",
+    metavar="DIR|git:REF|idlc.lock|REC|distro:NAME|graph",
+    help="The version to compare with: a folder, a git revision, the type hashes in a lock, "
+    "recordings (a pattern such as 'bags/*.mcap' means several), the standard interfaces of a "
+    "distribution, or what the nodes of the running ROS 2 graph use (a folder of that name is "
+    "./graph).",
 )
 @click.option(
     "--timeout",
@@ -47,7 +48,8 @@ LEVELS = ("wire", "hash", "source", "behaviour")
     "levels",
     multiple=True,
     type=click.Choice(LEVELS),
-    help="Only report what breaks this. May be repeated; otherwise all.",
+    help="Only report what breaks this. May be repeated; otherwise all, or against recordings what "
+    "readers of them would notice.",
 )
 @options.package
 @options.include
@@ -73,12 +75,15 @@ def command(
     With distro:NAME, the standard interfaces that PATH uses are compared with that
     distribution's, or all of them if there is no PATH.
 
+    Against recordings, the question is whether they can still be read: interfaces of PATH that
+    were recorded are compared, or without PATH all that are known here.
+
     Against the graph, it reports the types of which running nodes have several versions, or
     another one than the files here or the installed packages.
     """
     from idlc.cli.breaking_run import BreakingWishes, compare
 
     typed = BreakingWishes(
-        paths, against, timeout, levels or LEVELS, package, include, exclude, distro, style
+        paths, against, timeout, levels, package, include, exclude, distro, style
     )
     return compare(typed)

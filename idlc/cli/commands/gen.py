@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import options
+from idlc.cli import completion, options
 
 EPILOG = """\
 Example:
@@ -27,7 +27,7 @@ All options can be kept in pyproject.toml:
 
 
 @click.command("gen", epilog=EPILOG)
-@click.argument("paths", metavar="PATH|PACKAGE|TYPE...", nargs=-1, type=click.Path())
+@click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
 @click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
 @click.option(
     "--ament",
@@ -35,6 +35,14 @@ All options can be kept in pyproject.toml:
     type=click.Path(),
     default="",
     help="Install into a prefix, complete for ROS 2 and its C++ tools.",
+)
+@click.option(
+    "--topic",
+    "topics",
+    metavar="NAME",
+    multiple=True,
+    shell_complete=completion.topics,
+    help="Of recordings, only the types of this topic. May be repeated.",
 )
 @options.package
 @options.include
@@ -52,6 +60,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
 
     PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
     packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
+    REC is a recording, an .mcap or .db3 file or the folder of a bag: all that its topics need.
 
     OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
     number of packages can share, there is nothing to build: `source PREFIX/setup.bash`.

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report
-from idlc.diagnostics.source import Span
+from idlc.diagnostics.source import Source, Span
 from idlc.model import ir
 from idlc.model.distro import DEFAULT, Distro
 from idlc.model.lowering.section import lower_section
 from idlc.syntax import tree
 from idlc.syntax.escapes import EscapeError, through_idl
+
+if TYPE_CHECKING:
+    from idlc.syntax import idl_tree
 
 SECTIONS: dict[ir.Kind, tuple[str, ...]] = {
     "msg": ("",),
@@ -26,14 +30,19 @@ _NUMBERS = ("no", "one", "two")
 
 
 def lower(
-    file: tree.File, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
+    file: tree.File | idl_tree.File, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
 ) -> ir.Interface:
     """Return the interface that a file defines for a distribution; missing sections are empty.
 
     Reports everything that is wrong inside the file; types of other files are `link`'s.
     """
-    _check_reading(file, report)
     suffixes = SECTIONS[name.kind]
+    if not isinstance(file, tree.File):
+        from idlc.model.lowering.idl import lower_idl  # only recordings hold IDL
+
+        wanted = [name._replace(name=name.name + suffix) for suffix in suffixes]
+        return _assembled(name, lower_idl(file, wanted, report), file.source, report)
+    _check_reading(file, report)
     _check_separators(file, name.kind, len(suffixes), report)
     empty = tree.Section(len(file.source.text), ())
     sections = (*file.sections, *([empty] * len(suffixes)))
@@ -41,13 +50,20 @@ def lower(
         lower_section(file, section.lines, name._replace(name=name.name + suffix), report, distro)
         for suffix, section in zip(suffixes, sections, strict=False)
     ]
+    return _assembled(name, parts, file.source, report)
+
+
+def _assembled(
+    name: ir.TypeName, parts: list[ir.Message], source: Source, report: Report
+) -> ir.Interface:
+    """Return the interface that sections are."""
     parts = _without_moved_constants(parts, report)
     if name.kind == "msg":
         return parts[0]
     if name.kind == "srv":
-        return ir.Service(name=name, request=parts[0], response=parts[1], source=file.source)
+        return ir.Service(name=name, request=parts[0], response=parts[1], source=source)
     goal, result, feedback = parts
-    return ir.Action(name=name, goal=goal, result=result, feedback=feedback, source=file.source)
+    return ir.Action(name=name, goal=goal, result=result, feedback=feedback, source=source)
 
 
 def _check_reading(file: tree.File, report: Report) -> None:

@@ -169,7 +169,7 @@ def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fau
         return pieces.moved(1)
     if len(pieces) > MAX_ELEMENTS:
         return _too_many(text)
-    if (wrong := _wrong_length(type_, len(pieces), text)) is not None:
+    if (wrong := wrong_length(type_, len(pieces), text)) is not None:
         return wrong
     assert isinstance(type_.element, (ir.Primitive, ir.String))
     values: list[Number | str] = []
@@ -216,7 +216,8 @@ def _too_many(text: str) -> Fault:
     return _fault(codes.TOO_LARGE, text, message, "set the value in code")
 
 
-def _wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:
+def wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:
+    """Return what is wrong with a default of so many elements, or `None`."""
     if isinstance(type_, ir.Array):
         expected, wrong = f"exactly {type_.size}", count != type_.size
     else:

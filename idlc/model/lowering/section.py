@@ -10,7 +10,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Span
-from idlc.model import ir, names
+from idlc.model import ir
 from idlc.model.distro import Distro
 from idlc.model.lowering import slips
 from idlc.model.lowering.comments import Comment, condense, problem
@@ -190,15 +190,8 @@ class _Section:
         return lowered
 
     def _field(self, line: tree.Line, body: tree.Field, about: Comment) -> ir.Field:
-        if not names.is_field_name(body.name.text):
-            like = names.field_name_like(body.name.text)
-            self.report.add(
-                codes.INVALID_FIELD_NAME.at(
-                    self.file.span(line, body.name),
-                    f"`{body.name.text}` cannot be a field name",
-                    hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
-                )
-            )
+        wrong = slips.field_name(body.name.text, self.file.span(line, body.name))
+        self.report.extend([wrong] if wrong else [])
         type_ = self._type(line, body.type)
         return ir.Field(
             name=body.name.text,
@@ -233,16 +226,8 @@ class _Section:
         return found
 
     def _constant(self, line: tree.Line, body: tree.Constant, about: Comment) -> ir.Constant | None:
-        if not names.is_constant_name(body.name.text):
-            upper = names.field_name_like(body.name.text).upper()
-            hint = f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT
-            self.report.add(
-                codes.INVALID_CONSTANT_NAME.at(
-                    self.file.span(line, body.name),
-                    f"`{body.name.text}` cannot be a constant name",
-                    hint=hint,
-                )
-            )
+        wrong = slips.constant_name(body.name.text, self.file.span(line, body.name))
+        self.report.extend([wrong] if wrong else [])
         type_ = self._constant_type(line, body.type)
         if type_ is None:
             return None

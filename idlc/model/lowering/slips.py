@@ -9,6 +9,8 @@ import re
 from itertools import takewhile
 
 from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic
+from idlc.diagnostics.source import Span
 from idlc.model import ir, names
 from idlc.model.lowering.fault import Fault
 from idlc.syntax import tree
@@ -181,3 +183,27 @@ def _constant(body: tree.Constant) -> Fault | None:
             hint += f"; a constant is called `{name.text.upper()}`"
         return Fault(codes.INVALID_CONSTANT_NAME, message, name.start, name.end, hint)
     return None
+
+
+def field_name(name: str, span: Span) -> Diagnostic | None:
+    """Return the problem with a field's name, or `None`."""
+    if names.is_field_name(name):
+        return None
+    like = names.field_name_like(name)
+    return codes.INVALID_FIELD_NAME.at(
+        span,
+        f"`{name}` cannot be a field name",
+        hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
+    )
+
+
+def constant_name(name: str, span: Span) -> Diagnostic | None:
+    """Return the problem with a constant's name, or `None`."""
+    if names.is_constant_name(name):
+        return None
+    upper = names.field_name_like(name).upper()
+    return codes.INVALID_CONSTANT_NAME.at(
+        span,
+        f"`{name}` cannot be a constant name",
+        hint=f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT,
+    )

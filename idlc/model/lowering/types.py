@@ -21,7 +21,7 @@ def lower_type(type_: tree.Type, package: str) -> ir.FieldType | Fault:
         return element
     if type_.size is None:
         return ir.Sequence(element)
-    size = _positive(type_.size, "the array's size")
+    size = positive(type_.size, "the array's size")
     if isinstance(size, Fault):
         return size
     return ir.Sequence(element, size) if type_.at_most else ir.Array(element, size)
@@ -38,7 +38,7 @@ def as_parsed(type_: ir.FieldType) -> ir.FieldType:
 def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
     name = type_.name.text
     if name in STRINGS:
-        bound = None if type_.bound is None else _positive(type_.bound, "the string's bound")
+        bound = None if type_.bound is None else positive(type_.bound, "the string's bound")
         return bound if isinstance(bound, Fault) else ir.String(STRINGS[name], bound)
     if type_.bound is not None:
         piece = tree.Piece("<=" + type_.bound.text, type_.bound.start - 2)
@@ -83,7 +83,8 @@ def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
     return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 
-def _positive(piece: tree.Piece, what: str) -> int | Fault:
+def positive(piece: tree.Piece, what: str) -> int | Fault:
+    """Return the size or bound that a piece is."""
     try:
         value = int(piece.text)
     except ValueError:

@@ -2,7 +2,8 @@
 
 A case has `kind`, `pkg`, `name`, `bytes_hex` (the file's bytes) and `siblings` (path to text). An
 outcome has `stage` (where rosidl gave up: adapter, parser, type_description or generator_py; null
-if it did not), `parsed` (the structures as its parser sees them) and `hash`, as in golden/spec.
+if it did not), `parsed` (the structures as its parser sees them) and `hash`, as in golden/spec,
+and as `idl` the .idl file that the adapter wrote.
 """
 
 import json
@@ -94,6 +95,9 @@ class Pipeline:
         for path in self.files:
             convert_to_idl(self.sources, self.case["pkg"], Path(path), self.idl)
 
+    def idl_text(self):
+        return (self.idl / self.files[0]).with_suffix(".idl").read_bytes().decode(errors="replace")
+
     def parser(self):
         path = Path(self.files[0]).with_suffix(".idl")
         content = parse_idl_file(idl.IdlLocator(self.idl, path)).content
@@ -139,6 +143,8 @@ def outcome_of(case):
             except (Exception, SystemExit) as error:
                 outcome |= {"stage": stage, "error": type(error).__name__}
                 break
+            if stage == "adapter":
+                outcome["idl"] = pipeline.idl_text()
     outcome.pop("", None)
     return outcome
 

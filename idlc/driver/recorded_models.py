@@ -1,0 +1,70 @@
+"""Recordings for the commands that check and answer: each by itself, all that it defines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Label, Report
+from idlc.diagnostics.source import Span
+from idlc.disk.scope import Scope
+from idlc.driver.recorded import Version, contradictions, read, versions
+from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.stages import derived_names
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+
+
+def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
+    """Report what is wrong with what recordings say of their types."""
+    around = Around(scope, report)
+    for path in paths:
+        recording = read(path, report)
+        found = versions(recording.topics) if recording else []
+        check_versions(found, report)
+        for version in found:
+            types = RecordedTypes(version, around, scope, report)
+            report.extend(contradicted(types))
+            report.extend(types.errors)
+
+
+def check_versions(found: Sequence[Version], report: Report) -> None:
+    """Report IDL653 for each name with several definitions."""
+    for name, first, second in contradictions(found):
+        report.add(
+            codes.SEVERAL_DEFINITIONS.at(
+                Span(second, 0, 0),
+                f"this defines `{name}` in another way",
+                labels=(Label(Span(first, 0, 0), "this is the other"),),
+                hint="choose topics that agree, or one recording after the other",
+            )
+        )
+
+
+def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
+    """Yield IDL654 for each topic whose definition is not that of what was recorded."""
+    for one in types.topics:
+        topic, hash_ = one.recorded.topic, types.hash(one)
+        if topic.hash and hash_ and topic.hash != hash_:
+            yield codes.RECORDED_HASH_DIFFERS.of(
+                f"{one.recorded.recording}: topic {topic.name}",
+                f"the definition of `{one.name}` is not that of what was recorded",
+                hint="the recorder found another version of its files than the publisher used",
+                detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
+            )
+
+
+def recorded_models(
+    paths: Sequence[str], scope: Scope, report: Report
+) -> Iterator[tuple[Model, list[str]]]:
+    """Yield the models of recordings, without what has errors, and the names of all in them."""
+    around = Around(scope, report)
+    for path in paths:
+        recording = read(path, report)
+        for version in versions(recording.topics) if recording else ():
+            types = RecordedTypes(version, around, scope, report)
+            for model in types.models.values():
+                yield model, [name for one in model.own for name in derived_names(one)]
+            report.extend(types.errors)

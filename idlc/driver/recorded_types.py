@@ -1,0 +1,206 @@
+"""The types of recorded topics, compiled; what a recording does not define is looked up here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import NamedTuple
+
+from idlc.checks.size import Extents, oversized
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
+from idlc.diagnostics.source import Source
+from idlc.disk import nearby
+from idlc.disk.library import Library
+from idlc.disk.scope import Scope
+from idlc.driver.recorded import Version
+from idlc.driver.stages import Compiler
+from idlc.model import derive, ir
+from idlc.model.describe import Describer
+from idlc.model.link import Model
+from idlc.model.lowering.file import lower
+from idlc.recordings.definitions import ENCODINGS, Recorded
+from idlc.syntax.parse import parse_any
+
+#: Names that are told in a sentence.
+NAMED = 5
+
+
+class Typed(NamedTuple):
+    """A topic of a type that is known, by the recording or by what is around here."""
+
+    recorded: Recorded
+    name: ir.TypeName
+    interface: ir.TypeName
+
+
+class Around:
+    """The types that are known here without any recording."""
+
+    def __init__(self, scope: Scope, report: Report) -> None:
+        self.library = Library(scope.include, report, own=nearby.near(), distro=scope.distro)
+        self._compiler = Compiler(self.library)
+
+    def model(self, package: str, names: Iterable[ir.TypeName]) -> Model:
+        """Return the model of those of a package's interfaces that are known and sound."""
+        found = self._compiler.reached(names)
+        report = Report()
+        model = self._compiler.model(package, list(found.values()), report)
+        return model.sound({one.where[0] for one in report if one.severity is Severity.ERROR})
+
+    def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
+        """Return the hash of a type, which an interface implies; `None` if it is not known."""
+        model = self.model(interface.package, [interface])
+        return model.describer.hash(str(name)) if has(model, name) else None
+
+
+def has(model: Model, name: ir.TypeName) -> bool:
+    """Return whether a structure or interface is in a model."""
+    return name in model.messages or name in model.interfaces
+
+
+class RecordedTypes:
+    """What the topics of a version mean, and all that these types refer to."""
+
+    def __init__(self, version: Version, around: Around, scope: Scope, report: Report) -> None:
+        """Look the types up; reports IDL652 for what the recording does not define."""
+        library = around.library
+        texts = {name: one for name, one in version.texts.items() if _counts(name, one, library)}
+        texts |= _empty_ones(version.topics, texts)
+        self.library = Library(
+            scope.include, Report(), own=nearby.near(), distro=scope.distro, texts=texts
+        )
+        self.topics = tuple(_typed(version.topics, texts, around, report))
+        self._compiler = Compiler(self.library)
+        self.interfaces = self._compiler.reached(one.interface for one in self.topics)
+        self.errors = Report()
+        report.extend(self._doubts())
+
+    @property
+    def texts(self) -> Mapping[ir.TypeName, Source]:
+        """The definitions that are the recording's."""
+        return self.library.texts
+
+    @property
+    def names(self) -> dict[str, set[ir.TypeName]]:
+        """The names of all that is needed, by package."""
+        found: dict[str, set[ir.TypeName]] = {}
+        for name in self.interfaces:
+            found.setdefault(name.package, set()).add(name)
+        return found
+
+    def _doubts(self) -> Iterator[Diagnostic]:
+        """Yield IDL652 for definitions that are not the recording's, and that no hash confirms."""
+        doubtful: dict[str, set[ir.TypeName]] = {}
+        for one in self.topics:
+            missing = _explicit([one.interface], self.interfaces) - self.texts.keys()
+            if missing and one.recorded.topic.hash != self.hash(one):
+                doubtful.setdefault(one.recorded.recording, set()).update(missing)
+        for recording, found in doubtful.items():
+            names = first_few((f"`{name}`" for name in sorted(found)), NAMED)
+            yield codes.MISSING_DEFINITION.of(
+                recording,
+                f"there is no definition of {names}; what is known here by that name is used",
+                hint="see to it that it is what was recorded, or point -I to what is",
+            )
+
+    @cached_property
+    def models(self) -> dict[str, Model]:
+        """The model of each package without what has errors, which are in `errors` then."""
+        found = Report()
+        models = {
+            package: self._compiler.model(
+                package, [self.interfaces[name] for name in sorted(names)], found
+            )
+            for package, names in sorted(self.names.items())
+        }
+        if not found.had_errors:
+            extents: Extents = {}
+            for model in models.values():
+                found.extend(oversized(model, extents))
+        self.errors.extend(one for one in found if one.severity is Severity.ERROR)
+        broken = {one.where[0] for one in self.errors}
+        return {name: one.sound(broken) for name, one in models.items()} if broken else models
+
+    def hash(self, topic: Typed) -> str | None:
+        """Return the hash of the type that definitions make; `None` if these have errors."""
+        model = self.models[topic.name.package]
+        return model.describer.hash(str(topic.name)) if has(model, topic.name) else None
+
+
+def _counts(name: ir.TypeName, source: Source, around: Library) -> bool:
+    """Return whether a definition is used: not if it is IDL that only others read."""
+    if not source.is_idl or around.source(name) is None:
+        return True
+    report = Report()
+    lower(parse_any(source), name, report)
+    return not report.had_errors
+
+
+def _empty_ones(
+    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source]
+) -> Iterator[tuple[ir.TypeName, Source]]:
+    """Yield the messages whose definitions are empty because they are, as their hashes say."""
+    for topic in topics:
+        name, recorded = topic.interface, topic.topic.hash
+        if name is None or name.kind != "msg" or name in texts:
+            continue
+        if Describer({name: ir.Message(name=name)}).hash(str(name)) == recorded:
+            yield name, Source(f"{topic.recording}: topic {topic.topic.name}: {name}.msg", "")
+
+
+def _typed(
+    topics: Iterable[Recorded],
+    texts: Mapping[ir.TypeName, Source],
+    around: Around,
+    report: Report,
+) -> Iterator[Typed]:
+    """Yield the topics whose types are known; report the others."""
+    missing: dict[tuple[str, str], list[str]] = {}
+    for one in topics:
+        if one.name is None or one.interface is None:
+            why = _foreign(one)
+        else:
+            why = "" if one.interface in texts else _why_not_around(one, around)
+            if not why:
+                yield Typed(one, one.name, one.interface)
+        if why:
+            missing.setdefault((one.recording, why), []).append(one.topic.name)
+    for (recording, why), names in missing.items():
+        listed = first_few((f"`{name}`" for name in names), NAMED)
+        hint = None if "no type of" in why else "point -I to the package's sources"
+        report.add(
+            codes.MISSING_DEFINITION.of(recording, f"{listed} is left out: {why}", hint=hint)
+        )
+
+
+def _foreign(one: Recorded) -> str:
+    schema = one.topic.schema
+    if not one.topic.type:
+        return "it has no type of ROS 2"
+    what = f", but of {schema.encoding}" if schema and schema.encoding not in ENCODINGS else ""
+    return f"`{one.topic.type}` is no type of ROS 2{what}"
+
+
+def _why_not_around(one: Recorded, around: Around) -> str:
+    """Return why what is known here does not stand in for a definition; empty if it does."""
+    assert one.name is not None
+    assert one.interface is not None
+    if around.library.source(one.interface) is None:
+        return f"there is no definition of `{one.interface}`"
+    if one.topic.hash and one.topic.hash != around.hash(one.name, one.interface):
+        return f"there is no definition of `{one.interface}`, and the one known here is another"
+    return ""
+
+
+def _explicit(
+    names: Iterable[ir.TypeName], interfaces: Mapping[ir.TypeName, ir.Interface]
+) -> set[ir.TypeName]:
+    """Return what files name, and the files of these, without what ROS 2 adds by itself."""
+    found: set[ir.TypeName] = set()
+    waiting = set(names) & interfaces.keys()
+    while waiting:
+        found |= waiting
+        named = set[ir.TypeName]().union(*(derive.references(interfaces[one]) for one in waiting))
+        waiting = (named & interfaces.keys()) - found
+    return found

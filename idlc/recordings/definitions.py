@@ -1,0 +1,101 @@
+"""What a recording says of its types → interface texts by name.
+
+The texts are anybody's: a name that ROS 2 would not allow is no name, and what is said twice
+counts once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from idlc.diagnostics.source import Source
+from idlc.model import ir, names
+from idlc.recordings.container import Topic
+
+IDL = "ros2idl"
+#: `unknown` is what a recorder says of a service that refers to no message.
+ENCODINGS = ("ros2msg", IDL, "unknown", "")
+#: Characters of one definition with all that it refers to; real ones stay below 1 MiB.
+MAX_TEXT = 16 << 20
+_DELIMITER = re.compile(
+    r"^={80}[ \t]*\r?\n(MSG|IDL|SRV|ACTION):[ \t]*([^\s]*)[^\n]*(?:\n|\Z)", re.MULTILINE
+)
+_KINDS: dict[str, ir.Kind] = {"MSG": "msg", "IDL": "msg", "SRV": "srv", "ACTION": "action"}
+#: A field whose type is written as pkg/msg/Name, as some recorders do; and what has no effect and
+#: only newer distributions read.
+_ODDITIES = re.compile(r"^(?:@optional[ \t]*)?(?:(\w+/)msg/(?=\w))?", re.MULTILINE)
+#: What ROS 2 adds to the names of services and actions.
+_DERIVED = re.compile(
+    r"_((SendGoal|GetResult)_)?(Request|Response|Event)$|_(SendGoal|GetResult|FeedbackMessage)$"
+    r"|_(Goal|Result|Feedback)$"
+)
+
+
+class Recorded(NamedTuple):
+    """A topic, the interface that its messages are of, and all texts that came with it.
+
+    `name` may be derived from the `interface`; both are `None` for what is no type of ROS 2.
+    `recording` is how messages call the recording.
+    """
+
+    recording: str
+    topic: Topic
+    name: ir.TypeName | None
+    interface: ir.TypeName | None
+    texts: dict[ir.TypeName, Source]
+
+
+def recorded(topic: Topic, recording: str) -> Recorded:
+    """Return what a recording, as it is called in messages, says of a topic."""
+    name = type_name(topic.type)
+    if name is None:
+        return Recorded(recording, topic, None, None, {})
+    interface = interface_of(name)
+    texts: dict[ir.TypeName, Source] = {}
+    for one, extension, text in _definitions(topic, interface):
+        place = f"{recording}: topic {topic.name}: {one}.{extension}"
+        texts.setdefault(one, Source(place, text))
+    return Recorded(recording, topic, name, interface, texts)
+
+
+def type_name(text: str, kind: ir.Kind = "msg") -> ir.TypeName | None:
+    """Return the type that `pkg/Name` or `pkg/kind/Name` means, if ROS 2 allows such a name."""
+    package, _, rest = text.partition("/")
+    word, slash, name = rest.rpartition("/")
+    if slash and word not in ir.KINDS:
+        return None
+    found = ir.TypeName(package, word if slash else kind, name)  # type: ignore[arg-type]
+    own = interface_of(found).name
+    is_sound = names.is_package_name(package) and names.is_message_name(own)
+    return found if is_sound else None
+
+
+def interface_of(name: ir.TypeName) -> ir.TypeName:
+    """Return the interface that a type is, or is derived from."""
+    if name.kind == "msg":
+        return name
+    return name._replace(name=_DERIVED.sub("", name.name))
+
+
+def _definitions(topic: Topic, root: ir.TypeName) -> Iterator[tuple[ir.TypeName, str, str]]:
+    """Yield name, extension and text of each definition that came with a topic."""
+    schema = topic.schema
+    if schema is None or schema.encoding not in ENCODINGS or len(schema.text) > MAX_TEXT:
+        return
+    is_idl = schema.encoding == IDL
+    head, *parts = _DELIMITER.split(schema.text)
+    if head.strip() and schema.encoding in ENCODINGS[:2]:
+        yield root, "idl" if is_idl else root.kind, _tidy(head, is_idl)
+    for mark, written, text in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
+        name = type_name(written, _KINDS[mark])
+        if name is not None:
+            own = interface_of(name)
+            yield own, "idl" if mark == "IDL" else own.kind, _tidy(text, mark == "IDL")
+
+
+def _tidy(text: str, is_idl: bool) -> str:
+    """Return a text as every distribution reads it, without the line ends that recorders add."""
+    text = text.rstrip("\r\n") + "\n" if text.strip() else ""
+    return text if is_idl else _ODDITIES.sub(r"\1", text)

@@ -1,0 +1,70 @@
+"""Which words on the command line mean recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from glob import glob, has_magic
+from pathlib import Path
+
+from idlc.disk.enclosing_package import MANIFEST
+from idlc.disk.find import KIND_FOLDERS, KINDS
+from idlc.disk.read import is_file, is_folder
+from idlc.recordings.bag import COMPRESSED, METADATA, SUFFIXES
+
+
+def is_recording(word: str) -> bool:
+    """Return whether a path means a recording: an .mcap or .db3 file, or the folder of a bag.
+
+    A folder is that of a bag if it has a metadata.yaml, or recordings and no interfaces.
+    """
+    path = Path(word)
+    if path.name.endswith((*SUFFIXES, *COMPRESSED)):
+        return not is_folder(path) or _is_bag(path)
+    return is_folder(path) and _is_bag(path)
+
+
+def _is_bag(folder: Path) -> bool:
+    try:
+        found = list(folder.iterdir())
+    except OSError:
+        return False
+    if not any(one.name.endswith((*SUFFIXES, *COMPRESSED)) and is_file(one) for one in found):
+        return False
+    names = {one.name for one in found}
+    is_package = bool(names & {*KIND_FOLDERS, MANIFEST}) or any(
+        one.suffix in KINDS for one in found
+    )
+    return METADATA in names or not is_package
+
+
+def is_there(word: str) -> bool:
+    """Return whether a path leads to a regular file or a folder."""
+    return is_file(word) or is_folder(Path(word))
+
+
+def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return the words that mean recordings, and the others."""
+    recordings: list[str] = []
+    others: list[str] = []
+    for word in words:
+        (recordings if is_recording(word) else others).append(word)
+    return recordings, others
+
+
+def expanded(word: str) -> list[str]:
+    """Return the paths that a word means, which may be a pattern such as `bags/*.mcap`."""
+    if has_magic(word) and not is_there(word):
+        return sorted(glob(word, recursive=True))  # noqa: PTH207 - keeps what was typed
+    return [word]
+
+
+def recordings_of(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the recordings that --against means, which may be a pattern, and the other paths.
+
+    A shell that expands the pattern itself leaves all but the first among the paths.
+    """
+    found = expanded(against)
+    if not divided(found)[0]:
+        return (), paths
+    more, others = divided(paths)
+    return tuple(dict.fromkeys((*found, *more))), tuple(others)

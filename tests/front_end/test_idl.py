@@ -1,0 +1,157 @@
+"""The .idl files that ROS 2 makes of interface files mean what those mean; no other IDL is read."""
+
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.export.idl import idl
+from idlc.model import catalog, ir
+from idlc.model.distro import DISTROS
+from idlc.model.lowering.file import lower
+from idlc.syntax.parse import parse, parse_any
+from tests.support import idl_view
+
+SHARE = Path(sys.prefix) / "share"
+INSTALLED = sorted(SHARE.glob("*/*/*.idl"))
+NAME = ir.TypeName("demo", "msg", "Example")
+HEAD = "module demo {\n  module msg {\n"
+TAIL = "  };\n};\n"
+
+
+def test_every_installed_interface_means_the_same():
+    assert len(INSTALLED) > 150
+    for path in INSTALLED:
+        package, kind, _ = path.parts[-3:]
+        name = ir.TypeName(package, kind, path.stem)
+        texts = [one.read_text(encoding="utf-8") for one in (path, path.with_suffix(f".{kind}"))]
+        assert idl_view.read(texts[0], name) == idl_view.read(texts[1], name), path
+
+
+@pytest.mark.parametrize("distro", DISTROS, ids=lambda distro: distro.name)
+def test_what_idlc_itself_writes_is_read_back(distro):
+    for name in catalog.interfaces(distro):
+        text = catalog.source(name, distro).text
+        made = idl(lower(parse(Source("", text)), name, Report(), distro))
+        assert idl_view.read(made, name) == idl_view.read(text, name), name
+
+
+def read(inside):
+    """Return the interface in a module and what is wrong with it, as code and guilty text."""
+    report = Report()
+    source = Source("demo.idl", HEAD + inside + TAIL)
+    found = lower(parse_any(source), NAME, report)
+    return found, [(one.code, one.span.text) for one in report]
+
+
+@pytest.mark.parametrize(
+    ("inside", "guilty"),
+    [
+        ("enum Colour { RED, GREEN };", "enum"),
+        ("union U switch (long) { case 1: long a; };", "union"),
+        ("@mutable struct Example { long a; };", "long"),
+        ("struct Example { long a; };", "long"),
+        ("struct Example { unsigned long a; };", "a"),
+        ("struct Example { int32 a, b; };", ","),
+        ("struct Example { int32 a[3]; };", "["),
+        ("struct Example { @key int32 a; };", "key"),
+        ("struct Example { @default(value=1 + 2) int32 a; };", "+"),
+        ("struct Example { sequence<sequence<int32> > a; };", "int32"),
+        ("struct Example { map<string, int32> a; };", "string"),
+        ("struct Example { other::Thing a; };", "other::Thing"),
+        ("struct Example { Thing a; };", "Thing"),
+        ("struct Example : Base { int32 a; };", ":"),
+        ("struct Example { int32 a; }; struct Other { int32 a; };", "Other"),
+        ("struct Example { int32 a; }; struct Example { int32 a; };", "Example"),
+        ("struct Other { int32 a; };", "Other"),
+        ("typedef int32 a__2[2]; typedef a__2 b__2[2]; struct Example { b__2 c; };", "b__2"),
+        ("typedef int32 a__2[2]; struct Example { sequence<a__2> c; };", "int32"),
+        ("typedef a b; typedef b a; struct Example { a c; };", "a"),
+        ("const int32 A = 1; struct Example { int32 a; };", "const"),
+        ("struct Example { int32 a; }", "}"),
+        ("struct Example { int32 a;", ""),
+        ("#define A 1\nstruct Example { int32 a; };", "#"),
+    ],
+)
+def test_other_idl_is_refused_at_its_first_place(inside, guilty):
+    _, problems = read(inside)
+    assert problems[0][0] == "IDL114"
+    assert problems[0][1] == guilty
+
+
+@pytest.mark.parametrize(
+    ("inside", "expected"),
+    [
+        ("struct Example { string<0> a; };", ("IDL301", "0")),
+        ("typedef int32 a__0[0]; struct Example { a__0 a; };", ("IDL301", "0")),
+        ("struct Example { sequence<int32, 0> a; };", ("IDL301", "0")),
+        ("struct Example { int32 camelCase; };", ("IDL203", "camelCase")),
+        ("struct Example { int32 class__; };", ("IDL203", "class__")),
+        ("module Example_Constants { const int32 a = 1; }; struct Example { int8 a; };", None),
+        ("struct Example { @default (value=300) uint8 a; };", ("IDL305", "300")),
+        ("struct Example { @default (value=x) uint8 a; };", ("IDL304", "x")),
+        ('struct Example { @default (value="1") uint8 a; };', ("IDL304", '"1"')),
+        ('struct Example { @default (value="(1, 2)") sequence<bool> a; };', ("IDL114", "bool")),
+        ('struct Example { @default (value="(1, 2)") sequence<boolean> a; };', ("IDL304", None)),
+        ('struct Example { @default (value="(1, 2") sequence<int8> a; };', ("IDL304", None)),
+        ('struct Example { @default (value="(1, 2)") sequence<int8, 1> a; };', ("IDL309", None)),
+        ('struct Example { @default (value="f()") sequence<int8> a; };', ("IDL304", None)),
+        ('struct Example { @default (value="abc") string<2> a; };', ("IDL304", None)),
+        ("struct Example { @default (value=1) other_msgs::msg::A a; };", ("IDL114", "1")),
+    ],
+)
+def test_wrong_values_and_names_have_their_own_codes(inside, expected):
+    _, problems = read(inside)
+    code, text = expected or ("IDL204", "a")
+    assert problems[0][0] == code
+    assert text is None or problems[0][1] == text
+
+
+def test_the_text_must_define_what_it_is_said_to():
+    report = Report()
+    text = HEAD.replace("demo", "other") + "struct Example { int32 a; };" + TAIL
+    lower(parse_any(Source("x.idl", text)), NAME, report)
+    assert [(one.code, one.span.text) for one in report] == [("IDL114", "other")]
+
+
+def test_words_of_idl_may_be_names():
+    words = ["module", "struct", "sequence", "string", "const", "typedef", "boolean", "int32"]
+    found, problems = read(
+        "struct Example {" + "".join(f"int32 {word};\n" for word in words) + "};"
+    )
+    assert problems == []
+    assert [field.name for field in found.fields] == words
+
+
+def test_nothing_in_it_takes_for_ever_or_all_memory():
+    for text in (
+        "struct Example {" + "sequence<" * 100_000,
+        "@a " * 100_000,
+        "/*" * 100_000,
+        '"\\' * 100_000,
+        'struct Example { @default (value="' + "(" * 100_000 + '") sequence<int8> a; };',
+        "struct Example { @default (value=" + "9" * 100_000 + ") int8 a; };",
+        "typedef int8 a[" + "9" * 100_000 + "]; struct Example { a b; };",
+    ):
+        assert read(text)[1]
+
+
+PIECES = (
+    'module struct typedef const sequence string int32 Example a A { } < > ( ) [ ] ; , = :: @ "" '
+    '"\\n" "x" 1 -1.5e3 TRUE @default @verbatim value text // /* */ #include demo::msg::B'
+).split()
+
+
+@given(st.lists(st.sampled_from(PIECES) | st.text(max_size=3), max_size=30).map(" ".join))
+def test_any_text_ends_in_a_meaning_or_a_problem(inside):
+    for text in (inside, HEAD + inside + TAIL, f"{HEAD}struct Example {{ {inside} }};{TAIL}"):
+        report = Report()
+        source = Source("x.idl", text)
+        found = lower(parse_any(source), NAME, report)
+        assert isinstance(found, ir.Message)
+        for one in report:
+            assert one.span is None or 0 <= one.span.start <= one.span.end <= len(text)
