@@ -11,10 +11,10 @@ from idlc import __version__
 from idlc.diagnostics.report import Report
 from idlc.disk import cache
 from idlc.recordings.errors import RecordingError
-from idlc.runtime.names import public_name
+from idlc.emit.pynames import class_
+from idlc.model import ir
 
 if TYPE_CHECKING:
-    from idlc.model import ir
     from idlc.model.link import Model
     from idlc.recordings.container import Topic
     from idlc.templating import RenderedFile
@@ -43,7 +43,7 @@ class Loaded(ModuleType):
     def __init__(self, name: str, packages: Iterable[str], asked: Iterable[ir.TypeName]) -> None:
         super().__init__(name, "What `idlc.load` compiled.")
         self._packages = sorted(packages)
-        self._asked = {public_name(one.name): one for one in asked}
+        self._asked = {str(class_(one)): one for one in asked}
 
     def __getattr__(self, name: str) -> Any:
         if name in self._packages:
@@ -83,12 +83,12 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
 def class_of(topic: Topic) -> Any:
     """Return the class of a topic's messages, compiled from what was recorded."""
     key = topic.schema and _key([topic.type, topic.schema.encoding, topic.schema.text])
-    if not key or not cache.has(key):
+    if not (key and cache.has(key)):
         from idlc.driver.loading import topic_models
 
         models, is_recorded = topic_models(topic)
         # what was borrowed from around here may be another thing tomorrow
-        key = _kept(models, key if is_recorded else None)
+        key = _kept(models, key if is_recorded else "")
     return _class(f"{LOADED}.{key}", topic.type)
 
 
@@ -120,12 +120,12 @@ def accepted(kind: Any, topic: Topic) -> Any:
 def _class(home: str, name: str) -> Any:
     package, kind, short = name.split("/")
     found: Any = import_module(f"{home}.{package}.{kind}")
-    return getattr(found, public_name(short))
+    return getattr(found, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
 
 
-def _kept(models: Mapping[str, Model], key: str | None = None) -> str:
+def _kept(models: Mapping[str, Model], key: str = "") -> str:
     """Return the name under which the packages are kept, after they are written if need be."""
-    if key is None:
+    if not key:
         texts = [
             text
             for model in models.values()

@@ -58,9 +58,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
     return models
 
 
-def _of_recording(
-    path: str, where: Scope, report: Report
-) -> tuple[Models, list[ir.TypeName]]:
+def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
     recording = read(path, report)
     found = versions(recording.topics) if recording else []
     if len(found) != 1:
