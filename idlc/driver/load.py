@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from idlc import __version__
 from idlc.diagnostics.report import Report
 from idlc.disk import cache
-from idlc.recordings.errors import RecordingError
 from idlc.emit.pynames import class_
 from idlc.model import ir
+from idlc.recordings.errors import RecordingError
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -82,7 +82,9 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
 
 def class_of(topic: Topic) -> Any:
     """Return the class of a topic's messages, compiled from what was recorded."""
-    key = topic.schema and _key([topic.type, topic.schema.encoding, topic.schema.text])
+    schema, key = topic.schema, ""
+    if schema:
+        key = _key([topic.type, schema.encoding, schema.text])
     if not (key and cache.has(key)):
         from idlc.driver.loading import topic_models
 
