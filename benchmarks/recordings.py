@@ -1,6 +1,6 @@
 """One topic of a recording → a table of Arrow: python -m benchmarks.recordings.
 
-CPU seconds from opening the file, of a process and its threads, the best of some rounds. Each reader
+CPU seconds of a process from opening the file, the best of some rounds. Each reader
 has a process of its own, in which it has read the file once when the clock begins. The goals: ahead
 of rerun without compression, within 1.2 of its time with zstd, and five times as fast as rosbags.
 """

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
+from idlc.driver.load import OtherDefinitionWarning
 from idlc.driver.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
@@ -60,7 +63,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     """Write the columns of topics, each file whole or not at all; return what was written."""
     done: list[Written] = []
     try:
-        with Recording(options.recording, check=options.check) as recording:
+        with Recording(options.recording, check=options.check) as recording, _warnings(report):
             report.notes += recording.notes
             for job in _jobs(recording, options, report):
                 done.append(_written(job, options, progress))  # noqa: PERF401 # kept if one fails
@@ -70,6 +73,17 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
         where = options.recording
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
     return done
+
+
+@contextmanager
+def _warnings(report: Report) -> Iterator[None]:
+    """Report IDL654 for definitions that are not those of what was recorded."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        yield
+    for one in found:
+        if issubclass(one.category, OtherDefinitionWarning):
+            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(one.message)))
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import import_module
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc import __version__
 from idlc.diagnostics.report import Report
@@ -81,7 +82,10 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
 
 
 def class_of(topic: Topic) -> Any:
-    """Return the class of a topic's messages, compiled from what was recorded."""
+    """Return the class of a topic's messages, compiled from what was recorded.
+
+    Warns if that is not what the topic's publisher said that it is.
+    """
     schema, key = topic.schema, ""
     if schema:
         key = _key([topic.type, schema.encoding, schema.text])
@@ -91,32 +95,50 @@ def class_of(topic: Topic) -> Any:
         models, is_recorded = topic_models(topic)
         # what was borrowed from around here may be another thing tomorrow
         key = _kept(models, key if is_recorded else "")
-    return _class(f"{LOADED}.{key}", topic.type)
+    kind = _class(f"{LOADED}.{key}", topic.type)
+    if topic.hash not in (None, _type_of(kind).hash):
+        message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
+        warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
+    return kind
+
+
+class OtherDefinitionWarning(UserWarning):
+    """The definition in a recording has another hash than that which the publisher announced."""
 
 
 def accepted(kind: Any, topic: Topic) -> Any:
     """Return a class that a program gave; raise RecordingError if messages are of another type."""
     try:
-        home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
-        info = import_module(f"{home}._idlc.on_demand.typeinfo")
-        name = info.type_name(kind)
-        mine = info.types()["hashes"][name]
-    except (AttributeError, ImportError, KeyError):
+        given = _type_of(kind)
+    except (AttributeError, ImportError, KeyError, TypeError):
         hint = "leave it out, or give one that `idlc gen` made"
         raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
-    if name != topic.type:
-        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {name}")
-    if mine != topic.hash:
+    if given.name != topic.type:
+        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {given.name}")
+    if given.hash != topic.hash:
         from idlc.driver.loading import recorded_hash
 
         found = recorded_hash(topic)
-        if mine != found:
+        if given.hash != found:
             raise RecordingError(
-                f"{name} was another type when `{topic.name}` was recorded: its hash is "
-                f"{found or topic.hash or 'not known'}, that of the class is {mine}",
+                f"{given.name} was another type when `{topic.name}` was recorded: its hash is "
+                f"{found or topic.hash or 'not known'}, that of the class is {given.hash}",
                 "leave the class out to read what was recorded",
             )
     return kind
+
+
+class _Type(NamedTuple):
+    name: str
+    hash: str
+
+
+def _type_of(kind: Any) -> _Type:
+    """Return the full name and the hash of a generated class."""
+    home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
+    info = import_module(f"{home}._idlc.on_demand.typeinfo")
+    name = info.type_name(kind)
+    return _Type(name, info.types()["hashes"][name])
 
 
 def _class(home: str, name: str) -> Any:

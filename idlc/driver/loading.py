@@ -79,13 +79,6 @@ def topic_models(topic: Topic) -> tuple[Models, bool]:
         first = next(iter([*types.errors, *told]), None)
         why = first.message if first else "its type is not known"
         raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
-    (typed,) = types.topics
-    found = types.hash(typed)
-    if topic.hash and found and topic.hash != found:
-        raise RecordingError(
-            f"the definition of {topic.type} is not that of what was recorded as `{topic.name}`",
-            "give a class that `idlc gen` made of the right one",
-        )
     return types.models, not list(told)
 
 
