@@ -216,7 +216,7 @@ def plain(value: Any) -> Any:
         return {name: plain(one) for name, one in value.items()}
     if is_dataclass(value):
         names = [one.name for one in fields(value) if one.name != DUMMY]
-        return {name: plain(getattr(value, name)) for name in names if name.islower()}
+        return {name: plain(getattr(value, name)) for name in names if name[0].islower()}
     if hasattr(value, "__slots__"):
         names = [name for name in value.__slots__ if name != DUMMY]
         return {name: plain(getattr(value, name)) for name in names}
