@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -13,36 +13,55 @@ from ..batches import failed
 from ..field_reader import check
 from ..typeinfo import type_name
 from .build import plan_of
+from .gather import Flat, Pieces, Source
 from .lanes import Found, Lanes, UnreadableError
 from .plan import Level
 from .scan import Scan
 from .table import Elements, Table
-from .values import Batch
+
+#: From this mean size on, messages are not copied into one array.
+LARGE = 1 << 15
 
 
-def batch_of(messages: Any) -> Batch:
-    """Return messages as arrays of bytes and of positions; an iterable's are copied."""
+class Messages(NamedTuple):
+    """Serialized messages: where they begin and end in a source, as arrays."""
+
+    source: Source
+    starts: Any
+    stops: Any
+
+    def raw(self, index: int) -> bytes:
+        """Return one message."""
+        start, stop = (np.array([int(one[index])]) for one in (self.starts, self.stops))
+        return bytes(self.source.ranges(start, stop - start))
+
+
+def messages_of(messages: Any) -> Messages:
+    """Return the messages of a batch, or of an iterable; small ones of that are copied."""
     if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
-        return _checked(messages)
+        return _of_batch(messages)
     raws = [
         raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages
     ]
     sizes = np.fromiter(map(len, raws), np.int64, len(raws))
     stops = np.cumsum(sizes)
-    return Batch(np.frombuffer(b"".join(raws), np.uint8), stops - sizes, stops)
+    starts = stops - sizes
+    if len(raws) and stops[-1] >= LARGE * len(raws):
+        return Messages(Pieces(raws, starts), starts, stops)
+    return Messages(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
 
 
-def _checked(batch: Any) -> Batch:
-    buffer = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
+def _of_batch(batch: Any) -> Messages:
+    array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
     starts, stops = (
         np.asarray(one).astype(np.int64, casting="same_kind")
         for one in (batch.starts, batch.stops)
     )
     if starts.shape != stops.shape or starts.ndim != 1:
         raise ValueError("starts and stops of a batch must be as many")
-    if ((starts < 0) | (starts > stops) | (stops > len(buffer))).any():
+    if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
         raise ValueError("a message of the batch is not within its buffer")
-    return Batch(buffer, starts, stops)
+    return Messages(Flat(array), starts, stops)
 
 
 @contextmanager
@@ -53,46 +72,50 @@ def reading(
     name = type_name(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
     plan = plan_of(name, None if wanted is None else tuple(wanted), datetimes)
-    batch = batch_of(messages)
+    found = messages_of(messages)
     try:
-        yield _read(plan, batch)
+        yield _read(plan, found)
     except UnreadableError:
-        explain(name, batch)
+        explain(name, found)
 
 
-def _read(plan: Level, batch: Batch) -> tuple[Table, Elements]:
-    big = orders(batch)
-    found = Found()
-    done, mixed = [], bool(big.any() and not big.all())
+def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
+    big = big_endian(messages)
+    mixed = bool(big.any() and not big.all())
+    source, found = messages.source, Found()
+    done = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         if len(rows):
-            starts = batch.starts[rows]
-            lanes = Lanes(starts + 4, batch.stops[rows], starts + 4)
+            starts = messages.starts[rows] + 4
+            lanes = Lanes(starts, messages.stops[rows], starts)
             first = found.count[plan.key]
             found.count[plan.key] += len(rows)
-            Scan(batch.buffer, order, found).level(plan, lanes, first)
+            Scan(source, order, found).level(plan, lanes, first)
             done.append(rows)
-    order_of_rows = np.concatenate(done) if mixed else None
     order = ">" if big.any() and not mixed else "<"
-    top = Elements(plan, len(big), order_of_rows, big if mixed else None)
-    return Table(batch, order, found), top
+    size = int((messages.stops - messages.starts).sum())
+    table = Table(source, size, order, found)
+    if mixed:
+        return table, Elements(plan, len(big), np.concatenate(done), big)
+    return table, Elements(plan, len(big), None, None)
 
 
-def orders(batch: Batch) -> Any:
-    """Return which messages are big-endian, as their encapsulation headers say."""
-    if (batch.stops - batch.starts < 4).any():
+def big_endian(messages: Messages) -> Any:
+    """Return which messages are, as their encapsulation headers say."""
+    starts = messages.starts
+    if (messages.stops - starts < 4).any():
         raise UnreadableError
-    first, second = batch.buffer[batch.starts], batch.buffer[batch.starts + 1]
+    first, second = (messages.source.items(starts + at, "u1") for at in (0, 1))
     if (first != 0).any() or (second > 1).any():
         raise UnreadableError
     return second == 0
 
 
-def explain(name: str, batch: Batch) -> NoReturn:
+def explain(name: str, messages: Messages) -> NoReturn:
     """Raise DecodeError for the first message that is not of a type."""
-    for index, raw in enumerate(batch):
+    for index in range(len(messages.starts)):
         try:
-            check(name, bytes(raw))
+            check(name, messages.raw(index))
         except DecodeError as error:
             failed(error, index)
     raise AssertionError("all messages can be read one by one")

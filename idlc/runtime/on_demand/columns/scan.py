@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .gather import Source
 from .lanes import Found, Lanes, UnreadableError, repeat_fixed
 from .plan import Level, List, Segment, Text
 from .walk import Walk
@@ -22,11 +23,11 @@ FEW = 12
 class Scan:
     """Goes over messages of one byte order."""
 
-    def __init__(self, buffer: Any, order: str, found: Found) -> None:
+    def __init__(self, source: Source, order: str, found: Found) -> None:
         self.found = found
-        shape = max(0, len(buffer) - 3)
-        self.words = np.ndarray((shape,), order + "u4", buffer, strides=(1,))
-        self.walk = Walk(buffer, order, found)
+        self.source = source
+        self.order = order
+        self.walk = Walk(order, found)
 
     def level(self, level: Level, lanes: Lanes, first: int) -> None:
         """Go over a structure in each lane, which in its level count from `first` on."""
@@ -44,7 +45,8 @@ class Scan:
     def number(self, lanes: Lanes) -> Any:
         """Read a size or count in each lane."""
         lanes.align(4)
-        return self.words[lanes.take(4)].astype(np.int64)
+        numbers = self.source.items(lanes.take(4), f"{self.order}u4")
+        return numbers.astype(np.int64)
 
     def text(self, step: Text, lanes: Lanes) -> None:
         """Go over a string in each lane."""
@@ -99,7 +101,7 @@ class Scan:
             index += 1
             active = int(np.searchsorted(descending, -index))
         for row in range(active):
-            self.walk.end, self.walk.phase = int(rest.end[row]), int(rest.phase[row])
+            self.walk.enter(self.source, rest, row)
             elements = range(index, -int(descending[row]))
             at = int(rest.at[row])
             rest.at[row] = self.walk.repeat(

@@ -7,22 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from .gather import ranges
+from .gather import Source
 from .lanes import UnreadableError
 from .values import Texts
 
 
-def narrow_texts(buffer: Any, starts: Any, sizes: Any) -> Texts:
+def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
     """Return the strings at some places, mostly with a terminating zero."""
     last = np.maximum(starts + sizes, 1) - 1
-    sizes = sizes - ((sizes > 0) & (buffer[last] == 0))
-    made = Texts(offsets_of(sizes), ranges(buffer, starts, sizes))
+    sizes = sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
+    made = Texts(offsets_of(sizes), source.ranges(starts, sizes))
     return made if _is_utf8(made) else _encoded(map(_text, _parts(made)))
 
 
-def wide_texts(buffer: Any, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
+def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
     """Return the strings at some places, of so many UTF-16 units of four bytes."""
-    units = ranges(buffer, starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
+    units = source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
     if big is not None:
         swapped = np.repeat(big, sizes)
         units[swapped] = units[swapped].byteswap()

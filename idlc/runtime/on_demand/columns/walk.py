@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .gather import Source
 from .lanes import Found, Lanes, UnreadableError, aligned, repeat_fixed
 from .plan import Level, List, Segment, Text
 
@@ -17,15 +18,19 @@ from .plan import Level, List, Segment, Text
 class Walk:
     """Goes over one message at a time.
 
-    `end` is where it ends, and values align relative to `phase`.
+    `end` is where it ends, values align relative to `phase`, and `view` begins at `shift`.
     """
 
-    def __init__(self, buffer: Any, order: str, found: Found) -> None:
-        self.view = memoryview(buffer)
+    def __init__(self, order: str, found: Found) -> None:
         self.unpack = Struct(order + "I").unpack_from
         self.found = found
-        self.end = 0
-        self.phase = 0
+        self.end = self.phase = self.shift = 0
+        self.view: Any = b""
+
+    def enter(self, source: Source, lanes: Lanes, row: int) -> None:
+        """Begin with the message of a lane."""
+        self.end, self.phase = int(lanes.end[row]), int(lanes.phase[row])
+        self.view, self.shift = source.around(int(lanes.at[row]))
 
     def repeat(self, level: Level, at: int, parent: int, indices: range) -> int:
         """Go over elements of a sequence; return the position after them."""
@@ -59,7 +64,7 @@ class Walk:
         """Read a size or count; return it and the position after it."""
         at = aligned(at, self.phase, 4)
         after = self.take(at, 4)
-        value: int = self.unpack(self.view, at)[0]
+        value: int = self.unpack(self.view, at - self.shift)[0]
         return value, after
 
     def text(self, step: Text, at: int) -> int:
