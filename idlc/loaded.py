@@ -3,6 +3,6 @@
 So they have names by which any process can import them, which pickling needs.
 """
 
-from idlc.disk.cache import folder
+from idlc.disk.loaded_cache import folder
 
 __path__ = [str(folder())]

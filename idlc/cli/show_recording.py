@@ -48,7 +48,10 @@ def _row(one: TopicFacts) -> tuple[str, ...]:
     count = "?" if one.messages is None else str(one.messages)
     hash_ = one_line(one.hash or "-")
     here = one.here if one.definition else f"{one.here}; no definition in the recording"
-    return one_line(one.name), one_line(one.type_name), count, hash_[:SHORT], here
+    name = one_line(one.name)
+    # lines that begin with other characters may be commands to a CI system
+    name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
+    return name, one_line(one.type_name), count, hash_[:SHORT], here
 
 
 def _padded(text: str, width: int, column: int) -> str:

@@ -1,71 +1,48 @@
-"""What idlc keeps for another run, and can make again at any time."""
+"""The folder of what idlc can always make again."""
 
 from __future__ import annotations
 
 import os
 import sys
-import tempfile
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
-from shutil import rmtree
-
-from idlc.templating import RenderedFile
 
 
 @cache
-def folder() -> Path:
-    """Return the folder of this user's cache, or one for this process if there can be none."""
+def folder() -> Path | None:
+    """Return this user's folder of idlc's caches, made if need be; `None` if nothing can be kept.
+
+    What is kept there is run. So it is only used where nobody else can write.
+    """
+    base = _base()
+    if base is None:
+        return None
+    place = base / "idlc"
     try:
-        chosen = os.environ.get("IDLC_CACHE")
-        found = Path(chosen) if chosen else _home() / "idlc"
-        found.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=found):
-            return found
-    except (OSError, RuntimeError):
-        import atexit
-
-        made = tempfile.mkdtemp(prefix="idlc-")
-        atexit.register(rmtree, made, ignore_errors=True)
-        return Path(made)
+        there = next(one for one in (place, *place.parents) if one.exists())
+        if not _is_ours(there):  # `sudo idlc` leaves nothing in another user's home
+            return None
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        private = _is_ours(place) and not place.stat().st_mode & 0o022
+        return place if private and os.access(place, os.W_OK) else None
+    except OSError:
+        return None
 
 
-def _home() -> Path:
-    """Return where programs of this user keep such things."""
-    if chosen := os.environ.get("XDG_CACHE_HOME"):
-        return Path(chosen)
+def _base() -> Path | None:
+    """Return where this system wants caches."""
     if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local")
-    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
-
-
-def keep(name: str, files: Iterable[RenderedFile]) -> None:
-    """Write a folder of the cache, whole or not at all; what another process wrote stays."""
-    target = folder() / name
-    made = Path(tempfile.mkdtemp(dir=folder(), prefix=".new-"))
+        told = os.environ.get("LOCALAPPDATA", "")
+    else:
+        told = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(told).is_absolute():
+        return Path(told)
     try:
-        for file in files:
-            path = made / file.path
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(file.text, encoding="utf-8")
-        try:
-            made.rename(target)
-        except OSError:
-            if not target.is_dir():
-                raise
-    finally:
-        rmtree(made, ignore_errors=True)
+        home = Path.home()
+    except RuntimeError:
+        return None
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
 
 
-def has(name: str) -> bool:
-    """Return whether the cache has a folder."""
-    return (folder() / name).is_dir()
-
-
-@cache
-def newest() -> int:
-    """Return when idlc itself was changed last: its version does not change with each edit."""
-    package = Path(__file__).parents[1]
-    templates = (package / "templates", package.parent / "templates")
-    files = [*package.rglob("*.py"), *(file for one in templates for file in one.rglob("*.jinja"))]
-    return max(file.stat().st_mtime_ns for file in files)
+def _is_ours(path: Path) -> bool:
+    return sys.platform == "win32" or path.stat().st_uid == os.getuid()

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 MARK = "{topic}"
 STDOUT = "-"
 
+
+class UnknownFieldError(Exception):
+    """A type has no such field."""
+
+
 #: Told how many messages of a topic are done.
 Progress = Callable[[str, int, int], None]
 
@@ -69,6 +74,9 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
                 done.append(_written(job, options, progress))  # noqa: PERF401 # kept if one fails
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
+    except UnknownFieldError as error:
+        hint = f"`idlc show {options.recording} TOPIC` lists the fields"
+        report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
         where = options.recording
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
@@ -142,7 +150,11 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
     """Write the columns of one topic."""
     name = job.topic.topic.name
     flat = job.style == "csv" or not options.nested
-    reader = job.topic.to_reader(fields=options.fields, flat=flat, datetimes=options.datetimes)
+    wanted = {"fields": options.fields, "flat": flat, "datetimes": options.datetimes}
+    try:
+        reader = job.topic.to_reader(**wanted)
+    except ValueError as error:
+        raise UnknownFieldError(str(error)) from None
     counted = _Counted(reader, name, job.topic.topic.count, progress)
     if job.path == STDOUT:
         export.write(counted.batches(), reader.schema, sys.stdout.buffer, job.style)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc import __version__
 from idlc.diagnostics.report import Report
-from idlc.disk import cache
+from idlc.disk import loaded_cache as cache
 from idlc.emit.pynames import class_
 from idlc.model import ir
 from idlc.recordings.errors import RecordingError
@@ -26,9 +26,11 @@ LOADED = "idlc.loaded"
 SUPPORT = '''\
 """The support code of idlc, for this package."""
 
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 
-_spec = find_spec("idlc.runtime")
+import idlc
+
+_spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
 __path__ += _spec.submodule_search_locations
 exec(_spec.loader.get_code(_spec.name))
 '''

@@ -18,6 +18,7 @@ from pathlib import Path
 from idlc.cli.main import main
 from idlc.disk.output.lock_file import FILE
 from tests.support import fuzzing_edits as edits
+from tests.support.fuzzing_recordings import everything, recorded
 from tests.support.paths import ROOT, VERDICTS
 
 CORPUS = ROOT / "tests/hardening/corpus"
@@ -129,10 +130,35 @@ def package_xml(data: bytes, folder: Path) -> None:
     idlc("gen", str(here), "-o", str(folder / "out" / "demo"), "--check")
 
 
+def definition(data: bytes, folder: Path) -> None:
+    """What a recording says of a type is believed or refused."""
+    everything(idlc, recorded(data, folder, "ros2msg"), folder)
+
+
+def idl_definition(data: bytes, folder: Path) -> None:
+    """So is IDL."""
+    everything(idlc, recorded(data, folder, "ros2idl"), folder)
+
+
+def mcap(data: bytes, folder: Path) -> None:
+    """A recording is read or refused."""
+    path = folder / "demo.mcap"
+    path.write_bytes(data)
+    everything(idlc, path, folder)
+
+
+def db3(data: bytes, folder: Path) -> None:
+    """So is a database."""
+    path = folder / "demo.db3"
+    path.write_bytes(data)
+    everything(idlc, path, folder)
+
+
 TARGETS: dict[str, Callable[[bytes, Path], None]] = {
     function.__name__: function
     for function in (
         *(msg, srv, action, lock, pyproject, package_xml),
+        *(definition, idl_definition, mcap, db3),
         *(edits.manifest, edits.setup_file, edits.setup_cfg, edits.launch_file),
     )
 }

@@ -4,7 +4,7 @@ import msgspec
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.model import ir
+from idlc.model import derive, ir
 from idlc.model.lowering.file import lower
 from idlc.model.meaning import meaning
 from idlc.syntax.escapes import through_idl
@@ -42,3 +42,8 @@ def as_idl(value):
 
 #: A field that somebody wrote looks like the one that stands for none.
 DUMMY = (ir.Field(name=ir.DUMMY_FIELD, type=ir.Primitive("uint8")),)
+
+
+def sections(interface):
+    """Return the structures of an interface as IDL tells them."""
+    return derive.sections(as_idl(interface))

@@ -22,8 +22,8 @@ from idlc.syntax.parse import parse
 _NEXT = re.compile(r"^--- (MSG|IDL|SRV|ACTION) (\S+)$", re.MULTILINE)
 
 
-def write(path, text, messages=0):
-    """Write the MCAP file that a text describes, with as many messages of each topic."""
+def write(path, text, messages=None):
+    """Write the MCAP file that a text describes; `messages` is how many there are by topic."""
     with Path(path).open("wb") as file:
         writer = Writer(file, chunk_size=1024)
         writer.start(profile="ros2", library="test")
@@ -38,7 +38,7 @@ def write(path, text, messages=0):
             hash_ = right_hash(type_) if hash_ == "right" else hash_
             metadata = {"topic_type_hash": hash_} if hash_ else {}
             channel = writer.register_channel(topic, "cdr", schema, metadata)
-            for number in range(messages):
+            for number in range((messages or {}).get(topic, 0)):
                 writer.add_message(channel, number, b"\0\1\0\0", number)
         writer.finish()
     return path

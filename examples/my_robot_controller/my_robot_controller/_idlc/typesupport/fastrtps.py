@@ -1,4 +1,4 @@
-"""The opaque road: rmw_fastrtps_cpp and others that use its type support.
+"""The opaque kind: rmw_fastrtps_cpp and others that use its type support.
 
 The middleware never looks into message memory here, so it is a `Memory` that holds the
 encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS

@@ -1,0 +1,251 @@
+"""What recordings say of their types, in all the ways in which recorders say it."""
+
+import sqlite3
+import sys
+from pathlib import Path
+
+import pytest
+
+from idlc.cli.main import main
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.disk.scope import Scope
+from idlc.driver.recorded import versions
+from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.export.file_text import file_text
+from idlc.export.idl import idl
+from idlc.export.schemas import mcap
+from idlc.model import catalog, ir
+from idlc.model.link import link
+from idlc.model.lowering.file import lower
+from idlc.recordings.container import Schema, Topic
+from idlc.recordings.definitions import recorded, type_name
+from idlc.syntax.parse import parse, parse_any
+from tests.support import idl_view, recorded_text
+from tests.support.recordings import IMU, STORE, definition
+
+LINE = "=" * 80 + "\n"
+SHARE = Path(sys.prefix) / "share"
+
+
+def topic(type_, text, encoding="ros2msg", hash_=None):
+    schema = Schema(type_, encoding, text) if text else None
+    return recorded(Topic("/x", type_, 1, hash_, "cdr", schema), "rec")
+
+
+def texts(*words):
+    return {str(name): source.text for name, source in topic(*words).texts.items()}
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("middle", ["", "msg/"])
+def test_a_text_is_divided_at_its_lines(middle, end):
+    text = f"a_msgs/{middle}B[] b\nint32 c 3{end}\n{LINE}MSG: a_msgs/{middle}B\nint32 d{end}\n\n"
+    text += f"{LINE}MSG: a_msgs/{middle}C\n"
+    found = texts(f"a_msgs/{middle}A", text)
+    assert found == {
+        "a_msgs/msg/A": "a_msgs/B[] b\nint32 c 3\n",
+        "a_msgs/msg/B": "int32 d\n",
+        "a_msgs/msg/C": "",
+    }
+
+
+def test_idl_and_services_name_their_first_definition_too():
+    found = texts(
+        "a_msgs/msg/A", f"{LINE}IDL: a_msgs/msg/A\nmodule\n{LINE}IDL: a_msgs/msg/B\nx", "ros2idl"
+    )
+    assert found == {"a_msgs/msg/A": "module\n", "a_msgs/msg/B": "x\n"}
+    text = f"{LINE}SRV: a_msgs/srv/A\nint32 a\n---\n\n{LINE}MSG: a_msgs/msg/B\nint32 b"
+    for encoding in ("ros2msg", "unknown", ""):
+        found = topic("a_msgs/srv/A_Event", text, encoding)
+        assert (str(found.name), str(found.interface)) == ("a_msgs/srv/A_Event", "a_msgs/srv/A")
+        assert {str(name): one.text for name, one in found.texts.items()} == {
+            "a_msgs/srv/A": "int32 a\n---\n",
+            "a_msgs/msg/B": "int32 b\n",
+        }
+
+
+def test_a_service_is_recorded_without_a_line_as_well():
+    assert texts("a_msgs/srv/A_Event", "int32 a\n---\nint32 b\n") == {
+        "a_msgs/srv/A": "int32 a\n---\nint32 b\n"
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "interface"),
+    [
+        ("a/B", "a/msg/B"),
+        ("a/msg/B", "a/msg/B"),
+        ("a/msg/B_Request", "a/msg/B_Request"),
+        ("a/srv/B_Event", "a/srv/B"),
+        ("a/srv/B_Request", "a/srv/B"),
+        ("a/action/B_FeedbackMessage", "a/action/B"),
+        ("a/action/B_SendGoal_Event", "a/action/B"),
+        ("a/action/B_GetResult_Response", "a/action/B"),
+        ("a/action/B_Goal", "a/action/B"),
+    ],
+)
+def test_types_and_what_they_are_derived_from(name, interface):
+    assert str(topic(name, "").interface) == interface
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "B",
+        "a/b/c/D",
+        "../a/msg/B",
+        "a/../B",
+        "/a/msg/B",
+        "a/msg/../B",
+        "a/msg/b",
+        "A/msg/B",
+        "a/msg/B c",
+        "a/msg/B\n",
+        "a/idl/B",
+        "a/srv/_Event",
+        "a/msg/B;import os",
+        "foxglove.Scene",
+        "a/msg/Ü",
+    ],
+)
+def test_what_is_no_name_is_none(name):
+    assert type_name(name) is None
+    assert topic(name, "int32 a").texts == {}
+    assert texts("a/msg/B", f"int32 a\n{LINE}MSG: {name}\nint32 b\n") == {"a/msg/B": "int32 a\n"}
+
+
+def test_the_first_of_two_definitions_counts():
+    text = f"int32 a\n{LINE}MSG: a/B\nint32 b\n{LINE}MSG: a/B\nint32 c\n{LINE}MSG: a/A\nint32 d\n"
+    assert texts("a/msg/A", text) == {"a/msg/A": "int32 a\n", "a/msg/B": "int32 b\n"}
+
+
+def types_of(*topics):
+    report = Report()
+    (version,) = versions(topics)
+    return RecordedTypes(version, Around(Scope(), Report()), Scope(), report), report
+
+
+def test_what_rosbags_writes_has_its_hash():
+    names = [name for name in STORE.fielddefs if name.startswith(("sensor_msgs/msg/", "nav_msgs/"))]
+    assert IMU in names
+    topics = [topic(name, definition(name), hash_="x") for name in names]
+    types, _ = types_of(*topics)
+    assert not types.errors.had_errors
+    assert len(types.topics) == len(names)
+    expected = {name: STORE.hash_rihs01(name) for name in names}
+    assert {str(one.name): types.hash(one) for one in types.topics} == expected
+
+
+def test_what_idlc_writes_has_its_hash_in_both_languages():
+    for name in catalog.interfaces():
+        if name.kind != "msg" or name.package not in ("sensor_msgs", "diagnostic_msgs"):
+            continue
+        model = link(
+            name.package, [lower(parse(catalog.source(name)), name, Report())], catalog, Report()
+        )
+        expected = model.describer.hash(str(name))
+        as_msg = topic(str(name), mcap(model.interfaces[name], model))
+        parts = [f"{LINE}IDL: {one.name}\n{idl(one)}" for one in model.interfaces.values()]
+        as_idl = topic(str(name), "\n".join(parts), "ros2idl")
+        for one in (as_msg, as_idl):
+            types, report = types_of(one)
+            assert types.hash(types.topics[0]) == expected
+            assert [found.code for found in report] == []
+
+
+def test_idl_is_written_as_the_file_that_it_was():
+    """Tools ask for the text of the file; comments and units may stand at other places in it."""
+    for path in SHARE.glob("*/*/*.idl"):
+        package, kind, _ = path.parts[-3:]
+        name = ir.TypeName(package, kind, path.stem)
+        source = Source("x.idl", path.read_text(encoding="utf-8"))
+        found = lower(parse_any(source), name, Report())
+        report = Report()
+        again = lower(parse(Source("x", file_text(found))), name, report)
+        assert not report.had_errors
+        assert bare(again) == bare(found), name
+
+
+def bare(interface):
+    sections = idl_view.sections(interface)
+    return [
+        (
+            [(one.name, one.type, one.default) for one in section.fields],
+            [(one.name, one.type, one.value) for one in section.constants],
+        )
+        for section in sections
+    ]
+
+
+@pytest.mark.parametrize("value", ["it's", 'say "x"', "a#b", "back\\slash", "\\n", "é漢", "\t", ""])
+def test_texts_of_idl_survive_in_the_file(value):
+    name = ir.TypeName("a", "msg", "B")
+    field = ir.Field(name="x", type=ir.String(), default=ir.Default(value, value))
+    many = ir.Field(
+        name="y", type=ir.Sequence(ir.String()), default=ir.Default((value,), repr((value,)))
+    )
+    constant = ir.Constant(name="C", type=ir.String(), value=value)
+    source = Source("x.idl", "")
+    own = ir.Message(name=name, fields=(field, many), constants=(constant,), source=source)
+    report = Report()
+    again = lower(parse(Source("x", file_text(own))), name, report)
+    assert not report.had_errors
+    assert [one.default.value for one in again.fields] == [value, (value,)]
+    assert again.constants[0].value == value
+
+
+def test_versions_differ_in_more_than_comments():
+    a = topic("a/msg/A", "# one\nint32 a  # [m]\n")
+    same = topic("a/msg/A", "# another\nint32 a  # x [m]\n")
+    other = topic("a/msg/A", "int64 a\n")
+    assert len(versions([a, same])) == 1
+    assert len(versions([a, other, same])) == 2
+    assert len(versions([a, topic("a/msg/A", "int32 a 3  # [m]\n")])) == 2
+    assert len(versions([a, topic("a/msg/A", "int32 a  # [km]\n")])) == 2
+    broken = [topic("a/msg/A", "int32\n"), topic("a/msg/A", "int33\n")]
+    assert len(versions([a, *broken])) == 3
+    as_idl = 'module a { module msg { struct A { @unit (value="m") int32 a; }; }; };'
+    assert len(versions([a, topic("a/msg/A", as_idl, "ros2idl")])) == 1
+    assert versions([]) == []
+
+
+def test_a_message_without_fields_has_an_empty_definition():
+    empty = recorded_text.right_hash("std_msgs/msg/Empty")
+    types, report = types_of(topic("std_msgs/msg/Empty", "", hash_=empty))
+    assert (len(types.topics), list(report)) == (1, [])
+    model = link("a", [ir.Message(name=ir.TypeName("a", "msg", "B"))], catalog, Report())
+    own = model.describer.hash("a/msg/B")
+    types, report = types_of(topic("a/msg/B", "", hash_=own))
+    assert types.hash(types.topics[0]) == own
+    assert list(report) == []
+
+
+def test_idl_of_others_gives_way_to_what_is_known_here():
+    text = "module std_msgs { module msg { @final struct String { long a; }; }; };"
+    types, report = types_of(topic("std_msgs/msg/String", text, "ros2idl"))
+    assert [one.code for one in report] == ["IDL652"]
+    assert types.hash(types.topics[0]) == recorded_text.right_hash("std_msgs/msg/String")
+
+
+def test_a_db3_has_the_definition_of_a_service_by_the_service(tmp_path, capsys):
+    path = tmp_path / "a.db3"
+    with sqlite3.connect(path) as db:
+        db.executescript(
+            """
+            CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT,
+              serialization_format TEXT, offered_qos_profiles TEXT, type_description_hash TEXT);
+            CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER,
+              data BLOB);
+            CREATE TABLE message_definitions(id INTEGER PRIMARY KEY, topic_type TEXT,
+              encoding TEXT, encoded_message_definition TEXT, type_description_hash TEXT);
+            INSERT INTO topics VALUES
+              (1, '/a/_service_event', 'a_srvs/srv/Ask_Event', 'cdr', '', '');
+            INSERT INTO message_definitions VALUES
+              (1, 'a_srvs/srv/Ask', 'ros2msg', 'int32 a' || char(10) || '---', '');
+            """
+        )
+    db.close()
+    assert main(["hash", str(path)]) == 0
+    assert "a_srvs/srv/Ask_Event" in capsys.readouterr().out
