@@ -1,3 +1,25 @@
 """idlc: the ROS 2 interface compiler for Python."""
 
+from __future__ import annotations
+
 __version__ = "0.1.0"
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from idlc.driver.load import load
+    from idlc.driver.recording import Recording
+
+__all__ = ["Recording", "__version__", "load"]
+
+
+def __getattr__(name: str) -> object:
+    """Import what programs use when they ask for it."""
+    if name == "Recording":
+        from idlc.driver.recording import Recording
+
+        return Recording
+    if name == "load":
+        from idlc.driver.load import load
+
+        return load
+    raise AttributeError(f"module 'idlc' has no attribute {name!r}")

@@ -1,4 +1,6 @@
+import os
 import signal
+import tempfile
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,6 +14,10 @@ for number, handler in (
 ):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
+
+# What tests load is kept for this run alone, in all its processes.
+CACHE = tempfile.TemporaryDirectory(prefix="idlc-cache-")
+os.environ["IDLC_CACHE"] = CACHE.name
 
 # The same examples in every run, and no verdict that depends on how busy the machine is.
 settings.register_profile(

@@ -16,6 +16,7 @@ COMMANDS = {
     "fmt": "Lay interface files out.",
     "hash": "Print type hashes (RIHS01).",
     "show": "Show an interface with the messages in it.",
+    "columns": "Write topics of a recording as Parquet, Arrow or CSV.",
     "list": "List the packages and types that are known here.",
     "docs": "Write a site about interfaces.",
     "describe": "Print a type description, as ROS 2 installs it.",

@@ -13,10 +13,14 @@ from idlc.model import derive, ir
 
 
 class Homes:
-    """The module of each structure of a package, without the package and the kind."""
+    """The module of each structure of a package, without the package and the kind.
 
-    def __init__(self, interface: ir.Interface, modules: pynames.Modules) -> None:
+    Those of other packages are inside of the Python package `around`, if that is not empty.
+    """
+
+    def __init__(self, interface: ir.Interface, modules: pynames.Modules, around: str = "") -> None:
         self.modules = modules
+        self.around = f"{around}." if around else ""
         self.classes = modules[interface.name]
         self.protocol = pynames.protocol_module(self.classes)
         self.sections = {message.name for message in derive.sections(interface)}
@@ -85,7 +89,10 @@ class References:
 
     def modules(self) -> list[tuple[str, str]]:
         """Return the modules of implied types, with their names in this module."""
-        return sorted({(f"{type_.package}.{type_.kind}", _module(type_)) for type_ in self.implied})
+        return sorted({(self._outside(type_), _module(type_)) for type_ in self.implied})
+
+    def _outside(self, type_: ir.TypeName) -> str:
+        return f"{self._homes.around}{type_.package}.{type_.kind}"
 
     def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
         """Return import statements, those of this package and those of others, sorted.
@@ -99,7 +106,7 @@ class References:
             if self.name(type_) != name:
                 name = f"{name} as {self.name(type_)}"
             if type_.package != self.package:
-                outside[f"{type_.package}.{type_.kind}"].add(name)
+                outside[self._outside(type_)].add(name)
             elif type_.kind == self.kind:
                 inside[1, f".{self._homes.of(type_)}"].add(name)
             else:

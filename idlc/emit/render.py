@@ -41,26 +41,27 @@ def support_packages() -> list[str]:
 
 
 def module_files(
-    interface: ir.Interface, model: link.Model, modules: pynames.Modules
+    interface: ir.Interface, model: link.Model, modules: pynames.Modules, around: str = ""
 ) -> Iterator[RenderedFile]:
     """Yield the modules of one interface."""
-    for module in view.modules(interface, model.messages, modules):
+    for module in view.modules(interface, model.messages, modules, around):
         template = _template(f"message/{module.template}.py.jinja")
         yield RenderedFile(module.path, template.render(module=module))
 
 
-def render_package(model: link.Model) -> tuple[RenderedFile, ...]:
+def render_package(model: link.Model, around: str = "") -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
+    Other packages are imported from the Python package `around`, if that is not empty.
     The model must be without errors: no `Unknown` type, nothing that is not found.
     """
     modules = pynames.modules(interface.name for interface in model.own)
-    files = [file for own in model.own for file in module_files(own, model, modules)]
+    files = [file for own in model.own for file in module_files(own, model, modules, around)]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = listing.package(model, kind, modules)
         text = _template("message/package_init.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
-    files.append(RenderedFile("_idlc/type_data.py", type_data.source(model)))
+    files.append(RenderedFile("_idlc/type_data.py", type_data.source(model, around)))
     # a package without it would lose to any other of its name, wherever that stands on the path
     files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
     files.append(RenderedFile("py.typed", ""))

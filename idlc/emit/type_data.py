@@ -52,15 +52,18 @@ def content(model: link.Model) -> TypesDict:
     }
 
 
-def source(model: link.Model) -> str:
+def source(model: link.Model, around: str = "") -> str:
     """Return the text of the module: one line of it for each type."""
-    lines = "".join(f"    {literals.text(part)}\n" for part in _parts(content(model)))
+    parts = _parts(content(model), around)
+    lines = "".join(f"    {literals.text(part)}\n" for part in parts)
     return f'"""The types of {model.package}, read by `typeinfo`."""\n\nJSON = (\n{lines})\n'
 
 
-def _parts(tables: TypesDict) -> Iterator[str]:
+def _parts(tables: TypesDict, around: str) -> Iterator[str]:
     """Yield pieces that joined are the JSON text."""
     yield f'{{"package":{_json(tables["package"])}'
+    if around:
+        yield f',"around":{_json(f"{around}.")}'
     for key in ("descriptions", "hashes", "sources"):
         mark = f',"{key}":{{'
         entries: dict[str, Any] = tables[key]

@@ -56,10 +56,13 @@ class _Part(NamedTuple):
 
 
 def modules(
-    interface: ir.Interface, messages: wire_plan.Messages, names: pynames.Modules
+    interface: ir.Interface,
+    messages: wire_plan.Messages,
+    names: pynames.Modules,
+    around: str = "",
 ) -> Iterator[ModuleView]:
     """Yield the views of an interface's modules; `names` has the modules of all its package."""
-    homes = Homes(interface, names)
+    homes = Homes(interface, names, around)
     written = derive.sections(interface)
     added = derive.messages(interface)[len(written) :]
     for structures, module in ((written, homes.classes), (added, homes.protocol)):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import Any
 
 from idlc.recordings.errors import RecordingError
 
@@ -13,20 +12,36 @@ MOST_IN_A_CHUNK = 1 << 29
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
-def decompressed(data: memoryview, compression: str, size: int) -> memoryview:
-    """Return the `size` bytes that a chunk declares; raise RecordingError if it has others."""
+def check_size(size: int) -> None:
+    """Raise RecordingError if a chunk declares more than there is room for."""
     if size > MOST_IN_A_CHUNK:
         raise RecordingError(f"a chunk declares {size:,} bytes, more than {MOST_IN_A_CHUNK:,}")
-    if not compression or not size:
-        found: Any = data
-    else:
-        found = _decompressor(compression)(data, size)
-    if len(found) != size:
-        raise RecordingError(f"a chunk declares {size:,} bytes and holds {len(found):,}")
-    return memoryview(found)
 
 
-def _decompressor(compression: str) -> Callable[[memoryview, int], bytes]:
+def decompressed(data: memoryview, compression: str, size: int) -> memoryview:
+    """Return the `size` bytes that a chunk declares; raise RecordingError if it has others."""
+    check_size(size)
+    if not compression and len(data) == size:
+        return data
+    target = memoryview(bytearray(size))
+    decompress(data, compression, target)
+    return target
+
+
+def decompress(data: memoryview, compression: str, target: memoryview) -> None:
+    """Write into `target` what a chunk holds; raise RecordingError if that is not its size."""
+    found = _decompressor(compression)(data, target) if compression else _copy(data, target)
+    if found != len(target):
+        more = "more" if found > len(target) else f"{found:,}"
+        raise RecordingError(f"a chunk declares {len(target):,} bytes and holds {more}")
+
+
+#: Writes what compressed bytes hold into a buffer, and returns how much that is: more by one, if it
+#: is more than there is room for.
+Decompressor = Callable[[memoryview, memoryview], int]
+
+
+def _decompressor(compression: str) -> Decompressor:
     match compression:
         case "zstd":
             return _newer_zstd if sys.version_info >= (3, 14) else _zstd
@@ -35,41 +50,69 @@ def _decompressor(compression: str) -> Callable[[memoryview, int], bytes]:
     raise RecordingError(f"the compression `{compression}` is not known, only zstd and lz4")
 
 
-def _zstd(data: memoryview, size: int) -> bytes:
+def _copy(data: memoryview | bytes, target: memoryview) -> int:
+    size = min(len(data), len(target))
+    target[:size] = data[:size]
+    return len(data)
+
+
+def _zstd(data: memoryview, target: memoryview) -> int:
+    """A stream writes where it is told to; in one call, each chunk would be new memory."""
     try:
         import zstandard
     except ImportError:
         raise missing("zstandard", "chunks are compressed with zstd") from None
+    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    done = 0
     try:
-        # the size that the frame declares is what would be allocated
-        declared = zstandard.frame_content_size(data)
-        if declared > size:
-            raise RecordingError(f"a chunk declares {size:,} bytes and holds {declared:,}")
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+        while done < len(target) and (size := reader.readinto(target[done:])):
+            done += size
+        return done + len(reader.read(1))
     except zstandard.ZstdError as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
 
 
-def _newer_zstd(data: memoryview, size: int) -> bytes:
+def zstd_frame(data: bytes) -> bytes:
+    """Return what a message holds that is compressed by itself, and says how large it is."""
+    size = _declared(data)
+    target = bytearray(size)
+    decompress(memoryview(data), "zstd", memoryview(target))
+    return bytes(target)
+
+
+def _declared(data: bytes) -> int:
+    """Return the size that the head of a zstd frame declares (RFC 8878, 3.1.1.1)."""
+    flags = data[4] if len(data) > 4 else 0
+    single = flags >> 5 & 1
+    width = (single, 2, 4, 8)[flags >> 6]
+    start = 5 + (not single) + (0, 1, 2, 4)[flags & 3]
+    if not width or len(data) < start + width:
+        raise RecordingError("a compressed message does not declare its size")
+    size = int.from_bytes(data[start : start + width], "little") + (256 if width == 2 else 0)
+    check_size(size)
+    return size
+
+
+def _newer_zstd(data: memoryview, target: memoryview) -> int:
     from compression import zstd  # type: ignore[import-not-found] # Python 3.14
 
     try:
-        found: bytes = zstd.ZstdDecompressor().decompress(data, max_length=size + 1)
+        found = zstd.ZstdDecompressor().decompress(data, max_length=len(target) + 1)
     except zstd.ZstdError as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
-    return found
+    return _copy(found, target)
 
 
-def _lz4(data: memoryview, size: int) -> bytes:
+def _lz4(data: memoryview, target: memoryview) -> int:
     try:
-        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+        from lz4.frame import LZ4FrameDecompressor
     except ImportError:
         raise missing("lz4", "chunks are compressed with lz4") from None
     try:
-        found: bytes = LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+        found = LZ4FrameDecompressor().decompress(data, max_length=len(target) + 1)
     except (RuntimeError, ValueError, EOFError) as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
-    return found
+    return _copy(found, target)
 
 
 def missing(library: str, why: str) -> RecordingError:

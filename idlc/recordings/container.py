@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from idlc.recordings import bag
+from idlc.recordings.compression import ZSTD_MAGIC
 from idlc.recordings.db3 import MAGIC as DB3_MAGIC
-from idlc.recordings.db3 import Db3
-from idlc.recordings.errors import RecordingError
+from idlc.recordings.db3 import Db3, Rows
+from idlc.recordings.errors import RecordingError, of_file
 from idlc.recordings.mcap import McapFacts, read_facts
 from idlc.recordings.mcap_records import MAGIC as MCAP_MAGIC
 from idlc.recordings.mcap_records import Chunk
-from idlc.recordings.source import MappedFile, OpenedFile, Source
+from idlc.recordings.source import first_bytes, is_local, source_of
+
+if TYPE_CHECKING:
+    from idlc.recordings.messages import Messages, Window
+
+Opened = TypeVar("Opened", bound="File")
+DB3 = ".db3"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -32,30 +39,43 @@ class Schema:
 class Topic:
     """What was recorded under one name, of one type.
 
-    `hash` is the type hash (RIHS01) and None where the recorder wrote none. `count` is None where
-    nothing counted the messages. `schema` is None where the recording has no definition.
+    `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
+    the recording has no definition.
     """
 
     name: str
     type: str
-    count: int | None
+    count: int
     hash: str | None
     encoding: str
     schema: Schema | None
 
 
-class McapFile:
+class File:
+    """What can be closed, also by leaving a `with` statement."""
+
+    def close(self) -> None:
+        """Release the file."""
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class McapFile(File):
     """One MCAP file, and which channels mean which topic."""
 
-    def __init__(self, source: Source, index: bool, check: bool) -> None:
-        self.source = source
-        self.name = source.name
-        try:
-            self.facts: McapFacts = read_facts(source, index, check)
-        except RecordingError as error:
-            if source.name in error.message:
-                raise
-            raise RecordingError(f"`{source.name}`: {error.message}", error.hint) from None
+    def __init__(
+        self, place: Any, index: bool = True, check: bool = False, read: bool = True
+    ) -> None:
+        self.place = place
+        self.check = check
+        self.source = source_of(place)
+        self.name = self.source.name
+        with of_file(self.name):
+            self.facts = read_facts(self.source, index, check) if read else McapFacts()
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
         self.topics: list[tuple[Topic, int]] = [self._topic(one) for one in self.facts.channels]
 
@@ -65,40 +85,72 @@ class McapFile:
         found = facts.schemas.get(channel.schema)
         name = full_name(found.name) if found else ""
         schema = Schema(name, found.encoding, found.text) if found and found.text else None
-        count = facts.counts.get(number, 0) if facts.counts is not None else None
+        count = facts.counts.get(number, 0)
         digest = channel.metadata.get("topic_type_hash") or None
         return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
 
     @property
-    def chunks(self) -> list[Chunk]:
-        """Where messages are."""
-        return self.facts.chunks
+    def start(self) -> int | None:
+        """When the first message came."""
+        return self.facts.start
+
+    def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
+        """Return where messages of some channels may be."""
+        from idlc.recordings.mcap_messages import may_have
+
+        return [one for one in self.facts.chunks if may_have(one, channels, window)]
+
+    def messages(
+        self, channels: Collection[int], pieces: Iterable[Chunk], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some channels in some chunks."""
+        from idlc.recordings.mcap_messages import messages
+
+        return messages(self.source, pieces, channels, window, self.check)
 
     def close(self) -> None:
         """Release the file."""
         self.source.close()
 
 
-class Db3File:
+class Db3File(File):
     """One .db3 file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, read: bool = True) -> None:
+        self.place = str(path)
         self.name = str(path)
         self.database = Db3(path)
         self.notes: list[str] = []
         self.topics: list[tuple[Topic, int]] = []
-        for one in self.database.topics():
+        for one in self.database.topics() if read else ():
             name = full_name(one.type)
             schema = Schema(name, one.schema_encoding, one.text) if one.text.strip() else None
             topic = Topic(one.name, name, one.messages, one.hash or None, one.encoding, schema)
             self.topics.append((topic, one.id))
+
+    @property
+    def start(self) -> int | None:
+        """When the first message came."""
+        return self.database.start()
+
+    def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
+        """Return where messages of some topics may be."""
+        return self.database.rows_of_messages()
+
+    def messages(
+        self, topics: Collection[int], pieces: Iterable[Rows], window: Window
+    ) -> Iterator[Messages]:
+        """Yield the messages of some topics in some rows."""
+        from idlc.recordings.db3_messages import messages
+
+        return messages(self.database, pieces, topics, window)
 
     def close(self) -> None:
         """Close the file."""
         self.database.close()
 
 
-class Container:
+class Container(File):
     """An open recording: its topics, and the files that they are in."""
 
     def __init__(self, name: str, files: list[McapFile | Db3File], notes: Iterable[str]) -> None:
@@ -107,37 +159,67 @@ class Container:
         self.notes = (*notes, *(note for file in files for note in file.notes))
         self.topics: tuple[Topic, ...] = tuple(_merged(files))
 
+    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int]]]:
+        """Yield each file that has messages of a topic, and what it calls the topic."""
+        for file in self.files:
+            ids = [number for one, number in file.topics if _is_part_of(one, topic)]
+            if ids:
+                yield file, ids
+
+    def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
+        """Yield the messages of a topic, many at a time, in the order of the recording."""
+        for file, ids in self.ids_of(topic):
+            yield from file.messages(ids, file.pieces(ids, window), window)  # type: ignore[arg-type]
+
+    def start(self) -> int:
+        """Return when the first message came; 0 if there is none."""
+        found = [file.start for file in self.files]
+        return min((time for time in found if time is not None), default=0)
+
     def close(self) -> None:
         """Close all files."""
         for file in self.files:
             file.close()
 
-    def __enter__(self) -> Container:  # noqa: PYI034 # Self came with Python 3.11
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Container:
     """Open an .mcap or .db3 file, or the folder of a bag; raise RecordingError if it is none.
 
-    Without `index`, MCAP files are walked over whatever their summaries say. `check` compares
-    checksums.
+    A list of them is one recording. MCAP files may also be URLs that fsspec can open, and file
+    objects. Without `index`, MCAP files are walked over whatever their summaries say. `check`
+    compares checksums.
     """
+    if isinstance(path, (list, tuple)):
+        opened = _all_or_none(path, lambda one: open_recording(one, index=index, check=check))
+        files = [file for one in opened for file in one.files]
+        return Container(", ".join(one.name for one in opened), files, ())
+    if not is_local(path):
+        return Container(str(path), [McapFile(path, index, check)], ())
     path = Path(path)
     if not path.is_dir():
         return Container(str(path), [_open_file(path, index, check)], ())
     paths, notes = bag.files_of(path)
-    files: list[McapFile | Db3File] = []
+    return Container(str(path), _all_or_none(paths, lambda p: _open_file(p, index, check)), notes)
+
+
+def open_pieces(place: Any) -> McapFile | Db3File:
+    """Open a file for pieces of it that are known: nothing else is read."""
+    if is_local(place) and Path(place).suffix == DB3:
+        return Db3File(Path(place), read=False)
+    return McapFile(place, read=False)
+
+
+def _all_or_none(places: Iterable[Any], opened: Callable[[Any], Opened]) -> list[Opened]:
+    """Return what is opened at all places; close it all if one of them fails."""
+    found: list[Opened] = []
     try:
-        for one in paths:
-            files.append(_open_file(one, index, check))  # noqa: PERF401 # those before are closed
+        for place in places:
+            found.append(opened(place))  # noqa: PERF401 # those before are closed
     except RecordingError:
-        for file in files:
-            file.close()
+        for one in found:
+            one.close()
         raise
-    return Container(str(path), files, notes)
+    return found
 
 
 def _open_file(path: Path, index: bool, check: bool) -> McapFile | Db3File:
@@ -146,31 +228,30 @@ def _open_file(path: Path, index: bool, check: bool) -> McapFile | Db3File:
     if path.name == bag.METADATA:
         hint = f"name the folder: `{path.parent}`"
         raise RecordingError(f"`{path}` describes a recording and is none", hint)
-    source = MappedFile(path)
-    if not source.size:
-        raise RecordingError(f"`{path}` is empty")
-    start = bytes(source.view(0, min(source.size, 16)))
+    start = first_bytes(path)
     if start.startswith(DB3_MAGIC):
-        source.close()
         return Db3File(path)
-    if not start.startswith(MCAP_MAGIC):
-        if start.startswith(b"#ROSBAG"):
-            hint = "`rosbags-convert` reads those of ROS 1"
-        if start.startswith(b"\x28\xb5\x2f\xfd"):
-            hint = f"it is compressed as a whole: zstd -d {path}"
-        raise RecordingError(f"`{path}` is no recording: neither MCAP nor .db3", hint)
-    return McapFile(source, index, check)
-
-
-def open_mcap(file: Any, name: str, *, index: bool = True, check: bool = False) -> Container:
-    """Open an MCAP file that is a file object, such as fsspec's."""
-    return Container(name, [McapFile(OpenedFile(file, name), index, check)], ())
+    if start.startswith(MCAP_MAGIC):
+        return McapFile(path, index, check)
+    if not start:
+        raise RecordingError(f"`{path}` is empty")
+    if start.startswith(b"#ROSBAG"):
+        hint = "`rosbags-convert` reads those of ROS 1"
+    if start.startswith(ZSTD_MAGIC):
+        hint = f"it is compressed as a whole: zstd -d {path}"
+    raise RecordingError(f"`{path}` is no recording: neither MCAP nor .db3", hint)
 
 
 def full_name(name: str) -> str:
     """Return a type's name in three parts; pkg/Type is an older spelling of pkg/msg/Type."""
     package, slash, rest = name.partition("/")
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
+
+
+def _is_part_of(one: Topic, whole: Topic) -> bool:
+    """Return whether a channel belongs to a topic: definitions may be left out."""
+    same = (one.name, one.type, one.encoding) == (whole.name, whole.type, whole.encoding)
+    return same and one.schema in (whole.schema, None)
 
 
 def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
@@ -182,12 +263,11 @@ def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     for same in found.values():
         texts = dict.fromkeys(topic.schema for topic in same if topic.schema)
         for schema in texts or [None]:
-            mine = [one for one in same if one.schema in (schema, None)]
-            counts = [one.count for one in mine]
+            whole = replace(same[0], schema=schema)
+            mine = [one for one in same if _is_part_of(one, whole)]
             hashes = [one.hash for one in mine if one.hash]
             yield replace(
-                mine[0],
-                count=None if None in counts else sum(filter(None, counts)),
+                whole,
+                count=sum(one.count for one in mine),
                 hash=hashes[0] if hashes else None,
-                schema=schema,
             )

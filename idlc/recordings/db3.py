@@ -33,11 +33,19 @@ class Db3Topic(NamedTuple):
     messages: int
 
 
+class Rows(NamedTuple):
+    """Messages from one row to another, which belongs to them."""
+
+    first: int
+    last: int
+
+
 class Db3:
     """An open .db3 file."""
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
+        self.size = path.stat().st_size
         # what a recorder has not yet written back stands in a second file
         written_back = not _has_content(path.with_name(path.name + "-wal"))
         mode = "mode=ro&immutable=1" if written_back else "mode=ro"
@@ -111,6 +119,20 @@ class Db3:
             definition = (digest or other, schema_encoding, text, counts.get(number, 0))
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics
+
+    def rows_of_messages(self) -> list[Rows]:
+        """Return the rows that there are, in one piece; none if there are no messages."""
+        query = "SELECT MIN(rowid), MAX(rowid) FROM messages NOT INDEXED"
+        return [
+            Rows(first, last)
+            for first, last in self.rows(query)
+            if isinstance(first, int) and isinstance(last, int)
+        ]
+
+    def start(self) -> int | None:
+        """Return when the first message came."""
+        ((found,),) = self.rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
+        return found if isinstance(found, int) else None
 
     def _definitions(self) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""

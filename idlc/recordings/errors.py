@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class RecordingError(Exception):
     """A recording, or a part of it, cannot be read; `hint` says what can be done about it."""
@@ -13,3 +16,14 @@ class RecordingError(Exception):
 
     def __str__(self) -> str:
         return f"{self.message} ({self.hint})" if self.hint else self.message
+
+
+@contextmanager
+def of_file(name: str) -> Iterator[None]:
+    """Have errors say which file is meant."""
+    try:
+        yield
+    except RecordingError as error:
+        if f"`{name}`" in error.message:
+            raise
+        raise RecordingError(f"`{name}`: {error.message}", error.hint) from None

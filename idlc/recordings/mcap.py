@@ -21,12 +21,13 @@ END_OF_TIME = (1 << 64) - 1
 
 @dataclass
 class McapFacts:
-    """What a file holds; `counts` is by channel and None if nothing counted them."""
+    """What a file holds; `counts` is by channel, and `start` is when the first message came."""
 
     schemas: dict[int, McapSchema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
-    counts: dict[int, int] | None = None
+    counts: dict[int, int] = field(default_factory=dict)
+    start: int | None = None
     notes: list[str] = field(default_factory=list)
 
     def add(self, op: int, data: memoryview) -> None:
@@ -93,12 +94,18 @@ def _believe(facts: McapFacts, statistics: mcap.Statistics | None, start: int) -
         raise RecordingError("its summary does not name all schemas")
     if statistics.messages != sum(statistics.counts.values()):
         raise RecordingError("its summary counts messages in two ways")
-    if any(chunk.at + chunk.size > start for chunk in facts.chunks):
-        raise RecordingError("its summary names chunks that are not there")
     facts.chunks.sort(key=lambda chunk: chunk.at)
+    end = len(MAGIC)
+    for chunk in facts.chunks:
+        if chunk.at < end:
+            raise RecordingError("its summary names a chunk twice")
+        end = chunk.at + chunk.size
+    if end > start:
+        raise RecordingError("its summary names chunks that are not there")
     if statistics.messages and not facts.chunks:
         facts.chunks = [Chunk(len(MAGIC), start - len(MAGIC), 0, END_OF_TIME, None, None)]
-    facts.counts = dict.fromkeys(facts.channels, 0) | statistics.counts
+    facts.counts = statistics.counts
+    facts.start = statistics.start if statistics.messages else None
 
 
 class _Walk:
@@ -106,7 +113,7 @@ class _Walk:
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self.facts = McapFacts(counts={})
+        self.facts = McapFacts()
         self.loose: tuple[int, int] | None = None
         self.last: Chunk | None = None
         self.offsets = bytearray()
@@ -127,17 +134,24 @@ class _Walk:
         """Return what a record holds."""
         return self.source.view(at + HEAD.size, size - HEAD.size)
 
-    def count(self, channel: int, messages: int) -> None:
-        """Count messages of a channel."""
-        assert self.facts.counts is not None
-        self.facts.counts[channel] = self.facts.counts.get(channel, 0) + messages
+    def count(self, channel: int, messages: int, time: int) -> None:
+        """Count messages of a channel, the first of which came at a time."""
+        counts = self.facts.counts
+        counts[channel] = counts.get(channel, 0) + messages
+        if messages and (self.facts.start is None or time < self.facts.start):
+            self.facts.start = time
 
     def message(self, at: int, size: int) -> None:
         """Take note of a message outside of any chunk."""
-        if size >= HEAD.size + 2:
-            self.count(int.from_bytes(self.source.view(at + HEAD.size, 2), "little"), 1)
+        self.count_one(self.source.view(at + HEAD.size, min(size - HEAD.size, 14)))
         start = self.loose[0] if self.loose else at
         self.loose = (start, at + size)
+
+    def count_one(self, data: memoryview) -> None:
+        """Count a message."""
+        if len(data) >= 14:
+            channel, time = data[:2], data[6:14]
+            self.count(int.from_bytes(channel, "little"), 1, int.from_bytes(time, "little"))
 
     def end_of_loose(self) -> None:
         """Make one stretch of the messages outside of chunks until here."""
@@ -156,7 +170,8 @@ class _Walk:
         """Take note of the index of one channel in the chunk before it."""
         fields = mcap.Fields(self.content(at, size), "the index of a chunk")
         channel, entries = fields.number(2), fields.number(4)
-        self.count(channel, entries // 16)
+        assert self.last is not None
+        self.count(channel, entries // 16, self.last.first)
         self.offsets += mcap.INDEX_OFFSET.pack(channel, at)
 
     def end_of_chunk(self) -> None:
@@ -175,8 +190,8 @@ class _Walk:
         head = mcap.chunk_head(self.content(chunk.at, chunk.size))
         for op, _, data in mcap.records(decompressed(head.records, head.compression, head.size)):
             self.facts.add(op, data)
-            if counting and op == mcap.MESSAGE_OP and len(data) >= 2:
-                self.count(int.from_bytes(data[:2], "little"), 1)
+            if counting and op == mcap.MESSAGE_OP:
+                self.count_one(data)
 
 
 def _walk(source: Source, reason: str) -> McapFacts:

@@ -64,6 +64,7 @@ class Statistics(NamedTuple):
 
     messages: int
     chunks: int
+    start: int
     counts: dict[int, int]
 
 
@@ -154,23 +155,24 @@ def statistics(data: memoryview) -> Statistics:
     fields = Fields(data, "the statistics")
     messages = fields.number(8)
     fields.take(2 + 4 + 4 + 4)
-    chunks = fields.number(4)
-    fields.take(8 + 8)
+    chunks, start = fields.number(4), fields.number(8)
+    fields.take(8)
     part, counts = fields.part(), {}
     while part.more():
         number = part.number(2)
         counts[number] = part.number(8)
-    return Statistics(messages, chunks, counts)
+    return Statistics(messages, chunks, start, counts)
 
 
 class ChunkHead(NamedTuple):
-    """What stands before the records of a chunk."""
+    """What stands before the records of a chunk, and these; they begin at `start`."""
 
     first: int
     last: int
     size: int
     crc: int
     compression: str
+    start: int
     records: memoryview
 
 
@@ -179,4 +181,5 @@ def chunk_head(data: memoryview) -> ChunkHead:
     fields = Fields(data, "a chunk")
     first, last, size, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
     compression = fields.name()
-    return ChunkHead(first, last, size, crc, compression, fields.take(fields.number(8)))
+    found = fields.take(fields.number(8))
+    return ChunkHead(first, last, size, crc, compression, fields.at - len(found), found)

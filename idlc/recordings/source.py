@@ -48,6 +48,42 @@ class MappedFile:
         self.size = 0
 
 
+def is_local(place: Any) -> bool:
+    """Return whether a place is a path of this machine, not a URL or a file object."""
+    return isinstance(place, Path) or (isinstance(place, str) and "://" not in place)
+
+
+def source_of(place: Any) -> Source:
+    """Return a file at a path, at a URL that fsspec can open, or of an object that is one."""
+    if is_local(place):
+        return MappedFile(Path(place))
+    if isinstance(place, str):
+        try:
+            import fsspec
+        except ImportError:
+            message = f"`{place}` is opened by fsspec, which is not installed"
+            raise RecordingError(message, "pip install fsspec") from None
+        place = fsspec.open(place, "rb")
+    opened = place.open() if hasattr(place, "open") else place
+    try:
+        return OpenedFile(opened, _name(place))
+    except OSError as error:
+        raise RecordingError(f"`{place}` cannot be read: {error}") from None
+
+
+def _name(place: Any) -> str:
+    return str(getattr(place, "path", None) or getattr(place, "name", None) or place)
+
+
+def first_bytes(path: Path, size: int = 16) -> bytes:
+    """Return how a file begins."""
+    try:
+        with path.open("rb") as file:
+            return file.read(size)
+    except OSError as error:
+        raise RecordingError(f"`{path}` cannot be read: {error.strerror}") from None
+
+
 class OpenedFile:
     """A binary file object that can seek, such as fsspec's on an object store."""
 

@@ -26,8 +26,8 @@ STAGES = (
 NEEDS_ONLY = {"native": {"native", "model"}}
 #: What emit shares with the runtime, so that there is one rule for the names in Python.
 SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
-#: The outermost modules, which belong to the command line.
-OUTERMOST = {"__main__": "cli", "__init__": "diagnostics", "build": "cli"}
+#: The outermost modules, which belong to the command line or to programs.
+OUTERMOST = {"__main__": "cli", "__init__": "driver", "build": "cli", "loaded": "disk"}
 
 #: Only these stages may touch files, the environment or the terminal.
 MAY_DO_IO = {"disk", "recordings", "cli", "backend"}

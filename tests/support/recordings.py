@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterable, Iterator
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.interfaces import Nodetype
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as BagWriter
 from rosbags.typesys import Stores, get_typestore
@@ -129,3 +131,93 @@ def by_rosbags(path: Path, found: Iterable[Recorded], storage: str, compression:
 def of_topic(found: Iterable[Recorded], topic: str) -> Iterator[Recorded]:
     """Yield the messages of one topic."""
     return (one for one in found if one.topic == topic)
+
+
+#: Types of every shape, of which rosbags can make messages.
+KINDS = (
+    "builtin_interfaces/msg/Duration",
+    "sensor_msgs/msg/MultiEchoLaserScan",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "nav_msgs/msg/OccupancyGrid",
+    "nav_msgs/msg/Path",
+    "sensor_msgs/msg/BatteryState",
+    "sensor_msgs/msg/JointState",
+    "sensor_msgs/msg/PointCloud2",
+    "std_msgs/msg/Bool",
+    "std_msgs/msg/Char",
+    "std_msgs/msg/Empty",
+    "std_msgs/msg/Int64MultiArray",
+    "std_msgs/msg/String",
+    "stereo_msgs/msg/DisparityImage",
+    "tf2_msgs/msg/TFMessage",
+    "trajectory_msgs/msg/JointTrajectory",
+    "visualization_msgs/msg/MarkerArray",
+)
+#: What rosbags and others add to a message without fields.
+DUMMY = "structure_needs_at_least_one_member"
+#: What rosbags writes these as.
+NUMPY = {"octet": "uint8", "byte": "uint8", "char": "uint8"}
+
+
+def invented(name: str, rng: random.Random) -> Any:
+    """Return a message of any type, with sequences of any size."""
+    _, wanted = STORE.fielddefs[name]
+    return kind(name)(*(_value(one, rng) for _, one in wanted))
+
+
+def _value(wanted: Any, rng: random.Random) -> Any:
+    form, inner = wanted
+    if form == Nodetype.BASE:
+        return _number(inner[0], rng)
+    if form == Nodetype.NAME:
+        return invented(inner, rng)
+    element, size = inner
+    count = size if form == Nodetype.ARRAY else rng.randrange(4)
+    values = [_value(element, rng) for _ in range(count)]
+    number = element[0] == Nodetype.BASE and element[1][0] != "string"
+    if not number:
+        return values
+    return np.array(values, NUMPY.get(element[1][0], element[1][0]))
+
+
+def _number(name: str, rng: random.Random) -> Any:
+    if name == "string":
+        return "".join(rng.choice("aé€𝄞 z") for _ in range(rng.randrange(6)))
+    if name == "bool":
+        return rng.random() < 0.5
+    if name.startswith("float"):
+        return float(np.dtype(name).type(rng.uniform(-1e6, 1e6)))
+    limits = np.iinfo(NUMPY.get(name, name))
+    return rng.randint(int(limits.min), int(limits.max))
+
+
+def varied(count: int = 5, seed: int = 3) -> list[Recorded]:
+    """Return some messages of each of many types, on topics that are called like these."""
+    rng, found = random.Random(seed), []
+    for index in range(count * len(KINDS)):
+        name = KINDS[index % len(KINDS)]
+        data = bytes(STORE.serialize_cdr(invented(name, rng), name))
+        time = START + index * SECOND // 100
+        found.append(Recorded(f"/{name.rpartition('/')[2]}", name, time, time, data))
+    return found
+
+
+def plain(value: Any) -> Any:
+    """Return a value of any reader as those of Python: dictionaries, lists, numbers and texts."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, (bytes, bytearray, memoryview)):
+        return list(bytes(value))
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if isinstance(value, dict):
+        return {name: plain(one) for name, one in value.items()}
+    if is_dataclass(value):
+        names = [one.name for one in fields(value) if one.name != DUMMY]
+        return {name: plain(getattr(value, name)) for name in names if name[0].islower()}
+    if hasattr(value, "__slots__"):
+        names = [name for name in value.__slots__ if name != DUMMY]
+        return {name: plain(getattr(value, name)) for name in names}
+    return value

@@ -140,7 +140,8 @@ def _field(field: dict[str, Any]) -> FieldInfo:
 def class_of(name: str) -> Any:
     """Return the class of a type by its full name, of this package or of another."""
     package, kind, short = name.split("/")
-    root = OWN if package == types()["package"] else package
+    others = types().get("around", "")  # where other packages are, if not at the top
+    root = OWN if package == types()["package"] else others + package
     with importing():
         return getattr(import_module(f"{root}.{kind}"), public_name(short))
 

@@ -1,0 +1,194 @@
+"""Classes without files of one's own: compiled when a program asks, and kept in a cache."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from idlc import __version__
+from idlc.diagnostics.report import Report
+from idlc.disk import loaded_cache as cache
+from idlc.emit.pynames import class_
+from idlc.model import ir
+from idlc.recordings.errors import RecordingError
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+    from idlc.recordings.container import Topic
+    from idlc.templating import RenderedFile
+
+#: The package that all loaded ones are in.
+LOADED = "idlc.loaded"
+#: The support package of each: idlc's own modules under another name, with data of its own.
+SUPPORT = '''\
+"""The support code of idlc, for this package."""
+
+from importlib.machinery import PathFinder
+
+import idlc
+
+_spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
+__path__ += _spec.submodule_search_locations
+exec(_spec.loader.get_code(_spec.name))
+'''
+
+
+class CompileError(ValueError):
+    """What was to be loaded has errors, or does not exist; its text is that of the problems."""
+
+
+class Loaded(ModuleType):
+    """Packages that were compiled together, and by their own names the interfaces asked for."""
+
+    def __init__(self, name: str, packages: Iterable[str], asked: Iterable[ir.TypeName]) -> None:
+        super().__init__(name, "What `idlc.load` compiled.")
+        self._packages = sorted(packages)
+        self._asked = {str(class_(one)): one for one in asked}
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._packages:
+            return import_module(f"{self.__name__}.{name}")
+        if name in self._asked:
+            return self[str(self._asked[name])]
+        raise AttributeError(f"no `{name}` was loaded, but {', '.join(dir(self))}")
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a class by its full name, such as "std_msgs/msg/Header"."""
+        return _class(self.__name__, name)
+
+    def __dir__(self) -> list[str]:
+        return [*self._packages, *sorted(self._asked)]
+
+    def __repr__(self) -> str:
+        return f"<loaded: {', '.join(dir(self))}>"
+
+
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> Loaded:
+    """Compile interfaces, and return their classes.
+
+    `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
+    package that is known here. `include` are folders in which other packages are looked for first.
+    The classes can be pickled, where the same cache is seen; type checkers do not know them, so
+    programs are better off with `idlc gen`.
+    """
+    from idlc.driver.loading import asked_models
+
+    report = Report()
+    models, asked = asked_models(str(what), tuple(include), distro, report)
+    _raise_for(report)
+    name = _kept(models)
+    return Loaded(f"{LOADED}.{name}", models, asked)
+
+
+def class_of(topic: Topic) -> Any:
+    """Return the class of a topic's messages, compiled from what was recorded.
+
+    Warns if that is not what the topic's publisher said that it is.
+    """
+    schema, key = topic.schema, ""
+    if schema:
+        key = _key([topic.type, schema.encoding, schema.text])
+    if not (key and cache.has(key)):
+        from idlc.driver.loading import topic_models
+
+        models, is_recorded = topic_models(topic)
+        # what was borrowed from around here may be another thing tomorrow
+        key = _kept(models, key if is_recorded else "")
+    kind = _class(f"{LOADED}.{key}", topic.type)
+    if topic.hash not in (None, _type_of(kind).hash):
+        message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
+        warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
+    return kind
+
+
+class OtherDefinitionWarning(UserWarning):
+    """The definition in a recording has another hash than that which the publisher announced."""
+
+
+def accepted(kind: Any, topic: Topic) -> Any:
+    """Return a class that a program gave; raise RecordingError if messages are of another type."""
+    try:
+        given = _type_of(kind)
+    except (AttributeError, ImportError, KeyError, TypeError):
+        hint = "leave it out, or give one that `idlc gen` made"
+        raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
+    if given.name != topic.type:
+        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {given.name}")
+    if given.hash != topic.hash:
+        from idlc.driver.loading import recorded_hash
+
+        found = recorded_hash(topic)
+        if given.hash != found:
+            raise RecordingError(
+                f"{given.name} was another type when `{topic.name}` was recorded: its hash is "
+                f"{found or topic.hash or 'not known'}, that of the class is {given.hash}",
+                "leave the class out to read what was recorded",
+            )
+    return kind
+
+
+class _Type(NamedTuple):
+    name: str
+    hash: str
+
+
+def _type_of(kind: Any) -> _Type:
+    """Return the full name and the hash of a generated class."""
+    home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
+    info = import_module(f"{home}._idlc.on_demand.typeinfo")
+    name = info.type_name(kind)
+    return _Type(name, info.types()["hashes"][name])
+
+
+def _class(home: str, name: str) -> Any:
+    package, kind, short = name.split("/")
+    found: Any = import_module(f"{home}.{package}.{kind}")
+    return getattr(found, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
+
+
+def _kept(models: Mapping[str, Model], key: str = "") -> str:
+    """Return the name under which the packages are kept, after they are written if need be."""
+    if not key:
+        texts = [
+            text
+            for model in models.values()
+            for own in model.own
+            for text in (str(own.name), own.source.text if own.source else "")
+        ]
+        key = _key(texts)
+    if not cache.has(key):
+        cache.keep(key, _files(models, f"{LOADED}.{key}"))
+    return key
+
+
+def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
+    """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.emit.render import render_package
+    from idlc.templating import RenderedFile
+
+    for package, model in models.items():
+        yield RenderedFile(f"{package}/_idlc/__init__.py", SUPPORT)
+        for file in render_package(model, around):
+            if not file.path.startswith("_idlc/") or file.path == "_idlc/type_data.py":
+                yield RenderedFile(f"{package}/{file.path}", file.text)
+
+
+def _key(texts: Iterable[str]) -> str:
+    """Return a name for packages that are compiled from these texts by this idlc."""
+    from hashlib import sha256
+
+    digest = sha256(f"{__version__} {cache.newest()}".encode())
+    for text in texts:
+        raw = text.encode("utf-8", "surrogatepass")
+        digest.update(b"%d " % len(raw) + raw)
+    return f"h{digest.hexdigest()[:12]}"
+
+
+def _raise_for(report: Report) -> None:
+    if report.had_errors:
+        from idlc.diagnostics.formats import terminal
+
+        raise CompileError("\n" + "\n".join(terminal.text(report)))

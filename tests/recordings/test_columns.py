@@ -1,0 +1,207 @@
+"""`idlc columns`: recordings become files that everybody's tools read, whole or not at all."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+import sys
+from base64 import b64decode
+
+import pandas as pd
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+import idlc
+from idlc.cli.main import main
+from tests.support import recordings as made
+
+MESSAGES = made.messages()
+
+
+@pytest.fixture
+def recording(here):
+    return made.by_mcap(here / "rec.mcap", MESSAGES, chunk_size=3000)
+
+
+def run(*words):
+    return main([str(word) for word in ("columns", *words)])
+
+
+def table(recording, topic, **options):
+    with idlc.Recording(recording) as opened:
+        return opened[topic].to_arrow(**{"flat": True, "datetimes": True, **options})
+
+
+def test_a_newcomer_gets_from_a_file_to_a_data_frame(recording, here, capfd):
+    assert main(["show", str(recording)]) == 0
+    shown = capfd.readouterr().out
+    assert "/imu" in shown
+    assert "sensor_msgs/msg/Imu" in shown
+    assert run(recording, "/imu", "-o", "imu.parquet") == 0
+    assert capfd.readouterr().err == "/imu: 20 messages → imu.parquet\n"
+    frame = pd.read_parquet("imu.parquet")
+    assert len(frame) == 20
+    mine = [one for one in MESSAGES if one.topic == "/imu"]
+    assert list(frame["log_time"].astype("int64")) == [one.log_time for one in mine]
+    sent = [made.STORE.deserialize_cdr(one.data, one.type) for one in mine]
+    assert list(frame["angular_velocity.z"]) == [one.angular_velocity.z for one in sent]
+    delays = (frame["log_time"] - frame["header.stamp"]).dt.total_seconds() * 1e9
+    assert [round(one) for one in delays] == [5] * 20
+
+
+@pytest.mark.parametrize("name", ["a.parquet", "a.pq", "a.arrow", "a.feather"])
+@pytest.mark.parametrize("topic", made.MAKERS)
+def test_files_hold_the_tables(recording, name, topic):
+    assert run(recording, topic, "-o", name) == 0
+    if name.endswith(("parquet", "pq")):
+        found = parquet.read_table(name)
+    else:
+        with pa.ipc.open_file(name) as file:
+            found = file.read_all()
+    wanted = table(recording, topic)
+    assert found.to_pylist() == wanted.to_pylist()
+    assert found.schema.names == wanted.schema.names
+    assert found.schema.metadata[b"ros2.type"] == made.MAKERS[topic][0].encode()
+
+
+def test_options_choose_rows_and_columns(recording):
+    chosen = ("--fields", "header.stamp, position", "--from", "2", "--to", "3")
+    assert run(recording, "/joints", *chosen, "-o", "a.parquet") == 0
+    found = parquet.read_table("a.parquet")
+    assert found.column_names == ["log_time", "publish_time", "header.stamp", "position"]
+    assert len(found) == 3
+    assert run(recording, "/imu", "--nested", "--no-datetimes", "-o", "b.parquet") == 0
+    found = parquet.read_table("b.parquet")
+    assert found.to_pylist() == table(recording, "/imu", flat=False, datetimes=False).to_pylist()
+
+
+def test_a_pipe_gets_the_stream_format(recording):
+    command = [sys.executable, "-m", "idlc", "columns", str(recording), "/imu"]
+    done = subprocess.run(command, capture_output=True, check=True)
+    with pa.ipc.open_stream(done.stdout) as stream:
+        assert stream.read_all().equals(table(recording, "/imu"))
+
+
+def test_a_csv_file_has_lists_as_json_and_bytes_in_base64(recording, capfdbinary):
+    assert run(recording, "/joints", "-o", "joints.csv") == 0
+    with open("joints.csv", newline="") as file:  # noqa: PTH123
+        rows = list(csv.DictReader(file))
+    wanted = table(recording, "/joints").to_pylist()
+    assert [json.loads(row["name"]) for row in rows] == [row["name"] for row in wanted]
+    assert [json.loads(row["effort"]) for row in rows] == [row["effort"] for row in wanted]
+    assert run(recording, "/camera/image", "--format", "csv", "--fields", "data,encoding") == 0
+    text = capfdbinary.readouterr().out.decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    wanted = table(recording, "/camera/image").to_pylist()
+    assert [b64decode(json.loads(row["data"])) for row in rows] == [row["data"] for row in wanted]
+
+
+def test_several_topics_go_to_a_folder_or_to_names_of_their_own(recording, here):
+    assert run(recording, "-o", "all") == 0
+    names = {"camera.image.parquet", "imu.parquet", "joints.parquet"}
+    assert {path.name for path in (here / "all").iterdir()} == names
+    assert run(recording, "/imu", "/joints", "-o", "x/{topic}.csv") == 0
+    assert {path.name for path in (here / "x").iterdir()} == {"imu.csv", "joints.csv"}
+    assert run(recording, "/imu", "-o", "all", "--format", "arrow") == 0
+    assert (here / "all" / "imu.arrow").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (["/im", "-o", "a.csv"], 2, "did you mean `/imu`?"),
+        (["/imu", "-o", "a.txt"], 2, "does not say which format is meant"),
+        (["/imu", "/joints", "-o", "a.csv"], 2, "/imu, /joints cannot all go to `a.csv`"),
+        (["/imu", "/joints"], 2, "cannot all go to standard output"),
+        (["/imu", "--from", "soon", "-o", "a.csv"], 1, "`soon` is no time"),
+        (["/imu", "--fields", "nothing", "-o", "a.csv"], 2, "Imu has no field 'nothing'"),
+        (["/imu", "-o", "rec.mcap/a.csv"], 1, "cannot be written"),
+    ],
+)
+def test_what_cannot_be_done_is_said_and_leaves_nothing(
+    recording, here, words, status, said, capfd
+):
+    assert run(recording, *words) == status
+    assert said in capfd.readouterr().err
+    assert [path.name for path in here.iterdir()] == ["rec.mcap"]
+
+
+def test_nothing_is_replaced_unless_it_is_asked_for(recording, here, capfd):
+    (here / "a.csv").write_text("mine\n")
+    assert run(recording, "/imu", "-o", "a.csv") == 1
+    assert "`a.csv` exists" in capfd.readouterr().err
+    assert (here / "a.csv").read_text() == "mine\n"
+    assert run(recording, "/imu", "-o", "a.csv", "--force") == 0
+    assert (here / "a.csv").read_text() != "mine\n"
+
+
+def test_a_run_that_fails_in_the_middle_leaves_what_was_there(here, capfd):
+    broken = [*MESSAGES[:-3], *(one._replace(data=one.data[:40]) for one in MESSAGES[-3:])]
+    recording = made.by_mcap(here / "rec.mcap", broken)
+    (here / "imu.parquet").write_text("mine\n")
+    assert run(recording, "/imu", "-o", "imu.parquet", "--force") == 1
+    assert "message 19 of `/imu` is broken" in capfd.readouterr().err
+    assert (here / "imu.parquet").read_text() == "mine\n"
+    assert sorted(path.name for path in here.iterdir()) == ["imu.parquet", "rec.mcap"]
+
+
+def test_names_of_topics_do_not_leave_the_folder(here):
+    found = [one._replace(topic="/../../etc/\x1b[31m") for one in MESSAGES if one.topic == "/imu"]
+    recording = made.by_mcap(here / "rec.mcap", found)
+    assert run(recording, "-o", "out/") == 0
+    assert [path.name for path in (here / "out").iterdir()] == ["etc.__31m.parquet"]
+
+
+def test_what_is_unusual_is_noted(here, capfd):
+    recording = made.by_mcap(here / "rec.mcap", MESSAGES, chunk_size=3000)
+    recording.write_bytes(recording.read_bytes()[:9000])
+    assert run(recording, "/imu", "-o", "imu.csv") == 0
+    assert "read to its last whole record" in capfd.readouterr().err
+
+
+def test_without_arrow_it_is_said_how_to_install_it(recording, here):
+    (here / "pyarrow.py").write_text("raise ImportError\n")
+    command = [sys.executable, "-m", "idlc", "columns", str(recording), "/imu", "-o", "a.parquet"]
+    env = {**os.environ, "PYTHONPATH": str(here)}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=env)
+    assert done.returncode == 1
+    assert "pip install 'idlc[recordings]'" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_terminal_sees_a_bar(recording):
+    from idlc.cli import progress
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    seen = Terminal()
+    with progress.shown(seen) as tell:
+        tell("/imu", 5, 20)
+        tell("/imu\x1b", 20, 20)
+    assert "5 of 20  /imu" in seen.getvalue()
+    assert "\x1b" not in seen.getvalue()
+    assert seen.getvalue().rpartition("\r")[0].endswith(" ")
+
+
+def test_memory_is_bounded_by_chunks_and_not_by_the_recording(here):
+    """A recording many times as large as a group of chunks takes not much more than one."""
+    frames = (
+        made.Recorded("/b", "std_msgs/msg/UInt8MultiArray", n, n, bytes(4 + 8) + data)
+        for n in range(200)
+        for data in [(1 << 20).to_bytes(4, "little") + bytes(1 << 20)]
+    )
+    recording = made.by_mcap(here / "rec.mcap", frames, "zstd")
+    code = (
+        "import resource\nfrom idlc.cli.main import main\n"
+        "import pyarrow.parquet, numpy, zstandard\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        f"assert main(['columns', {str(recording)!r}, '-o', 'out/']) == 0\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert parquet.read_metadata(here / "out" / "b.parquet").num_rows == 200
+    assert int(done.stdout) < 190_000  # KiB: the messages are 205,000 and more
