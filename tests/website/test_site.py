@@ -102,7 +102,8 @@ def test_a_block_of_code_has_the_name_of_its_file_as_title():
 
 
 def test_what_stands_in_a_list_is_indented_by_four():
-    text = "text:\n* one\n\n  ```py\n  a:\n    b\n  ```\n\n  more\n1. two\n   1. three\n\n      end\nout\n"
+    text = "text:\n* one\n\n  ```py\n  a:\n    b\n  ```\n\n  more\n"
+    text += "1. two\n   1. three\n\n      end\nout\n"
     assert translated(text) == (
         "text:\n\n* one\n\n    ```py\n    a:\n      b\n    ```\n\n    more\n"
         "1. two\n    1. three\n\n        end\nout\n"

@@ -42,11 +42,11 @@ function stem(word) {
   return word.length > 5 ? word.replace(/(?:ing|ed|es|s)$/, "") : word;
 }
 
-// Two answers as one, on one page.
+// Two answers as one.
 function joined(first, second) {
   const known = new Set(first.items.map(({ id }) => id));
   const items = [...first.items, ...second.items.filter(({ id }) => !known.has(id))];
-  return { ...first, items, pagination: { total: items.length } };
+  return { ...first, items };
 }
 
 // Messages of the theme: 0 has the index, 2 a query; 3 is its answer.
@@ -61,7 +61,8 @@ window.Worker = class {
 
   postMessage(message) {
     if (message.type === 0) {
-      this.texts = message.data.items.map(({ title, text }) => `${title} ${text}`.toLowerCase());
+      this.items = message.data.items;
+      this.texts = this.items.map(({ title, text }) => `${title} ${text}`.toLowerCase());
     }
     if (typeof message.data?.input === "string") this.ask(message);
     else this.worker.postMessage(message);
@@ -106,8 +107,13 @@ window.Worker = class {
     if (this.found.items.length < ENOUGH && this.queries.length > 0) {
       this.send();
     } else {
-      this.onmessage?.({ data: { type: 3, data: this.found } });
+      this.deliver();
     }
+  }
+
+  deliver() {
+    const pagination = { total: this.found.items.length }; // one page of results is enough
+    this.onmessage?.({ data: { type: 3, data: { ...this.found, pagination } } });
   }
 
   terminate() {
