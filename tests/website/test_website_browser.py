@@ -78,7 +78,7 @@ export async function measure(window) {
     input.value = question;
     input.dispatchEvent(new window.Event("input", { bubbles: true }));
     await until(() => told?.[0] === question, `answer to ${question}, but to ${told}`);
-    const links = () => [...host.shadowRoot.querySelectorAll("[role=listbox] a")];
+    const links = () => [...host.shadowRoot.querySelectorAll("ol a[href]")];
     await until(() => told[1] === undefined || (links()[0] && place(links()[0]) === place({ href: told[1] })),
       `results for ${told}`);
     answers[question] = told[1] ? links().map(place) : [];
