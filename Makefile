@@ -4,6 +4,7 @@
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
+#                       and of the documentation site
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
@@ -26,11 +27,13 @@ KILTED_ENV := .venv/kilted-$(KIND)
 LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 DEMO_ENV := .venv/demo-$(TAG)
+SITE_ENV := $(if $(filter no,$(ROS)),.venv/site-$(TAG),$(TEST_ENV))
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
-WITHOUT_ROS := --ignore=tests/ros -m 'not ros'
-WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),--ignore=tests/cli/test_docs_browser.py)
+WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website -m 'not ros'
+BROWSER_TESTS := tests/cli/test_docs_browser.py tests/website/test_website_browser.py
+WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
@@ -43,7 +46,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench lock clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench site lock clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -57,10 +60,10 @@ demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with i
 
 test: $(TEST_ENV)/installed ## run the tests
 ifeq ($(ROS),no)
-	@echo 'without the ROS 2 wheels: the tests marked "ros" are left out'
+	@echo 'without the ROS 2 wheels: the tests marked "ros" and those of the site are left out'
 endif
 ifeq ($(BROWSER),no)
-	@echo 'without Chromium: tests/cli/test_docs_browser.py is left out'
+	@echo 'without Chromium: left out are $(BROWSER_TESTS)'
 endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
@@ -100,6 +103,9 @@ example: $(TEST_ENV)/installed ## compile the committed example again
 bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says what else it can do
 	@$(BENCH_ENV)/bin/python -m benchmarks --json build/benchmarks.json $(ARGS)
 
+site: $(SITE_ENV)/installed ## write the documentation site into build/site
+	$(SITE_ENV)/bin/python -m website build/site
+
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
@@ -118,6 +124,7 @@ $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
 $(DEMO_ENV)/installed: EXTRA := ros
+$(SITE_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),docs,test-ros)
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
 # there already is brought up to date.

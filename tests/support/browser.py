@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import tempfile
 import threading
+from collections.abc import Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -23,20 +24,25 @@ FLAGS = (
     "--hide-scrollbars",  # a page is as wide as its frame
     "--window-size=1600,1200",
 )
-#: Opens each page in a frame of each width, so that one start of the browser does for all.
+DARK = "--blink-settings=preferredColorScheme=0"
+#: Opens each page in a frame and gives it each width: one start of the browser does for all.
 HARNESS = """<!doctype html><body><script type="module">
 import { measure } from "./measure.js";
 const { pages, widths } = await (await fetch("/wanted")).json();
 const found = [];
 let failed = null;
 try {
-  for (const width of widths) {
-    for (const page of pages) {
-      const frame = document.createElement("iframe");
-      frame.style = `width: ${width}px; height: 900px; border: 0`;
-      frame.src = `/site/${page}`;
-      document.body.replaceChildren(frame);
-      await new Promise((ready) => { frame.onload = ready; });
+  for (const page of pages) {
+    const frame = document.createElement("iframe");
+    frame.style = `width: ${widths[0]}px; height: 900px; border: 0`;
+    frame.src = `/site/${page}`;
+    document.body.replaceChildren(frame);
+    await new Promise((ready) => { frame.onload = ready; });
+    for (const width of widths) {
+      frame.style.width = `${width}px`;
+      for (let count = 0; count < 2; count += 1) {
+        await new Promise((ready) => { requestAnimationFrame(ready); });
+      }
       found.push({ page, width, ...await measure(frame.contentWindow, width) });
     }
   }
@@ -83,25 +89,20 @@ class _Handler(SimpleHTTPRequestHandler):
         pass
 
 
-def measured(site: Path, pages: list[str], widths: list[int], script: str) -> list[dict]:
-    """Return what the JavaScript function `measure(window, width)` says of each page."""
+def measured(
+    site: Path, pages: list[str], widths: list[int], script: str, *, dark: bool = False
+) -> list[dict]:
+    """Return what the JavaScript function `measure(window, width)` says of each page.
+
+    `dark` is whether the browser's user prefers dark pages.
+    """
     found: queue.Queue[bytes] = queue.Queue()
     wanted = {"pages": pages, "widths": widths}
     handler = functools.partial(_Handler, site=site, script=script, wanted=wanted, found=found)
-    with (
-        tempfile.TemporaryDirectory() as profile,
-        ThreadingHTTPServer(("127.0.0.1", 0), handler) as server,
-    ):
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         address = f"http://127.0.0.1:{server.server_port}/"
-        with subprocess.Popen(
-            [command(), *FLAGS, f"--user-data-dir={profile}", address],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "HOME": profile},
-            start_new_session=True,
-        ) as process:
+        with _started(*([DARK] if dark else []), address) as process:
             try:
                 answer = json.loads(found.get(timeout=120))
             finally:
@@ -112,3 +113,30 @@ def measured(site: Path, pages: list[str], widths: list[int], script: str) -> li
                 server.shutdown()
     assert not answer["failed"], answer["failed"]
     return answer["found"]
+
+
+def dumped(page: Path) -> str:
+    """Return a page that was opened as a file, as it is after five seconds of its own clock."""
+    words = ("--virtual-time-budget=5000", "--dump-dom", page.as_uri())
+    with _started(*words, stdout=subprocess.PIPE) as process:
+        try:
+            return process.communicate(timeout=120)[0].decode("utf-8")
+        finally:
+            process.kill()
+
+
+@contextlib.contextmanager
+def _started(*words: str, stdout: int = subprocess.DEVNULL) -> Iterator[subprocess.Popen]:
+    """Start a browser with a profile of its own."""
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
+        subprocess.Popen(
+            [command(), *FLAGS, f"--user-data-dir={profile}", *words],
+            stdin=subprocess.DEVNULL,
+            stdout=stdout,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "HOME": profile},
+            start_new_session=True,
+        ) as process,
+    ):
+        yield process

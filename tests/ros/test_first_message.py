@@ -1,0 +1,38 @@
+"""docs/first-message.md: its files, in an empty folder, are two nodes that talk."""
+
+import re
+import subprocess
+import sys
+from threading import Timer
+
+from tests.support import programs
+from tests.support.paths import DOCS, ROOT
+
+PAGE = (DOCS / "first-message.md").read_text(encoding="utf-8")
+
+
+def test_the_nodes_of_the_page_talk(tmp_path, lonely_environment):
+    files = re.findall(r"^```(\S+\.\w+)\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+    assert [name for name, _ in files] == ["interfaces/msg/Drive.msg", "talker.py", "listener.py"]
+    for name, text in files:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (command,) = re.findall(r"^idlc (gen .*)$", PAGE, re.MULTILINE)
+    programs.run(sys.executable, "-m", "idlc", *command.split(), cwd=tmp_path)
+    (shown,) = re.findall(r"^\$ python listener.py\n(.*)$", PAGE, re.MULTILINE)
+    environment = {**lonely_environment, "PYTHONPATH": str(ROOT)}
+    nodes = [
+        subprocess.Popen(
+            [sys.executable, name], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+        )
+        for name in ("listener.py", "talker.py")
+    ]
+    late = Timer(60, nodes[0].kill)
+    late.start()
+    try:
+        assert nodes[0].stdout.readline().rstrip() == shown
+    finally:
+        late.cancel()
+        for node in nodes:
+            node.kill()
+            node.communicate()

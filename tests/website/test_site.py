@@ -1,0 +1,142 @@
+"""The documentation site: complete, without a dead link, and without anything of another host."""
+
+import re
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from idlc.diagnostics.codes import CODES
+from tests.support.paths import DOCS, ROOT
+from website import sources
+from website.dialect import translated
+
+#: Elements that load what they name.
+LOADS = {"script", "link", "img", "iframe", "source", "video", "object", "embed"}
+CODE = {"pre", "code", "script", "style"}
+
+
+class Page(HTMLParser):
+    """What a page links to and loads, what can be linked to, and its text outside of code."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.links, self.loads, self.ids, self.text, self.depth = [], [], set(), "", 0
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        links = [found[key] for key in ("href", "src", "data", "srcset") if found.get(key)]
+        (self.loads if tag in LOADS else self.links).extend(links)
+        self.ids |= {found[key] for key in ("id", "name") if found.get(key)}
+        self.depth += tag in CODE
+
+    def handle_endtag(self, tag):
+        self.depth -= tag in CODE
+
+    def handle_data(self, data):
+        self.text += "" if self.depth else data
+
+
+@pytest.fixture(scope="module")
+def pages(site):
+    return {path: Page(path) for path in site.rglob("*.html") if path.name != "404.html"}
+
+
+def test_every_link_leads_somewhere(site, pages):
+    ids = cache(lambda path: pages[path].ids if path in pages else set())
+    dead = []
+    for path, page in pages.items():
+        for link in {*page.links, *page.loads}:
+            if re.match(r"https?:|mailto:", link):
+                continue
+            target, _, anchor = unquote(link).partition("#")
+            there = (path.parent / target).resolve() if target else path
+            if not there.is_file() or (anchor and anchor not in ids(there)):
+                dead.append((path.relative_to(site).as_posix(), link))
+    assert dead == []
+
+
+def test_nothing_is_loaded_from_another_host(site, pages):
+    for path, page in pages.items():
+        assert not [link for link in page.loads if re.match(r"\w+:|//", link)], path
+    for path in site.rglob("*.css"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"@import|url\(\s*['\"]?(\w+:(?<!data:)|//)", text), path
+
+
+def test_every_document_has_a_page(site, pages):
+    for document in DOCS.rglob("*.md"):
+        place = sources.place(document.relative_to(ROOT).as_posix())
+        assert (site / place).with_suffix(".html") in pages, document
+    for code in CODES:
+        assert f"idlc explain {code}" in (site / "rules" / f"{code}.html").read_text("utf-8")
+
+
+def test_no_markdown_is_left(pages):
+    for path, page in pages.items():
+        left = re.findall(r"```.*|\]\([^)]*\)|\*\*\w.*", page.text)
+        assert left == [], path
+
+
+def test_pages_are_reached_from_the_navigation(site, pages):
+    start = site / "index.html"
+    linked = {(start.parent / link.partition("#")[0]).resolve() for link in pages[start].links}
+    named = [there for _, part in sources.navigation(sources.files()) for _, there in part]
+    assert len(named) > 25
+    assert {(site / there).with_suffix(".html") for there in named} <= linked
+
+
+# the dialect
+
+
+def test_a_block_of_code_has_the_name_of_its_file_as_title():
+    text = "```msg/Drive.msg\nint8 a\n```\n\n```pyproject.toml\n[a]\n```\n\n```sh\nls\n```\n"
+    assert re.findall("(?m)^```(.+)$", translated(text)) == [
+        ' text title="msg/Drive.msg"',
+        ' toml title="pyproject.toml"',
+        "sh",
+    ]
+
+
+def test_what_stands_in_a_list_is_indented_by_four():
+    text = "text:\n* one\n\n  ```py\n  a:\n    b\n  ```\n\n  more\n"
+    text += "1. two\n   1. three\n\n      end\nout\n"
+    assert translated(text) == (
+        "text:\n\n* one\n\n    ```py\n    a:\n      b\n    ```\n\n    more\n"
+        "1. two\n    1. three\n\n        end\nout\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a\n\n    code\n    * no list\n\nb\n",
+        "```sh\n* no list\n  1. nor this\n```\n",
+        "````markdown\n```msg/A.msg\n* x\n```\n````\n",
+        "- - -\n",
+    ],
+)
+def test_what_is_no_list_stays(text):
+    assert translated(text) == text
+
+
+@pytest.mark.parametrize(
+    ("link", "moved"),
+    [
+        ("ci.md", "../ci.md"),
+        ("../README.md#use", "../about.md#use"),
+        ("../action.yml", "../files/action.yml"),
+        ("rules.md", "../rules/index.md"),
+        ("rules.md#idl405-unusual-unit-warning-style", "../rules/IDL405.md"),
+        ("pictures/check.svg", "../pictures/check.svg"),
+        ("https://docs.ros.org", "https://docs.ros.org"),
+        ("#here", "#here"),
+    ],
+)
+def test_links_hold_where_the_page_is(link, moved):
+    deeper = link if link[0] == "#" or ":" in link else f"../{link}"
+    path = Path("docs/contributing/style.md").as_posix()
+    assert sources.moved(path, f"[a]({deeper}) `[a]({deeper})`") == f"[a]({moved}) `[a]({deeper})`"
