@@ -20,7 +20,7 @@ from idlc.model import derive, ir
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-    from idlc.model.pool import Pool
+    from idlc.model.pool import Memory, Pool
 
 
 class InternalError(Exception):
@@ -44,16 +44,20 @@ def stage(name: str, subject: str) -> Iterator[None]:
 
 
 class Compiler:
-    """Compiles the packages of one run; what several of them use is read and lowered once."""
+    """Compiles the packages of one run; what several of them use is read and lowered once.
 
-    def __init__(self, library: Library) -> None:
+    Runs that share a `memory` and a library lower only what changed from one to the next.
+    """
+
+    def __init__(self, library: Library, memory: Memory | None = None) -> None:
         self.library = library
+        self._memory = memory
 
     @cached_property
     def _pool(self) -> Pool:
         from idlc.model.pool import Pool
 
-        return Pool(self.library)
+        return Pool(self.library, self._memory)
 
     def add(
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
@@ -64,13 +68,16 @@ class Compiler:
 
         own = []
         for name, source in sources:
-            with stage("parse", source.path):
-                tree = parse(source)
-            with stage("lower", source.path):
-                found = Report()
-                own.append(lower(tree, name, found, self.library.distro))
-                self._pool.add(own[-1], found)
-                report.extend(found)
+            lowered = self._pool.remembered(name, source)
+            if lowered is None:
+                with stage("parse", source.path):
+                    tree = parse(source)
+                with stage("lower", source.path):
+                    found = Report()
+                    interface = lower(tree, name, found, self.library.distro)
+                    lowered = self._pool.learn(interface, found)
+            own.append(lowered.interface)
+            report.extend(lowered.problems)
         return tuple(own)
 
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
@@ -118,7 +125,14 @@ def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeNa
 def library_for(packages: Sequence[inputs.Inputs], scope: Scope, report: Report) -> Library:
     """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
-    return Library(scope.include, report, own=own, exclude=scope.exclude, distro=scope.distro)
+    return Library(
+        scope.include,
+        report,
+        own=own,
+        exclude=scope.exclude,
+        distro=scope.distro,
+        unsaved=scope.unsaved,
+    )
 
 
 def models_of(
