@@ -18,6 +18,7 @@ COMMANDS = {
     "show": "Show an interface with the messages in it.",
     "list": "List the packages and types that are known here.",
     "docs": "Write a site about interfaces.",
+    "lsp": "Serve an editor.",
     "describe": "Print a type description, as ROS 2 installs it.",
     "scaffold": "Write packages, interfaces and nodes.",
     "explain": "Explain a code such as IDL201.",

@@ -1,0 +1,180 @@
+"""What `idlc check` says of a folder, again and again while its files are edited.
+
+What is on disk is read when `Workspace.load` is called. After that only texts change, until the
+next load: what an editor has open counts instead of what its file holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from idlc.diagnostics.report import Report
+from idlc.disk import command_settings, environment, inputs, pyproject
+from idlc.disk.enclosing_package import MANIFEST, manifest
+from idlc.disk.find import look, root_of
+from idlc.disk.package_names import locks, places
+from idlc.disk.read import MAX_SIZE, Unsaved, absolute
+from idlc.disk.scope import scope
+from idlc.disk.working_folder import working_in
+from idlc.driver.check import checkers, judged
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from idlc.checks.select import Selection
+    from idlc.diagnostics.report import Diagnostic
+    from idlc.diagnostics.source import Source
+    from idlc.disk.library import Library
+    from idlc.model import ir
+    from idlc.model.link import Model
+
+
+class Wishes(msgspec.Struct, frozen=True, rename="camel"):
+    """What an editor's settings say, as options of `idlc check` do."""
+
+    select: str = ""
+    ignore: str = ""
+    package: str = ""
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    distro: str = ""
+
+
+class State(msgspec.Struct, frozen=True, dict=True):
+    """What is known of a folder at one moment.
+
+    `models` are those of its packages for the first of its distributions, by name, and `library`
+    has everything else.
+    """
+
+    folder: Path
+    problems: tuple[Diagnostic, ...]
+    models: Mapping[str, Model]
+    library: Library
+    selection: Selection
+
+    @cached_property
+    def interfaces(self) -> Mapping[Path, tuple[ir.Interface, Source]]:
+        """The interfaces of the folder's own files, by absolute path, with their texts."""
+        return {
+            self.path_of(one.source): (one, one.source)
+            for model in self.models.values()
+            for one in model.own
+            if one.source
+        }
+
+    def path_of(self, source: Source) -> Path:
+        """Return the absolute path of a file's text."""
+        return absolute(self.folder / source.path)
+
+
+class Workspace:
+    """A folder that is checked as if `idlc check PATHS` ran in it.
+
+    Without `paths`, what its pyproject.toml says is meant, or the folder.
+    """
+
+    def __init__(self, folder: Path, wishes: Wishes, paths: tuple[str, ...] = ()) -> None:
+        self.folder = folder
+        self._wishes = wishes
+        self._paths = paths
+
+    def load(self, unsaved: Unsaved) -> None:
+        """Read what there is; problems that do not depend on texts are remembered.
+
+        Raises OSError if the folder is gone.
+        """
+        self._fixed = report = Report()
+        self._packages: tuple[inputs.Inputs, ...] = ()
+        with working_in(self.folder):
+            wishes = self._wishes
+            settings = pyproject.load(report, unsaved)
+            selected = command_settings.selection(settings, report)
+            self._selection = selected.with_lists(wishes.select, wishes.ignore)
+            found = scope(
+                settings, wishes.package or None, wishes.include, wishes.exclude, wishes.distro
+            )
+            self._scope = msgspec.structs.replace(found, unsaved=unsaved)
+            # a mistake in the settings stops the command line, too
+            if not report.had_errors:
+                paths = self._paths or settings.paths or (".",)
+                there = look(paths, report, found.exclude, unsaved)
+                self._packages = inputs.packages(there.files, self._scope, report, there.packages)
+            self._checkers = checkers(self._packages, self._scope)
+        self._places = {
+            absolute(self.folder / one.file.path): (number, at)
+            for number, given in enumerate(self._packages)
+            for at, one in enumerate(given.files)
+        }
+
+    def holds(self, path: Path) -> bool:
+        """Return whether a file is one of those that are checked."""
+        return path in self._places
+
+    def counts(self, path: Path) -> bytes | None:
+        """Return the text that counts for one of the files that are checked; `None` for others."""
+        number, at = self._places.get(path, (-1, -1))
+        return self._packages[number].files[at].data if number >= 0 else None
+
+    def change(self, path: Path, data: bytes) -> bool:
+        """Let a text count for one of the files that are checked, if that can change no other.
+
+        Otherwise, a load is needed.
+        """
+        number, at = self._places.get(path, (-1, -1))
+        if number < 0 or len(data) > MAX_SIZE or self._is_named_by_lock(number):
+            return False
+        packages = list(self._packages)
+        files = list(packages[number].files)
+        files[at] = inputs.Input(files[at].file, data)
+        packages[number] = msgspec.structs.replace(packages[number], files=tuple(files))
+        self._packages = tuple(packages)
+        return True
+
+    def _is_named_by_lock(self, number: int) -> bool:
+        """Return whether the texts of a package may decide what it is called."""
+        home = self._packages[number].home
+        with working_in(self.folder):
+            return not manifest(home) and any(map(locks, places(home)))
+
+    def concerns(self, path: Path) -> bool:
+        """Return whether a file outside of the packages may change what is known."""
+        if path.name in (pyproject.FILE, MANIFEST) and self.folder.is_relative_to(path.parent):
+            return True
+        folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
+        return any(path.is_relative_to(one) for one in (*folders, *environment.ament_prefixes()))
+
+    def state(self) -> State:
+        """Return what is known now."""
+        found: dict[str, Report] = {}
+        models: dict[str, list[Model]] = {}
+        with working_in(self.folder):
+            for distro, checker in self._checkers.items():
+                found[distro] = Report()
+                models[distro] = checker.check(self._packages, self._selection, found[distro])
+            every = [model for some in models.values() for model in some]
+            problems = [*self._fixed, *judged(found, every, self._selection)]
+        first = next(iter(self._checkers))
+        return State(
+            self.folder,
+            tuple(problems),
+            {model.package: model for model in models[first]},
+            self._checkers[first].library,
+            self._selection,
+        )
+
+
+def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """Return for a file of no workspace the folder in which it is checked, and what is there.
+
+    That is its package; without a package.xml, only the file with those that it refers to.
+    """
+    root = root_of(str(path.parent))
+    declared = manifest(root)
+    if declared is None:
+        return root, (path.relative_to(root).as_posix(),)
+    return declared.parent, (".", path.relative_to(declared.parent).as_posix())

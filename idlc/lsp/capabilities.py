@@ -1,0 +1,43 @@
+"""What client and server can do, as they say it to each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from idlc import __version__
+from idlc.lsp import positions
+from idlc.lsp.world import World
+
+
+def encoding(client: dict[str, Any]) -> str:
+    """Return the first encoding of positions that a client offers and the server knows."""
+    general = client.get("general")
+    offered = general.get("positionEncodings") if isinstance(general, dict) else None
+    known = [one for one in offered or () if one in positions.ENCODINGS]
+    return known[0] if known else positions.DEFAULT
+
+
+def pulls(world: World) -> bool:
+    """Return whether the client asks for problems itself; it would show pushed ones again."""
+    return world.supports("textDocument", "diagnostic")
+
+
+def answer(world: World) -> dict[str, object]:
+    """Return the answer to `initialize`."""
+    return {
+        "capabilities": {"positionEncoding": world.encoding, **CAPABILITIES},
+        "serverInfo": {"name": "idlc", "version": __version__},
+    }
+
+
+CAPABILITIES: dict[str, object] = {
+    "textDocumentSync": {"openClose": True, "change": 2, "save": {"includeText": False}},
+    "diagnosticProvider": {
+        "identifier": "idlc",
+        "interFileDependencies": True,
+        "workspaceDiagnostics": True,
+    },
+    "workspace": {
+        "workspaceFolders": {"supported": True, "changeNotifications": True},
+    },
+}
