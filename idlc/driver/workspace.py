@@ -174,6 +174,7 @@ def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
     That is its package; without a package.xml, only the file with those that it refers to.
     """
     root = root_of(str(path.parent))
+    manifest.cache_clear()  # there may be another since the last look
     declared = manifest(root)
     if declared is None:
         return root, (path.relative_to(root).as_posix(),)

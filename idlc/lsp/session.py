@@ -42,7 +42,7 @@ class Session:
         self.is_shut_down = False
         self._notify = notify
         self._ask = ask
-        self._world = World()
+        self.world = World()
         self._begun = False
         self._client: int | None = None
         self._changed = False
@@ -85,7 +85,7 @@ class Session:
         if name not in METHODS:
             raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
         method = METHODS[name]
-        return method.load()(self._world, msgspec.json.decode(request.params, type=method.params))
+        return method.load()(self.world, msgspec.json.decode(request.params, type=method.params))
 
     def take(self, notification: Message) -> None:
         """Take a notification; those that are not known, or not for now, are passed over."""
@@ -96,7 +96,7 @@ class Session:
     def _initialize(self, given: Initialize) -> object:
         self._begun = True
         self._client = given.process_id
-        world = self._world
+        world = self.world
         world.client = given.capabilities
         world.encoding = capabilities.encoding(given.capabilities)
         roots = [one.uri for one in given.workspace_folders or ()]
@@ -110,7 +110,7 @@ class Session:
 
     def _initialized(self, _: object) -> None:
         """Ask for what may change without the editor's documents."""
-        world = self._world
+        world = self.world
         wanted: list[tuple[str, dict[str, object]]] = []
         if world.supports("workspace", "didChangeWatchedFiles", "dynamicRegistration"):
             options: dict[str, object] = {
@@ -128,7 +128,7 @@ class Session:
         self._fetch_settings()
 
     def _fetch_settings(self) -> None:
-        if self._world.supports("workspace", "configuration"):
+        if self.world.supports("workspace", "configuration"):
             items = {"items": [{"section": "idlc"}]}
             self._ask("workspace/configuration", items, lambda found: self._settle(*found[:1]))
 
@@ -136,13 +136,13 @@ class Session:
         """Use settings; an editor without any says `null`."""
         if settings is None:
             return
-        wrong = self._world.settle(settings)
+        wrong = self.world.settle(settings)
         if wrong:
             self._notify("window/showMessage", {"type": 2, "message": wrong})
         self._changed = True
 
     def _change_settings(self, given: DidChangeSettings) -> None:
-        if self._world.supports("workspace", "configuration"):
+        if self.world.supports("workspace", "configuration"):
             self._fetch_settings()
         else:
             self._settle(given.settings)
@@ -151,39 +151,39 @@ class Session:
         self._folders(given.event.added, given.event.removed)
 
     def _folders(self, added: Any, removed: Any) -> None:
-        projects = self._world.projects
+        projects = self.world.projects
         projects.remove(path for one in removed if (path := uris.to_path(one.uri)))
         projects.add(path for one in added if (path := uris.to_path(one.uri)))
         self._changed = True
 
     def _open(self, given: DidOpen) -> None:
-        document = self._world.documents.open(given.text_document)
+        document = self.world.documents.open(given.text_document)
         self._follow(document, document.data)
 
     def _change(self, given: DidChange) -> None:
-        document = self._world.documents.get(given.text_document.uri)
+        document = self.world.documents.get(given.text_document.uri)
         if document is None:
             raise RequestError(INVALID_REQUEST, f"{given.text_document.uri} is not open")
         document.version = given.text_document.version
-        document.change(given.content_changes, self._world.encoding)
+        document.change(given.content_changes, self.world.encoding)
         self._follow(document, document.data)
 
     def _close(self, given: OfDocument) -> None:
-        document = self._world.documents.close(given.text_document.uri)
+        document = self.world.documents.close(given.text_document.uri)
         if document is not None:
             self._follow(document, None)
 
     def _follow(self, document: Document, data: bytes | None) -> None:
-        self._world.projects.follow(document, data)
+        self.world.projects.follow(document, data)
         self._changed = True
 
     def _save(self, _: OfDocument) -> None:
-        self._world.projects.forget()
+        self.world.projects.forget()
         self._changed = True
 
     def _change_files(self, given: DidChangeFiles) -> None:
         paths = {uris.to_path(one.uri) for one in given.changes}
-        self._world.projects.changed_on_disk(filter(None, paths))
+        self.world.projects.changed_on_disk(filter(None, paths))
         self._changed = True
 
     def settle(self) -> None:
@@ -193,17 +193,17 @@ class Session:
         self._changed = False
         from idlc.lsp.publish import diagnostics
 
-        found = diagnostics(self._world)
+        found = diagnostics(self.world)
         new = {uri: msgspec.json.encode(some) for uri, some in found.items()}
         gone = self._told.keys() - new.keys()
         changed = {uri for uri, some in new.items() if self._told.get(uri) != some} | gone
         self._told = new
-        if capabilities.pulls(self._world):
-            if changed and self._world.supports("workspace", "diagnostics", "refreshSupport"):
+        if capabilities.pulls(self.world):
+            if changed and self.world.supports("workspace", "diagnostics", "refreshSupport"):
                 self._ask("workspace/diagnostic/refresh", None)
             return
         for uri in sorted(changed):
-            document = self._world.documents.get(uri)
+            document = self.world.documents.get(uri)
             version = {} if document is None else {"version": document.version}
             params = {"uri": uri, "diagnostics": msgspec.Raw(new.get(uri, b"[]")), **version}
             self._notify("textDocument/publishDiagnostics", params)
