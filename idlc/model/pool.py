@@ -112,6 +112,18 @@ class Pool:
             if self._entries.get(target):
                 yield field, target
 
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        seen = {name: self._entries.get(name)}
+        waiting = [name]
+        while waiting:
+            entry = seen[waiting.pop()]
+            for _, target in entry.references if entry else ():
+                if target not in seen:
+                    seen[target] = self._entries.get(target)
+                    waiting.append(target)
+        return tuple(entry.interface if entry else None for entry in seen.values())
+
     def crossings(self) -> Iterator[tuple[str, str, Span]]:
         """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
         for entry in filter(None, self._entries.values()):

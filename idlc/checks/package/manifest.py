@@ -46,11 +46,11 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """A package of interfaces alone declares no interfaces that it does not use."""
-    if facts.modules or facts.native or not facts.whole or _has_gaps(model):
+    if facts.modules or facts.native or not facts.whole:
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
-        if package not in used and catalog.is_standard(package):
+        if package not in used and catalog.is_standard(package) and not _has_gaps(model):
             report.add(
                 codes.UNUSED_DEPENDENCY.at(
                     statement.span,
