@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, Severity
 from idlc.disk import command_settings, environment, inputs, pyproject
 from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.find import look, root_of
@@ -66,6 +66,28 @@ class State(msgspec.Struct, frozen=True, dict=True):
             for one in model.own
             if one.source
         }
+
+    @cached_property
+    def _broken(self) -> frozenset[str]:
+        """The files that have errors."""
+        errors = (one for one in self.problems if one.severity is Severity.ERROR)
+        return frozenset(one.where[0] for one in errors)
+
+    def model_of(self, interface: ir.Interface) -> Model | None:
+        """Return the model that an interface is in, `None` if there are errors in what it needs."""
+        for model in self.models.values():
+            if model.interfaces.get(interface.name) is interface:
+                reach = model.reach(interface.name)
+                paths = {one.source.path for one in reach if one and one.source}
+                return (
+                    model if model.is_sound(interface.name) and not paths & self._broken else None
+                )
+        return None
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface of any package."""
+        with working_in(self.folder):
+            return self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""

@@ -37,7 +37,18 @@ CAPABILITIES: dict[str, object] = {
         "interFileDependencies": True,
         "workspaceDiagnostics": True,
     },
+    "hoverProvider": True,
+    "definitionProvider": True,
+    "typeDefinitionProvider": True,
+    "referencesProvider": True,
+    "documentHighlightProvider": True,
+    "documentSymbolProvider": True,
+    "workspaceSymbolProvider": True,
+    "documentFormattingProvider": True,
+    "documentRangeFormattingProvider": True,
+    "documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n"},
     "workspace": {
+        "textDocumentContent": {"schemes": ["idlc"]},
         "workspaceFolders": {"supported": True, "changeNotifications": True},
     },
 }

@@ -97,8 +97,15 @@ class Model:
     def each(self) -> Iterator[tuple[Model, Hashable]]:
         """Yield the model with each of its own interfaces alone, and all that it depends on."""
         for one in self.own:
-            reach = self._pool.reach(one.name) if self._pool else (one,)
-            yield Model(self.package, (one,), self.interfaces, self._pool), reach
+            yield Model(self.package, (one,), self.interfaces, self._pool), self.reach(one.name)
+
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        return self._pool.reach(name) if self._pool else (self.interfaces.get(name),)
+
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to were linked without errors."""
+        return self._pool is None or self._pool.is_sound(name)
 
     def sound(self, broken: Container[str]) -> Model:
         """Return the model without the interfaces in `broken` files, and those that hold them."""

@@ -124,6 +124,11 @@ class Pool:
                     waiting.append(target)
         return tuple(entry.interface if entry else None for entry in seen.values())
 
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to exist and have no errors."""
+        entries = [self._entries.get(one.name) if one else None for one in self.reach(name)]
+        return all(entry is not None and not entry.errors for entry in entries)
+
     def crossings(self) -> Iterator[tuple[str, str, Span]]:
         """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
         for entry in filter(None, self._entries.values()):
