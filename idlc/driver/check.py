@@ -136,12 +136,12 @@ class Checker:
 
         with stage("advise", given.package):
             advise(model, report, selection, self._advised)
-        surroundings = self._around(given)
+        surroundings = self.around(given)
         if surroundings is not None:
             with stage("check package", given.package):
                 check_package(surroundings, model, report, selection)
 
-    def _around(self, given: inputs.Inputs) -> Facts | None:
+    def around(self, given: inputs.Inputs) -> Facts | None:
         """Return what surrounds a package, with the texts that it has now."""
         scope = self._scope
         if given.package not in self._facts:

@@ -6,7 +6,7 @@ next load: what an editor has open counts instead of what its file holds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,15 +21,15 @@ from idlc.disk.read import MAX_SIZE, Unsaved, absolute
 from idlc.disk.scope import scope
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
+from idlc.model import ir
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from idlc.checks.select import Selection
-    from idlc.diagnostics.report import Diagnostic
+    from idlc.diagnostics.report import Diagnostic, Edit
     from idlc.diagnostics.source import Source
     from idlc.disk.library import Library
-    from idlc.model import ir
     from idlc.model.link import Model
 
 
@@ -169,6 +169,33 @@ class Workspace:
             return True
         folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
         return any(path.is_relative_to(one) for one in (*folders, *environment.ament_prefixes()))
+
+    def name_of(self, path: Path) -> ir.TypeName:
+        """Return the name of the interface of one of the files that are checked."""
+        number, at = self._places[path]
+        file = self._packages[number].files[at].file
+        return ir.TypeName(self._packages[number].package, file.kind, file.name)
+
+    def packages(self) -> Iterable[str]:
+        """Return the packages that are known here and have messages."""
+        return (one for one in self._library.packages() if self.names(one))
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of the messages of a package."""
+        return self._library.names(package)
+
+    def dependency(self, path: Path, package: str) -> Edit | None:
+        """Return the edit of package.xml by which a file may use a package; `None` if it may."""
+        from idlc.checks.package.manifest import dependency
+
+        given = self._packages[self._places[path][0]]
+        with working_in(self.folder):
+            found = next(iter(self._checkers.values())).around(given)
+        return dependency(found, package) if found else None
+
+    @property
+    def _library(self) -> Library:
+        return next(iter(self._checkers.values())).library
 
     def state(self) -> State:
         """Return what is known now."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import positions
+from idlc.lsp import dependencies, positions
 from idlc.lsp.world import World
 
 
@@ -37,6 +37,8 @@ CAPABILITIES: dict[str, object] = {
         "interFileDependencies": True,
         "workspaceDiagnostics": True,
     },
+    "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "]},
+    "executeCommandProvider": {"commands": [dependencies.COMMAND]},
     "hoverProvider": True,
     "definitionProvider": True,
     "typeDefinitionProvider": True,

@@ -30,6 +30,8 @@ class Method(NamedTuple):
 METHODS = {
     "textDocument/diagnostic": Method("pull", "document", protocol.AskedDocument),
     "workspace/diagnostic": Method("pull", "workspace", protocol.AskedWorkspace),
+    "textDocument/completion": Method("completion", "complete", protocol.AtPosition),
+    "workspace/executeCommand": Method("commands", "execute", protocol.Command),
     "textDocument/hover": Method("hover", "hover", protocol.AtPosition),
     "textDocument/definition": Method("navigation", "definition", protocol.AtPosition),
     "textDocument/typeDefinition": Method("navigation", "type_definition", protocol.AtPosition),

@@ -169,6 +169,13 @@ class AskedSymbols(Part, frozen=True):
     query: str = ""
 
 
+class Command(Part, frozen=True):
+    """workspace/executeCommand."""
+
+    command: str
+    arguments: tuple[Any, ...] = ()
+
+
 class AskedContent(Part, frozen=True):
     """workspace/textDocumentContent."""
 

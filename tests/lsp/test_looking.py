@@ -6,6 +6,8 @@ from pygls.exceptions import JsonRpcException
 
 from tests.support.editor import at, between
 
+CONTENT = lsp.WORKSPACE_TEXT_DOCUMENT_CONTENT
+
 DRIVE = """\
 # How to drive.
 
@@ -23,11 +25,18 @@ FILES = {
 }
 
 
-@pytest.fixture
-def opened(editor, package):
+@pytest.fixture(scope="module")
+def server(editor, package):
     folder = package(FILES)
-    one = editor(folder)
-    return one, one.open(folder / "msg/Drive.msg"), folder
+    return editor(folder), folder
+
+
+@pytest.fixture
+def opened(server):
+    one, folder = server
+    uri = one.open(folder / "msg/Drive.msg")
+    yield one, uri, folder
+    one.close(uri)
 
 
 def document(uri):
@@ -104,10 +113,10 @@ def test_what_is_built_in_is_a_document_of_its_own(editor, package):
     uri = one.open(folder / "msg/Plan.msg")
     found = ask(one, lsp.TEXT_DOCUMENT_DEFINITION, lsp.DefinitionParams, uri, 0, 3)
     assert found.uri == "idlc:/jazzy/shape_msgs/msg/Plane.msg"
-    answer = one.ask("workspace/textDocumentContent", {"uri": found.uri})
+    answer = one.ask(CONTENT, lsp.TextDocumentContentParams(uri=found.uri))
     assert answer.text == "float64[4] coef\n"
     with pytest.raises(JsonRpcException, match="there is no document"):
-        one.ask("workspace/textDocumentContent", {"uri": "idlc:/jazzy/../../etc/passwd"})
+        one.ask(CONTENT, lsp.TextDocumentContentParams(uri="idlc:/jazzy/../../etc/passwd"))
 
 
 def test_references_are_those_of_every_file(opened):
