@@ -35,6 +35,12 @@ class Selection(msgspec.Struct, frozen=True):
     ignore: tuple[str, ...] = ()
     per_path: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
+    def with_lists(self, select: str | None, ignore: str | None) -> Selection:
+        """Return what lists of rules with commas change of it: typed ones come after a file's."""
+        chosen = tuple(select.split(",")) if select else self.select
+        ignored = (*self.ignore, *(ignore.split(",") if ignore else ()))
+        return Selection(chosen, ignored, self.per_path)
+
     def has(self, code: codes.Code) -> bool:
         """Return whether a code is switched on."""
         if self.select is None:

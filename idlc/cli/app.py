@@ -19,6 +19,7 @@ COMMANDS = {
     "columns": "Write topics of a recording as Parquet, Arrow or CSV.",
     "list": "List the packages and types that are known here.",
     "docs": "Write a site about interfaces.",
+    "lsp": "Serve an editor.",
     "describe": "Print a type description, as ROS 2 installs it.",
     "scaffold": "Write packages, interfaces and nodes.",
     "explain": "Explain a code such as IDL201.",

@@ -6,7 +6,6 @@ import sys
 
 import msgspec
 
-from idlc.checks.select import Selection
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
 from idlc.disk import command_settings, pyproject
@@ -35,7 +34,8 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     wishes = wishes or Wishes()
     report = Report()
     settings = pyproject.load(report)
-    chosen = _selection(command_settings.selection(settings, report), wishes)
+    configured = command_settings.selection(settings, report)
+    chosen = configured.with_lists(wishes.select, wishes.ignore)
     checked = Checked(())
     if wishes.prefix is not None:
         from idlc.driver.prefix import check_prefix
@@ -51,13 +51,3 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
         checked = check(wanted, report)
     reports.write(report, wishes.style, checked, sys.stdout, numbers=wishes.statistics)
     return output.status(report) or int(wishes.strict and bool(len(report)))
-
-
-def _selection(configured: Selection, wishes: Wishes) -> Selection:
-    """Return which warnings are wanted: what pyproject.toml says, and what was typed."""
-    if wishes.select:
-        configured = msgspec.structs.replace(configured, select=tuple(wishes.select.split(",")))
-    if wishes.ignore:
-        ignored = (*configured.ignore, *wishes.ignore.split(","))
-        configured = msgspec.structs.replace(configured, ignore=ignored)
-    return configured

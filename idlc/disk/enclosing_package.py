@@ -11,7 +11,7 @@ from idlc.checks.package import package_xml
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
-from idlc.disk.read import is_file, is_folder, read_bytes, read_source
+from idlc.disk.read import NOTHING_OPEN, Unsaved, is_file, is_folder, read_bytes, read_source
 
 if TYPE_CHECKING:
     from idlc.checks.package.facts import Statement
@@ -37,9 +37,11 @@ def _is_repository(folder: Path) -> bool:
     return is_folder(folder / ".git") or is_file(folder / ".git")
 
 
-def declared_name(path: Path, name: str, report: Report) -> str | None:
+def declared_name(
+    path: Path, name: str, report: Report, unsaved: Unsaved = NOTHING_OPEN
+) -> str | None:
     """Return the package name in a package.xml; report IDL610 and return `None` without one."""
-    data = read_bytes(path, name, report)
+    data = unsaved.read_bytes(path, name, report)
     if data is None:
         return None
     try:

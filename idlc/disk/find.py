@@ -17,7 +17,15 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.suggest import closest
 from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.exclude import Exclusions
-from idlc.disk.read import is_folder, kind_of, unreadable
+from idlc.disk.read import (
+    NOTHING_OPEN,
+    Unsaved,
+    absolute,
+    is_file,
+    is_folder,
+    kind_of,
+    unreadable,
+)
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -92,7 +100,12 @@ def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> 
     )
 
 
-def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) -> Found:
+def look(
+    paths: Iterable[str],
+    report: Report,
+    exclude: Exclusions = NOTHING,
+    unsaved: Unsaved = NOTHING_OPEN,
+) -> Found:
     """Return what paths mean; a folder means everything below it.
 
     Reports IDL601, IDL602, IDL605 and IDL622.
@@ -103,7 +116,7 @@ def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) ->
     empty: dict[str, None] = {}
     for given in paths:
         seen = not is_folder(Path(given))
-        for path in _under(given, report):
+        for path in _under(given, report, unsaved):
             whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
             if exclude.has(whole):
                 continue
@@ -120,9 +133,12 @@ def look(paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING) ->
     return Found(tuple(files), tuple(sorted(packages)), tuple(empty))
 
 
-def _under(given: str, report: Report) -> Iterator[Path]:
+def _under(given: str, report: Report, unsaved: Unsaved) -> Iterator[Path]:
     """Yield the interface and package.xml files that one path means."""
     path = Path(given)
+    if path.suffix in KINDS and unsaved.is_file(path) and not path.exists():
+        yield path
+        return
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError) as error:
@@ -131,6 +147,11 @@ def _under(given: str, report: Report) -> Iterator[Path]:
         return
     if stat.S_ISDIR(mode):
         yield from walk(path, report)
+        whole = absolute(path)
+        for new in unsaved.new_below(whole):
+            inside = new.relative_to(whole)
+            if _is_wanted(new.name) and not _is_closed(whole, inside.parts[:-1]):
+                yield path / inside
     elif path.suffix not in KINDS or not stat.S_ISREG(mode):
         what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
         report.add(
@@ -199,6 +220,15 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
                     waiting.append(here / entry.name)
             elif not entry.name.startswith(".") and _is_wanted(entry.name):
                 yield here / entry.name
+
+
+def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
+    """Return whether `walk` would not reach a folder that lies in another."""
+    for name in inside:
+        folder /= name
+        if name.startswith(".") or name in SKIPPED or any(is_file(folder / one) for one in CLOSING):
+            return True
+    return False
 
 
 def _is_wanted(name: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from pathlib import Path
 
 import msgspec
@@ -13,12 +14,12 @@ from idlc.diagnostics.source import Source
 from idlc.disk.find import InterfaceFile
 from idlc.disk.output.lock_file import digest, meaning
 from idlc.disk.package_names import by_home, locks, name_of
-from idlc.disk.read import decode, is_folder, read_bytes, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, decode, is_folder, shown
 from idlc.disk.scope import Scope
 from idlc.model.ir import TypeName
 
 
-class Input(msgspec.Struct, frozen=True):
+class Input(msgspec.Struct, frozen=True, dict=True):
     """An input file and its bytes."""
 
     file: InterfaceFile
@@ -26,7 +27,14 @@ class Input(msgspec.Struct, frozen=True):
 
     def source(self, report: Report) -> Source | None:
         """Return its text; report IDL603 and return `None` if it is not text."""
-        return decode(self.data, self.file.shown, report)
+        source, problems = self._decoded
+        report.extend(problems)
+        return source
+
+    @cached_property
+    def _decoded(self) -> tuple[Source | None, Report]:
+        problems = Report()
+        return decode(self.data, self.file.shown, problems), problems
 
 
 class Inputs(msgspec.Struct, frozen=True):
@@ -64,7 +72,13 @@ class Inputs(msgspec.Struct, frozen=True):
         return frozenset(TypeName(self.package, file.kind, file.name) for file in files)
 
 
-def load(package: str, files: Iterable[InterfaceFile], home: Path, report: Report) -> Inputs:
+def load(
+    package: str,
+    files: Iterable[InterfaceFile],
+    home: Path,
+    report: Report,
+    unsaved: Unsaved = NOTHING_OPEN,
+) -> Inputs:
     """Read a package's files; report IDL609 for each that is there twice."""
     loaded: dict[str, Input] = {}
     for file in files:
@@ -78,7 +92,7 @@ def load(package: str, files: Iterable[InterfaceFile], home: Path, report: Repor
                     "out with --exclude, or `exclude` in [tool.idlc]",
                 )
             )
-        elif (data := read_bytes(file.path, file.shown, report)) is not None:
+        elif (data := unsaved.read_bytes(file.path, file.shown, report)) is not None:
             loaded[file.key] = Input(file, data)
     roots = dict.fromkeys(one.file.root for one in loaded.values())
     return Inputs(package, tuple(loaded[key] for key in sorted(loaded)), tuple(roots), home)
@@ -95,9 +109,10 @@ def packages(
     locks.cache_clear()
     if scope.package is not None and files:
         home = min(by_home(files))
-        return (load(scope.package, files, home, report),)
+        return (load(scope.package, files, home, report, scope.unsaved),)
     homes = by_home(files)
-    found = [_named(load("", own, home, report), scope, report) for home, own in homes.items()]
+    read = [load("", own, home, report, scope.unsaved) for home, own in homes.items()]
+    found = [_named(one, scope, report) for one in read]
     others = (home for home in sorted(set(empty)) if not homes.keys() & {home, *home.parents})
     found += [_named(Inputs("", (), (home,), home), scope, report) for home in others]
     return without_duplicates(found, report)

@@ -16,7 +16,7 @@ from idlc.disk.distribution import installed
 from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
-from idlc.disk.read import absolute, is_file, is_folder, read_source, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, absolute, is_file, is_folder, shown
 from idlc.model import catalog, derive, ir
 from idlc.model.distro import DEFAULT, Distro
 
@@ -112,24 +112,30 @@ class Library:
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
         texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+        unsaved: Unsaved = NOTHING_OPEN,
     ) -> None:
         self.distro = distro
         self.texts = texts
         places = [Folder(path) for path in folders]
-        for path in folders:
-            if not is_folder(Path(path)):
-                report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
+        self._missing = [path for path in folders if not is_folder(Path(path))]
         self._places: tuple[Folder | Prefix, ...] = (
             *places,
             *(Prefix(path, distro) for path in environment.ament_prefixes()),
         )
         self._own = own or {}
         self._exclude = exclude
-        self._report = report
+        self._unsaved = unsaved
         self._known: dict[str, list[Path]] = {}
-        self._sources: dict[ir.TypeName, Source | None] = {}
+        self._sources: dict[ir.TypeName, tuple[Source | None, Report]] = {}
         self._packages: list[str] | None = None
         self._listed: dict[str, list[tuple[ir.Kind, str]]] = {}
+        self.report_to(report)
+
+    def report_to(self, report: Report) -> None:
+        """Report what is wrong with what is asked for from now on, known or not."""
+        self._report = report
+        for path in self._missing:
+            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""
@@ -148,7 +154,8 @@ class Library:
         places = self._roots(name.package)
         paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
         exclude = self._excluded(name.package)
-        return next((Path(one) for one in paths if is_file(one) and not exclude.has(one)), None)
+        found = (one for one in paths if self._unsaved.is_file(one) and not exclude.has(one))
+        return next(map(Path, found), None)
 
     def _excluded(self, package: str) -> Exclusions:
         """Return what is left out of a package: of others than the compiled ones, nothing."""
@@ -159,11 +166,19 @@ class Library:
         if name in self.texts:
             return self.texts[name]
         if name not in self._sources:
-            path = self.path(name)
-            self._sources[name] = (
-                read_source(path, shown(path), self._report) if path else self._built_in(name)
-            )
-        return self._sources[name]
+            self._sources[name] = self._read(name)
+        source, problems = self._sources[name]
+        self._report.extend(problems)
+        return source
+
+    def _read(self, name: ir.TypeName) -> tuple[Source | None, Report]:
+        from idlc.diagnostics.report import Report
+
+        problems = Report()
+        path = self.path(name)
+        if path is None:
+            return self._built_in(name), problems
+        return self._unsaved.read_source(path, shown(path), problems), problems
 
     def _built_in(self, name: ir.TypeName) -> Source | None:
         # generated code is the same for all: it has events where ROS 2 has none, too
@@ -196,15 +211,16 @@ class Library:
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
         exclude = self._excluded(package)
-        own = {one for root in self._own.get(package, ()) for one in _interfaces(root, exclude)}
+        folders = self._own.get(package, ())
+        own = {one for root in folders for one in self._interfaces(root, exclude)}
         if own:
             return sorted(own)
-        roots = (_interfaces(root, exclude) for root in self._roots(package))
+        roots = (self._interfaces(root, exclude) for root in self._roots(package))
         return next(filter(None, roots), [])
 
     def home(self, package: str) -> Path | None:
         """Return the folder that a package's interfaces lie in; `None` if they are built in."""
-        return next((root for root in self._roots(package) if _interfaces(root)), None)
+        return next((root for root in self._roots(package) if self._interfaces(root)), None)
 
     def packages(self) -> Sequence[str]:
         """Return the names of all packages, sorted."""
@@ -224,21 +240,20 @@ class Library:
                 return f"it is in `{Path(folder, package).as_posix()}`: add `-I {folder}`"
         return None
 
+    def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
+        """Return kind and name of each interface file of a folder and of its folders for kinds."""
+        return sorted(
+            {
+                (KINDS[path.suffix], path.stem)
+                for folder in (root, *(root / kind for kind in KIND_FOLDERS))
+                for path in self._files(folder)
+                if path.suffix in KINDS and not exclude.has(path)
+            }
+        )
 
-def _interfaces(root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
-    """Return kind and name of each interface file of a folder and of its folders for kinds."""
-    return sorted(
-        {
-            (KINDS[path.suffix], path.stem)
-            for folder in (root, *(root / kind for kind in KIND_FOLDERS))
-            for path in _files(folder)
-            if path.suffix in KINDS and not exclude.has(path)
-        }
-    )
-
-
-def _files(folder: Path) -> list[Path]:
-    try:
-        return [path for path in folder.iterdir() if is_file(path)]
-    except OSError:
-        return []
+    def _files(self, folder: Path) -> list[Path]:
+        new = [path for path in self._unsaved.new_below(folder) if path.parent == folder]
+        try:
+            return new + [path for path in folder.iterdir() if is_file(path)]
+        except OSError:
+            return new

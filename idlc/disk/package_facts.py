@@ -15,7 +15,7 @@ from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.inputs import Inputs
 from idlc.disk.output import lock_file
-from idlc.disk.read import decode, read_bytes, read_source, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, read_bytes, shown
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
@@ -31,29 +31,32 @@ _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
 
 def facts(
-    given: Inputs, known: Callable[[], Iterable[str]], exclude: Exclusions = NOTHING
+    given: Inputs,
+    known: Callable[[], Iterable[str]],
+    exclude: Exclusions = NOTHING,
+    unsaved: Unsaved = NOTHING_OPEN,
 ) -> Facts | None:
     """Return what surrounds a package's interfaces; `None` without a package.xml.
 
     `known` tells the names of ROS packages; it is asked only for a package with Python code.
     """
     path = manifest(next(iter(given.folders), given.home))
-    source = read_source(path, shown(path), Report()) if path else None
+    source = unsaved.read_source(path, shown(path), Report()) if path else None
     if path is None or source is None or not (said := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))
     locks = _locks(files)
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
-    modules = dict(_modules(folder, files, generated))
+    modules = dict(_modules(folder, files, generated, unsaved))
     return Facts(
         name=given.package,
         manifest=source,
         statements=said,
         inputs=given.digests if locks else {},
         modules=modules,
-        setup_py=_optional(folder / "setup.py"),
-        setup_cfg=_optional(folder / "setup.cfg"),
+        setup_py=_optional(folder / "setup.py", unsaved),
+        setup_cfg=_optional(folder / "setup.cfg", unsaved),
         generates=_generates(folder / "CMakeLists.txt"),
         native=any(file.suffix in _NATIVE for file in files),
         whole=_whole(given, files, exclude),
@@ -107,7 +110,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _modules(
-    folder: Path, files: Iterable[Path], generated: Container[Path]
+    folder: Path, files: Iterable[Path], generated: Container[Path], unsaved: Unsaved
 ) -> Iterator[tuple[str, Source]]:
     """Yield a package's own Python files by their dotted names, without tests and the like.
 
@@ -116,12 +119,10 @@ def _modules(
     for file in files:
         parts = file.relative_to(folder).parts
         ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and file not in generated and (source := _optional(file)):
+        if ours and file not in generated and (source := _optional(file, unsaved)):
             yield ".".join((*parts[:-1], file.stem)), source
 
 
-def _optional(path: Path) -> Source | None:
+def _optional(path: Path, unsaved: Unsaved) -> Source | None:
     """Return a file's text, `None` if it is not there or no text, which others complain about."""
-    ignored = Report()
-    data = read_bytes(path, shown(path), ignored) if path.is_file() else None
-    return None if data is None else decode(data, shown(path), ignored)
+    return unsaved.read_source(path, shown(path), Report()) if unsaved.is_file(path) else None

@@ -49,7 +49,8 @@ def name_of(
     """
     declared = manifest(home)
     if declared:
-        return declared_name(declared, shown(declared), report) or home.name, ""
+        name = declared_name(declared, shown(declared), report, scope.unsaved)
+        return name or home.name, ""
     name = _by_settings(home, scope) or _by_lock(home, digests)
     if name:
         return name, ""

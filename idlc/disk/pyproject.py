@@ -17,7 +17,7 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source, Span
-from idlc.disk.read import decode, is_file, read_bytes, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, decode, shown
 from idlc.disk.settings_table import Place, Switch, Table, Text, TextOrTexts, Texts, read_table
 from idlc.model.distro import BY_NAME, listed, unknown_distro
 
@@ -62,18 +62,18 @@ class Config(msgspec.Struct, frozen=True):
     folder: Path | None = None
 
 
-def load(report: Report) -> Config:
+def load(report: Report, unsaved: Unsaved = NOTHING_OPEN) -> Config:
     """Return the settings that hold in the working folder."""
     for folder in (here := Path.cwd(), *here.parents):
         path = folder / FILE
-        if is_file(path):
-            return _read(path, report)
+        if unsaved.is_file(path):
+            return _read(path, report, unsaved)
     return Config()
 
 
-def _read(path: Path, report: Report) -> Config:
+def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
     name = shown(path)
-    data = read_bytes(path, name, report)
+    data = unsaved.read_bytes(path, name, report)
     if data is None or b"idlc" not in data:
         return Config()
     source = decode(data, name, report)

@@ -9,7 +9,9 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
@@ -85,14 +87,52 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
     except (OSError, ValueError) as error:
         report.add(unreadable(name, error))
         return None
-    report.add(
-        codes.TOO_LARGE.of(
-            name,
-            f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is",
-            hint="is it another kind of file with this extension?",
-        )
-    )
+    report.add(_too_large(name))
     return None
+
+
+def _too_large(name: str) -> Diagnostic:
+    return codes.TOO_LARGE.of(
+        name,
+        f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is",
+        hint="is it another kind of file with this extension?",
+    )
+
+
+class Unsaved:
+    """Texts that count instead of what files hold, by absolute path: what an editor has open."""
+
+    def __init__(self, texts: Mapping[Path, bytes] = MappingProxyType({})) -> None:
+        self._texts = texts
+
+    def read_bytes(self, path: Path, name: str, report: Report) -> bytes | None:
+        """Return what counts as a file's bytes; report as the function of this name does."""
+        data = self._texts.get(absolute(path)) if self._texts else None
+        if data is None:
+            return read_bytes(path, name, report)
+        if len(data) > MAX_SIZE:
+            report.add(_too_large(name))
+            return None
+        return data
+
+    def read_source(self, path: Path, name: str, report: Report) -> Source | None:
+        """Return what counts as a file's text; report what stands in the way."""
+        data = self.read_bytes(path, name, report)
+        return None if data is None else decode(data, name, report)
+
+    def is_file(self, path: str | Path) -> bool:
+        """Return whether there is such a file, on disk or only in the editor."""
+        return is_file(path) or (bool(self._texts) and absolute(path) in self._texts)
+
+    def new_below(self, folder: Path) -> Iterator[Path]:
+        """Yield what lies below an absolute folder in the editor only."""
+        for path in self._texts:
+            if path.is_relative_to(folder) and not is_file(path):
+                yield path
+
+
+#: What counts where no editor has anything open.
+NOTHING_OPEN = Unsaved()
 
 
 def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:

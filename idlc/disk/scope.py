@@ -10,6 +10,7 @@ import msgspec
 
 from idlc.disk.distribution import distribution
 from idlc.disk.exclude import Exclusions, exclusion
+from idlc.disk.read import NOTHING_OPEN, Unsaved
 from idlc.model.distro import BY_NAME, DEFAULT, Distro, listed
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ class Scope(msgspec.Struct, frozen=True):
 
     `out` is the folder that [tool.idlc] compiles `paths` into; its name may be the package's.
     `distros` are the distributions of ROS 2 that files are read for, one except for `check`;
-    none means the one that is installed.
+    none means the one that is installed. `unsaved` counts instead of what files hold.
     """
 
     package: str | None = None
@@ -30,6 +31,7 @@ class Scope(msgspec.Struct, frozen=True):
     paths: tuple[str, ...] = ()
     out: str | None = None
     distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros(()))
+    unsaved: Unsaved = NOTHING_OPEN
 
     @property
     def distro(self) -> Distro:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -11,14 +11,16 @@ from idlc.checks.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk import inputs
 from idlc.disk.find import KINDS, look, nothing_in
-from idlc.disk.library import Library
 from idlc.disk.package_facts import facts
 from idlc.disk.read import absolute
 from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage
 
 if TYPE_CHECKING:
+    from idlc.checks import registry
+    from idlc.checks.package.facts import Facts
     from idlc.diagnostics.source import Source
+    from idlc.model import pool
     from idlc.model.link import Model
 
 
@@ -60,7 +62,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
 
         found = _once(options, report)[1]
         if not report.had_errors:
-            fixed = edit((one for problem in found for one in problem.edits), report, _tidied)
+            fixed = edit((one for problem in found for one in problem.edits), report, tidied)
     checked, found = _once(options, report)
     report.extend(found)
     return msgspec.structs.replace(checked, fixed=fixed)
@@ -82,7 +84,7 @@ def _with_recordings(
     return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
 
 
-def _tidied(name: str, old: str, new: str) -> str:
+def tidied(name: str, old: str, new: str) -> str:
     """Return an edited file as `idlc fmt` has it, if it was so before."""
     from idlc.diagnostics.source import Source
     from idlc.model.ir import KINDS
@@ -97,55 +99,94 @@ def _tidied(name: str, old: str, new: str) -> str:
 
 def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
-    there = look(options.paths, report, scope.exclude)
+    there = look(options.paths, report, scope.exclude, scope.unsaved)
     packages = inputs.packages(there.files, scope, report, there.packages)
     for path in there.empty:
         if not any(one.home.is_relative_to(absolute(path)) for one in packages):
             report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
     found: dict[str, Report] = {}
-    texts: dict[str, Source] = {}
-    for distro in scope.distros or (scope.distro,):
-        found[distro.name] = Report()
-        narrowed = msgspec.structs.replace(scope, distros=(distro,))
-        alone = msgspec.structs.replace(options, scope=narrowed)
-        texts |= _compiled(packages, alone, found[distro.name])
+    models: list[Model] = []
+    for distro, checker in checkers(packages, scope).items():
+        found[distro] = Report()
+        models += checker.check(packages, options.selection, found[distro])
     files = tuple(file.shown for file in there.files)
+    distros = tuple(found) if len(found) > 1 else ()
+    checked = Checked(files, len(packages), distros=distros)
+    return checked, judged(found, models, options.selection)
+
+
+def checkers(packages: Sequence[inputs.Inputs], scope: Scope) -> dict[str, Checker]:
+    """Return what checks packages, for each distribution by its name."""
+    distros = scope.distros or (scope.distro,)
+    return {
+        one.name: Checker(packages, msgspec.structs.replace(scope, distros=(one,)))
+        for one in distros
+    }
+
+
+class Checker:
+    """Checks packages for one distribution, also again after some of their texts changed.
+
+    Everything else on disk is as it was when it was first looked at.
+    """
+
+    def __init__(self, packages: Sequence[inputs.Inputs], scope: Scope) -> None:
+        self._scope = scope
+        self.library = library_for(packages, scope, Report())
+        self._lowered: pool.Memory = {}
+        self._checked: registry.Memory = {}
+        self._advised: registry.Memory = {}
+        self._facts: dict[str, Facts | None] = {}
+
+    def check(
+        self, packages: Sequence[inputs.Inputs], selection: Selection, report: Report
+    ) -> list[Model]:
+        """Report what is wrong; return the model of each package, with only the given files."""
+        self.library.report_to(report)
+        models = []
+        compiler = Compiler(self.library, self._lowered, self._checked)
+        for given, model in compiler.all(packages, report):
+            models.append(model.only(given.names))
+            self._advise(given, models[-1], selection, report)
+        return models
+
+    def _advise(
+        self, given: inputs.Inputs, model: Model, selection: Selection, report: Report
+    ) -> None:
+        """Report what only `check` looks at: style, portability and the package around."""
+        from idlc.checks.registry import advise, check_package
+
+        with stage("advise", given.package):
+            advise(model, report, selection, self._advised)
+        surroundings = self.around(given)
+        if surroundings is not None:
+            with stage("check package", given.package):
+                check_package(surroundings, model, report, selection)
+
+    def around(self, given: inputs.Inputs) -> Facts | None:
+        """Return what surrounds a package, with the texts that it has now."""
+        scope = self._scope
+        if given.package not in self._facts:
+            found = facts(given, self.library.packages, scope.exclude, scope.unsaved)
+            self._facts[given.package] = found
+        known = self._facts[given.package]
+        if known is None or not known.inputs:
+            return known
+        return msgspec.structs.replace(known, inputs=given.digests)
+
+
+def judged(
+    found: Mapping[str, Report], models: Iterable[Model], selection: Selection
+) -> list[Diagnostic]:
+    """Return the problems to be shown of those that were found for distributions, each once."""
+    texts = {one.source.path: one.source for model in models for one in model.own if one.source}
     sources = list(texts.values())
     if len(found) == 1:
         (everything,) = found.values()
-        return Checked(files, len(packages)), _wanted(everything, sources, options.selection)
+        return _wanted(everything, sources, selection)
     from idlc.diagnostics.merge import merged, without_overruled
 
-    wanted = _wanted(merged(found), sources, options.selection)
-    checked = Checked(files, len(packages), distros=tuple(found))
-    return checked, list(without_overruled(wanted))
-
-
-def _compiled(
-    packages: Sequence[inputs.Inputs], options: CheckOptions, report: Report
-) -> dict[str, Source]:
-    """Report what is wrong for one distribution; return the texts by path."""
-    library = library_for(packages, options.scope, report)
-    texts: dict[str, Source] = {}
-    for given, model in Compiler(library).all(packages, report):
-        mine = model.only(given.names)
-        texts |= {one.source.path: one.source for one in mine.own if one.source}
-        _advise(given, mine, library, options, report)
-    return texts
-
-
-def _advise(
-    given: inputs.Inputs, model: Model, library: Library, options: CheckOptions, report: Report
-) -> None:
-    """Report what only `check` looks at: style, portability and the package around."""
-    from idlc.checks.registry import advise, check_package
-
-    with stage("advise", given.package):
-        advise(model, report, options.selection)
-    surroundings = facts(given, library.packages, options.scope.exclude)
-    if surroundings is not None:
-        with stage("check package", given.package):
-            check_package(surroundings, model, report, options.selection)
+    return list(without_overruled(_wanted(merged(found), sources, selection)))
 
 
 def _wanted(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:

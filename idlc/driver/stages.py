@@ -20,6 +20,8 @@ from idlc.disk.scope import Scope
 from idlc.model import derive, ir
 
 if TYPE_CHECKING:
+    from idlc.checks import registry
+    from idlc.model import pool
     from idlc.model.link import Model
     from idlc.model.pool import Pool
 
@@ -45,16 +47,27 @@ def stage(name: str, subject: str) -> Iterator[None]:
 
 
 class Compiler:
-    """Compiles the packages of one run; what several of them use is read and lowered once."""
+    """Compiles the packages of one run; what several of them use is read and lowered once.
 
-    def __init__(self, library: Library) -> None:
+    Runs that share memories and a library do only what changed from one to the next: `memory`
+    is of what was lowered, `checked` of what rules found.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        memory: pool.Memory | None = None,
+        checked: registry.Memory | None = None,
+    ) -> None:
         self.library = library
+        self._memory = memory
+        self._checked = checked
 
     @cached_property
     def _pool(self) -> Pool:
         from idlc.model.pool import Pool
 
-        return Pool(self.library)
+        return Pool(self.library, self._memory)
 
     def add(
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
@@ -65,13 +78,16 @@ class Compiler:
 
         own = []
         for name, source in sources:
-            with stage("parse", source.path):
-                tree = parse_any(source)
-            with stage("lower", source.path):
-                found = Report()
-                own.append(lower(tree, name, found, self.library.distro))
-                self._pool.add(own[-1], found)
-                report.extend(found)
+            lowered = self._pool.remembered(name, source)
+            if lowered is None:
+                with stage("parse", source.path):
+                    tree = parse_any(source)
+                with stage("lower", source.path):
+                    found = Report()
+                    interface = lower(tree, name, found, self.library.distro)
+                    lowered = self._pool.learn(interface, found)
+            own.append(lowered.interface)
+            report.extend(lowered.problems)
         return tuple(own)
 
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
@@ -82,7 +98,7 @@ class Compiler:
         with stage("link", package):
             model = link(package, own, self.library, report, self._pool)
         with stage("check", package):
-            check(model, report)
+            check(model, report, self._checked)
         return model
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
@@ -137,7 +153,13 @@ def library_for(
     """Return the library from which packages that are compiled take what they refer to."""
     own = {given.package: given.folders for given in packages}
     return Library(
-        scope.include, report, own=own, exclude=scope.exclude, distro=scope.distro, texts=texts
+        scope.include,
+        report,
+        own=own,
+        exclude=scope.exclude,
+        distro=scope.distro,
+        texts=texts,
+        unsaved=scope.unsaved,
     )
 
 

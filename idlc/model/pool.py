@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
 
@@ -18,7 +18,7 @@ from idlc.syntax.parse import parse_any
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from idlc.diagnostics.source import Span
+    from idlc.diagnostics.source import Source, Span
     from idlc.model.describe import Describer
     from idlc.model.link import Library
 
@@ -35,11 +35,27 @@ class Entry(msgspec.Struct):
     linked: bool = False
 
 
-class Pool:
-    """Interfaces by name: those that were added, and those that a library has."""
+class Lowered(msgspec.Struct, frozen=True):
+    """What a text means, what is wrong in it, and the fields that hold messages of other files."""
 
-    def __init__(self, library: Library) -> None:
+    interface: ir.Interface
+    problems: Report
+    references: tuple[tuple[ir.Field, ir.TypeName], ...]
+
+
+#: What was lowered before, by name; it holds for the same `Source` and distribution.
+Memory: TypeAlias = dict[ir.TypeName, Lowered]
+
+
+class Pool:
+    """Interfaces by name: those that were added, and those that a library has.
+
+    Pools of one library may share a `memory`, so that only texts that changed are lowered again.
+    """
+
+    def __init__(self, library: Library, memory: Memory | None = None) -> None:
         self.library = library
+        self._memory = {} if memory is None else memory
         self._entries: dict[ir.TypeName, Entry | None] = {}
         #: The interfaces that were searched for circles.
         self.searched: set[ir.TypeName] = set()
@@ -53,14 +69,33 @@ class Pool:
             self._entries[interface.name] = known
         return known
 
+    def remembered(self, name: ir.TypeName, source: Source) -> Lowered | None:
+        """Return what a text was lowered to before, after adding it; `None` if it is new."""
+        known = self._memory.get(name)
+        if known is None or known.interface.source is not source:
+            return None
+        self._add(known)
+        return known
+
+    def learn(self, interface: ir.Interface, problems: Report) -> Lowered:
+        """Add and remember what a text was lowered to."""
+        known = Lowered(interface, problems, tuple(_references(interface)))
+        self._memory[interface.name] = known
+        self._add(known)
+        return known
+
+    def _add(self, one: Lowered) -> None:
+        errors = [found for found in one.problems if found.severity is Severity.ERROR]
+        self._entries[one.interface.name] = Entry(one.interface, one.references, errors)
+
     def get(self, name: ir.TypeName) -> Entry | None:
         """Return an interface by name; `None` if there is none."""
         if name not in self._entries:
             source = self.library.source(name)
             self._entries[name] = None
-            if source is not None:
+            if source is not None and not self.remembered(name, source):
                 found = Report()
-                self.add(lower(parse_any(source), name, found, self.library.distro), found)
+                self.learn(lower(parse_any(source), name, found, self.library.distro), found)
         return self._entries[name]
 
     def __getitem__(self, name: ir.TypeName) -> Entry:
@@ -76,6 +111,23 @@ class Pool:
         for field, target in entry.references if entry else ():
             if self._entries.get(target):
                 yield field, target
+
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        seen = {name: self._entries.get(name)}
+        waiting = [name]
+        while waiting:
+            entry = seen[waiting.pop()]
+            for _, target in entry.references if entry else ():
+                if target not in seen:
+                    seen[target] = self._entries.get(target)
+                    waiting.append(target)
+        return tuple(entry.interface if entry else None for entry in seen.values())
+
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to exist and have no errors."""
+        entries = [self._entries.get(one.name) if one else None for one in self.reach(name)]
+        return all(entry is not None and not entry.errors for entry in entries)
 
     def crossings(self) -> Iterator[tuple[str, str, Span]]:
         """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""

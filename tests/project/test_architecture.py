@@ -20,7 +20,7 @@ RUNTIME = [path for path in MODULES if "runtime" in path.parts]
 #: Each stage may import those before it; `runtime` stands apart and imports none.
 STAGES = (
     "diagnostics syntax model breaking export checks templating emit native site "
-    "scaffold disk recordings driver cli backend"
+    "scaffold disk recordings driver lsp cli backend"
 ).split()
 #: Stages that need fewer of those before them.
 NEEDS_ONLY = {"native": {"native", "model"}}
@@ -30,7 +30,7 @@ SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
 OUTERMOST = {"__main__": "cli", "__init__": "driver", "build": "cli", "loaded": "disk"}
 
 #: Only these stages may touch files, the environment or the terminal.
-MAY_DO_IO = {"disk", "recordings", "cli", "backend"}
+MAY_DO_IO = {"disk", "recordings", "lsp", "cli", "backend"}
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
 #: What may read files of idlc: grammar, catalogue, templates, runtime, texts of licences.

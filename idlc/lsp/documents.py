@@ -1,0 +1,89 @@
+"""The documents that a client has open, and how it changes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from pathlib import Path
+
+from idlc.disk.read import Unsaved
+from idlc.lsp import uris
+from idlc.lsp.positions import in_lines, lines_of
+from idlc.lsp.protocol import Change, DocumentItem, Range
+
+
+class Document:
+    """One document; `path` is `None` if it is no file's."""
+
+    def __init__(self, item: DocumentItem) -> None:
+        self.uri = item.uri
+        self.path = uris.to_path(item.uri)
+        self.language = item.language_id
+        self.version: int | None = item.version
+        self._lines = lines_of(item.text)
+
+    @cached_property
+    def text(self) -> str:
+        """The whole text."""
+        return "".join(self._lines)
+
+    @property
+    def data(self) -> bytes:
+        """What a file would hold; halves of characters, which no file can hold, become `?`."""
+        return self.text.encode("utf-8", errors="replace")
+
+    def change(self, changes: Iterable[Change], encoding: str) -> None:
+        """Make changes, one after the other."""
+        for one in changes:
+            if one.range is None:
+                self._lines = lines_of(one.text)
+            else:
+                self._replace(one.range, one.text, encoding)
+        self.__dict__.pop("text", None)
+
+    def _replace(self, where: Range, new: str, encoding: str) -> None:
+        """Replace a range; only the lines around it are looked at."""
+        lines = self._lines
+        first, start = in_lines(lines, where.start, encoding)
+        last, end = in_lines(lines, where.end, encoding)
+        if (last, end) < (first, start):
+            last, end = first, start
+        # CR and LF may come together or apart at either end
+        low, high = max(first - 1, 0), min(last + 1, len(lines) - 1)
+        before = "".join(lines[low:first]) + lines[first][:start]
+        after = lines[last][end:] + "".join(lines[last + 1 : high + 1])
+        found = lines_of(before + new + after)
+        if high < len(lines) - 1 and not found[-1]:
+            del found[-1]
+        lines[low : high + 1] = found
+
+
+class Documents:
+    """All open documents by URI."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, Document] = {}
+
+    def __iter__(self) -> Iterator[Document]:
+        return iter(self._open.values())
+
+    def get(self, uri: str) -> Document | None:
+        """Return an open document."""
+        return self._open.get(uri)
+
+    def open(self, item: DocumentItem) -> Document:
+        """Open a document, again if it is open already."""
+        found = self._open[item.uri] = Document(item)
+        return found
+
+    def close(self, uri: str) -> Document | None:
+        """Close a document; `None` if it was not open."""
+        return self._open.pop(uri, None)
+
+    def at(self, path: Path) -> Document | None:
+        """Return the open document of a file."""
+        return next((one for one in self if one.path == path), None)
+
+    def unsaved(self) -> Unsaved:
+        """Return what counts instead of the files on disk."""
+        return Unsaved({one.path: one.data for one in self if one.path is not None})

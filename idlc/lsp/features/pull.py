@@ -1,0 +1,36 @@
+"""Problems, for clients that ask: of a document, or of all that have any."""
+
+from __future__ import annotations
+
+from zlib import crc32
+
+import msgspec
+
+from idlc.lsp.protocol import AskedDocument, AskedWorkspace
+from idlc.lsp.publish import Shown, diagnostics
+from idlc.lsp.world import World
+
+
+def document(world: World, asked: AskedDocument) -> dict[str, object]:
+    """Return the problems of a document, unless they are those that were told before."""
+    found = diagnostics(world).get(asked.text_document.uri, [])
+    return _report(found, asked.previous_result_id)
+
+
+def workspace(world: World, asked: AskedWorkspace) -> dict[str, object]:
+    """Return the problems of every document that has any, or had some when it was told."""
+    found = diagnostics(world)
+    before = {one.uri: one.value for one in asked.previous_result_ids}
+    items = []
+    for uri in sorted({*found, *before}):
+        opened = world.documents.get(uri)
+        report = _report(found.get(uri, []), before.get(uri))
+        items.append({"uri": uri, "version": opened.version if opened else None, **report})
+    return {"items": items}
+
+
+def _report(found: list[Shown], before: str | None) -> dict[str, object]:
+    now = f"{crc32(msgspec.json.encode(found)):08x}-{len(found)}"
+    if now == before:
+        return {"kind": "unchanged", "resultId": now}
+    return {"kind": "full", "resultId": now, "items": found}

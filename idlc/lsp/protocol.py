@@ -1,0 +1,309 @@
+"""The parts of the Language Server Protocol (3.17) that are used, as msgspec reads and writes them.
+
+Names are the protocol's, with underscores in Python.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, TypeAlias
+
+import msgspec
+from msgspec import UNSET, Meta, Raw, UnsetType
+
+#: Codes of errors.
+PARSE_ERROR = -32700
+INVALID_REQUEST = -32600
+METHOD_NOT_FOUND = -32601
+INVALID_PARAMS = -32602
+INTERNAL_ERROR = -32603
+NOT_INITIALIZED = -32002
+CANCELLED = -32800
+REQUEST_FAILED = -32803
+
+Id: TypeAlias = int | str
+Number = Annotated[int, Meta(ge=0)]
+
+
+class RequestError(Exception):
+    """A request that cannot be answered: a code of the protocol, and why in words for people."""
+
+    def __init__(self, code: int, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+
+
+class Message(msgspec.Struct):
+    """Any message that comes in."""
+
+    id: Id | UnsetType | None = UNSET
+    method: str | UnsetType = UNSET
+    params: Raw = Raw(b"null")
+    result: Raw | UnsetType = UNSET
+    error: Any = UNSET
+
+
+class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
+    """What all parts of messages have in common: camel case, and only what is not a default."""
+
+
+class Position(Part, frozen=True):
+    """A place in a document: line and character from 0, in units of the agreed encoding."""
+
+    line: Number
+    character: Number
+
+
+class Range(Part, frozen=True):
+    """From one position up to another."""
+
+    start: Position
+    end: Position
+
+
+class Location(Part, frozen=True):
+    """A range in a document."""
+
+    uri: str
+    range: Range
+
+
+class TextEdit(Part, frozen=True):
+    """A range and what takes its place."""
+
+    range: Range
+    new_text: str
+
+
+class DocumentId(Part, frozen=True):
+    """A document, with its version where the sender knows it."""
+
+    uri: str
+    version: int | None = None
+
+
+class DocumentItem(Part, frozen=True):
+    """A document with its text."""
+
+    uri: str
+    language_id: str
+    version: int
+    text: str
+
+
+class Change(Part, frozen=True):
+    """A new text for a range, or for the whole document."""
+
+    text: str
+    range: Range | None = None
+
+
+class DidOpen(Part, frozen=True):
+    """textDocument/didOpen."""
+
+    text_document: DocumentItem
+
+
+class DidChange(Part, frozen=True):
+    """textDocument/didChange."""
+
+    text_document: DocumentId
+    content_changes: tuple[Change, ...]
+
+
+class OfDocument(Part, frozen=True):
+    """What is asked about a document as a whole."""
+
+    text_document: DocumentId
+
+
+class AskedDocument(Part, frozen=True):
+    """textDocument/diagnostic: what was answered before, if anything was."""
+
+    text_document: DocumentId
+    previous_result_id: str | None = None
+
+
+class PreviousResult(Part, frozen=True):
+    """What was answered on a document before."""
+
+    uri: str
+    value: str
+
+
+class AskedWorkspace(Part, frozen=True):
+    """workspace/diagnostic."""
+
+    previous_result_ids: tuple[PreviousResult, ...] = ()
+
+
+class AtPosition(Part, frozen=True):
+    """What is asked about a place in a document."""
+
+    text_document: DocumentId
+    position: Position
+
+
+class AtPositions(Part, frozen=True):
+    """What is asked about several places of a document."""
+
+    text_document: DocumentId
+    positions: tuple[Position, ...]
+
+
+class Action(Part, frozen=True):
+    """What a lens does, or only says if there is no command."""
+
+    title: str
+    command: str
+    arguments: tuple[Any, ...] = ()
+
+
+class Lens(Part, frozen=True):
+    """A text above a line; it gets its `command` when it is shown."""
+
+    range: Range
+    command: Action | None = None
+    data: Any = None
+
+
+class OfRange(Part, frozen=True):
+    """What is asked about a part of a document."""
+
+    text_document: DocumentId
+    range: Range
+
+
+class ReferenceContext(Part, frozen=True):
+    """Whether the place of the definition is asked for as well."""
+
+    include_declaration: bool = True
+
+
+class AskedReferences(AtPosition, frozen=True):
+    """textDocument/references."""
+
+    context: ReferenceContext = ReferenceContext()
+
+
+class AskedSymbols(Part, frozen=True):
+    """workspace/symbol."""
+
+    query: str = ""
+
+
+class GivenProblem(Part, frozen=True):
+    """A diagnostic that the client shows."""
+
+    range: Range
+    message: str = ""
+    code: Any = None
+
+
+class ActionContext(Part, frozen=True):
+    """Which actions are asked for; all without `only`."""
+
+    diagnostics: tuple[GivenProblem, ...] = ()
+    only: tuple[str, ...] | None = None
+
+
+class AskedActions(OfRange, frozen=True):
+    """textDocument/codeAction."""
+
+    context: ActionContext = ActionContext()
+
+
+class AskedRename(AtPosition, frozen=True):
+    """textDocument/rename."""
+
+    new_name: str
+
+
+class FileRename(Part, frozen=True):
+    """The old and the new URI of a file."""
+
+    old_uri: str
+    new_uri: str
+
+
+class AskedFileRenames(Part, frozen=True):
+    """workspace/willRenameFiles."""
+
+    files: tuple[FileRename, ...]
+
+
+class Command(Part, frozen=True):
+    """workspace/executeCommand."""
+
+    command: str
+    arguments: tuple[Any, ...] = ()
+
+
+class AskedContent(Part, frozen=True):
+    """workspace/textDocumentContent."""
+
+    uri: str
+
+
+class Folder(Part, frozen=True):
+    """A workspace folder."""
+
+    uri: str
+    name: str = ""
+
+
+class Initialize(Part, frozen=True):
+    """What a client says of itself."""
+
+    process_id: int | None = None
+    root_uri: str | None = None
+    root_path: str | None = None
+    capabilities: dict[str, Any] = {}
+    initialization_options: Any = None
+    workspace_folders: tuple[Folder, ...] | None = None
+    client_info: dict[str, Any] | None = None
+
+
+class FolderChanges(Part, frozen=True):
+    """The folders that were added to the workspace, and those that were removed."""
+
+    added: tuple[Folder, ...]
+    removed: tuple[Folder, ...]
+
+
+class DidChangeFolders(Part, frozen=True):
+    """workspace/didChangeWorkspaceFolders."""
+
+    event: FolderChanges
+
+
+class FileChange(Part, frozen=True):
+    """A file that was made (1), changed (2) or removed (3)."""
+
+    uri: str
+    type: int
+
+
+class DidChangeFiles(Part, frozen=True):
+    """workspace/didChangeWatchedFiles."""
+
+    changes: tuple[FileChange, ...]
+
+
+class DidChangeSettings(Part, frozen=True):
+    """workspace/didChangeConfiguration."""
+
+    settings: Any = None
+
+
+class CancelParams(Part, frozen=True):
+    """$/cancelRequest."""
+
+    id: Id
+
+
+class Markup(Part, omit_defaults=False, frozen=True):
+    """Text for people, in Markdown."""
+
+    value: str
+    kind: str = "markdown"

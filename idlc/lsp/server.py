@@ -1,0 +1,169 @@
+"""The loop of the server: messages come in one after the other, and are answered in this order.
+
+A thread reads, so that a cancellation is known before its request is begun, and so that many
+changes in a row are followed by one check. Whatever a client sends, the server lives on.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from typing import Any, BinaryIO, TypeAlias
+
+import msgspec
+
+from idlc.lsp import framing
+from idlc.lsp.protocol import (
+    CANCELLED,
+    INTERNAL_ERROR,
+    INVALID_PARAMS,
+    INVALID_REQUEST,
+    PARSE_ERROR,
+    CancelParams,
+    Id,
+    Message,
+    RequestError,
+)
+from idlc.lsp.session import Session
+
+#: Messages in a row after which problems are told although more are waiting.
+MOST_IN_A_ROW = 500
+#: Seconds between looks at whether the client still lives.
+PATIENCE = 10.0
+#: What came in: a message, something that is none, or the end.
+Arrival: TypeAlias = Message | RequestError | None
+Answer: TypeAlias = Callable[[Any], None]
+
+
+def serve(reader: BinaryIO, writer: BinaryIO) -> int:
+    """Serve a client until it ends that or is gone, and return the exit status."""
+    return Server(reader, writer).run()
+
+
+class Server:
+    """A server between two streams."""
+
+    def __init__(self, reader: BinaryIO, writer: BinaryIO) -> None:
+        self._reader = reader
+        self._writer = writer
+        self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._cancelled: set[Id] = set()
+        self._asked: list[Answer | None] = []
+        self._session = Session(self._notify, self._ask)
+
+    def run(self) -> int:
+        """Serve, and return the exit status."""
+        threading.Thread(target=self._read, daemon=True).start()
+        in_a_row = 0
+        try:
+            while True:
+                if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
+                    in_a_row = 0
+                    self._attempt("problems", self._session.settle)
+                try:
+                    arrival = self._arrivals.get(timeout=PATIENCE)
+                except queue.Empty:
+                    if self._session.client_is_gone():
+                        return 1
+                    continue
+                in_a_row += 1
+                if arrival is None or getattr(arrival, "method", None) == "exit":
+                    return 0 if self._session.is_shut_down else 1
+                self._take(arrival)
+        except (OSError, ValueError):  # nobody reads what is written
+            return 1
+
+    def _read(self) -> None:
+        """Put each message that comes in where the loop takes it; `None` comes last."""
+        decode = msgspec.json.Decoder(Message).decode
+        while True:
+            try:
+                body = framing.read(self._reader)
+                if body is None:
+                    break
+                message = decode(body)
+                if message.method == "$/cancelRequest":
+                    self._cancelled.add(msgspec.json.decode(message.params, type=CancelParams).id)
+                else:
+                    self._arrivals.put(message)
+            except framing.TooLongError:
+                self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
+            except msgspec.ValidationError as error:
+                self._arrivals.put(RequestError(INVALID_REQUEST, str(error)))
+            except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
+                self._arrivals.put(RequestError(PARSE_ERROR, str(error)))
+            except (OSError, ValueError):  # the stream was closed
+                break
+        self._arrivals.put(None)
+
+    def _take(self, arrival: Message | RequestError) -> None:
+        if isinstance(arrival, RequestError):
+            self._fail(None, arrival)
+        elif not isinstance(arrival.method, str):
+            self._take_answer(arrival)
+        elif isinstance(arrival.id, msgspec.UnsetType):
+            self._attempt(arrival.method, lambda: self._session.take(arrival))
+        else:
+            self._answer(arrival, arrival.id)
+
+    def _take_answer(self, arrival: Message) -> None:
+        """Take an answer to what was asked of the client; one to nothing that was is left."""
+        asked = arrival.id
+        known = isinstance(asked, int) and 0 <= asked < len(self._asked)
+        take = self._asked[asked] if known and isinstance(asked, int) else None
+        if take is not None and isinstance(arrival.result, msgspec.Raw):
+            result = msgspec.json.decode(arrival.result)
+            self._attempt("answer", lambda: take(result))
+
+    def _answer(self, request: Message, id_: Id | None) -> None:
+        failure = None
+        result: object = None
+        if id_ in self._cancelled:
+            failure = RequestError(CANCELLED, "cancelled")
+        else:
+            failure, result = self._result(lambda: self._session.answer(request))
+        self._cancelled.discard(id_)
+        if failure is None:
+            self._write({"jsonrpc": "2.0", "id": id_, "result": result})
+        else:
+            if failure.code == INTERNAL_ERROR:
+                self._log(f"{request.method!s}: {failure.message}")
+            self._fail(id_, failure)
+
+    def _attempt(self, what: str, action: Callable[[], object]) -> None:
+        """Do what needs no answer; only the log says if that fails."""
+        failure, _ = self._result(action)
+        if failure is not None:
+            self._log(f"{what}: {failure.message}")
+
+    def _result(self, action: Callable[[], object]) -> tuple[RequestError | None, object]:
+        try:
+            return None, action()
+        except RequestError as error:
+            return error, None
+        except msgspec.ValidationError as error:
+            return RequestError(INVALID_PARAMS, str(error)), None
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            return RequestError(INTERNAL_ERROR, f"{type(error).__name__}: {error}"), None
+
+    def _fail(self, id_: Id | None, error: RequestError) -> None:
+        told = {"code": error.code, "message": error.message}
+        self._write({"jsonrpc": "2.0", "id": id_, "error": told})
+
+    def _log(self, message: str) -> None:
+        self._notify("window/logMessage", {"type": 1, "message": f"idlc: {message}"})
+
+    def _notify(self, method: str, params: object) -> None:
+        self._write({"jsonrpc": "2.0", "method": method, "params": params})
+
+    def _ask(self, method: str, params: object, answer: Answer | None = None) -> None:
+        """Ask the client something."""
+        self._asked.append(answer)
+        id_ = len(self._asked) - 1
+        self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
+
+    def _write(self, message: object) -> None:
+        framing.write(self._writer, msgspec.json.encode(message))

@@ -1,0 +1,112 @@
+"""What a server knows, which features look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from idlc.diagnostics.source import Source, Span
+from idlc.driver.workspace import State, Wishes
+from idlc.lsp import positions, uris
+from idlc.lsp.documents import Document, Documents
+from idlc.lsp.projects import Projects
+from idlc.lsp.protocol import Location, Position, Range
+from idlc.model import ir
+
+
+class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
+    """What an editor's settings say, below `idlc`: options of `idlc check`, and of features.
+
+    `against` is what the lens on breaking changes compares with.
+    """
+
+    inlay_hints: bool = True
+    code_lens: bool = True
+    against: str = ""
+
+
+class Known(NamedTuple):
+    """An interface file: what is known of its folder, what it defines, and its text."""
+
+    state: State
+    interface: ir.Interface
+    source: Source
+
+
+class World:
+    """The state of a server."""
+
+    def __init__(
+        self,
+        ask: Callable[..., None] = lambda *_: None,
+        tell: Callable[..., None] = lambda *_: None,
+    ) -> None:
+        #: Ask the client something, and tell it something: a method, and what it is given.
+        self.ask = ask
+        self.tell = tell
+        self.documents = Documents()
+        self.projects = Projects(self.documents)
+        self.encoding = positions.DEFAULT
+        self.settings = Settings()
+        self.client: dict[str, Any] = {}
+
+    def supports(self, *path: str) -> bool:
+        """Return whether the client says that it can do something."""
+        found: Any = self.client
+        for name in path:
+            found = found.get(name) if isinstance(found, dict) else None
+        return found not in (None, False)
+
+    def settle(self, given: object) -> str:
+        """Take the client's settings; return what is wrong with them, empty if nothing is."""
+        own = given.get("idlc", given) if isinstance(given, dict) else {}
+        try:
+            self.settings = msgspec.convert(own, Settings)
+        except msgspec.ValidationError as error:
+            return f"the settings of idlc are not used: {error}"
+        wishes = {name: getattr(self.settings, name) for name in Wishes.__struct_fields__}
+        self.projects.settle(Wishes(**wishes))
+        return ""
+
+    def known(self, uri: str) -> Known | None:
+        """Return what is known of an interface file; `None` if it is not looked at."""
+        path = self.path(uri)
+        project = self.projects.of(path) if path else None
+        state = project.state(self.documents) if project else None
+        if path is None or state is None or path not in state.interfaces:
+            return None
+        interface, source = state.interfaces[path]
+        return Known(state, interface, source)
+
+    def path(self, uri: str) -> Path | None:
+        """Return the path of a document."""
+        document = self.documents.get(uri)
+        return document.path if document else uris.to_path(uri)
+
+    def uri(self, path: Path) -> str:
+        """Return the URI of a file, as the client spells it if it is open."""
+        document: Document | None = self.documents.at(path)
+        return document.uri if document else uris.from_path(path)
+
+    def offset(self, source: Source, position: Position) -> int:
+        """Return the character of a text at a position."""
+        return positions.places(source.text, self.encoding).offset(position)
+
+    def range(self, span: Span) -> Range:
+        """Return the range of a span."""
+        return positions.range_of(span, self.encoding)
+
+    def location(self, span: Span, state: State) -> Location:
+        """Return the location of a span; what is built in is a document of its own."""
+        source = span.source
+        if source.path.startswith("<"):
+            return Location(built_in(source), self.range(span))
+        return Location(self.uri(state.path_of(source)), self.range(span))
+
+
+def built_in(source: Source) -> str:
+    """Return the URI of an interface of the catalogue, such as `idlc:/jazzy/std_msgs/msg/…`."""
+    return "idlc:/" + source.path.replace("<", "", 1).replace(">", "", 1)
