@@ -5,11 +5,12 @@ Each list is a function, so that a run imports only the rules that it asks.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.model import ir
 from idlc.model.link import Model
 
 if TYPE_CHECKING:
@@ -21,10 +22,18 @@ PackageCheck: TypeAlias = "Callable[[Facts, Model, Report], None]"
 
 
 class Rule(NamedTuple):
-    """A function that looks at a model, and what it may report."""
+    """A function that looks at a model, and what it may report.
+
+    `together` is whether it looks at more than each interface with what that refers to.
+    """
 
     check: Check
     codes: tuple[codes.Code, ...]
+    together: bool = False
+
+
+#: What rules found in an interface, by its name, with all that this depends on.
+Memory: TypeAlias = dict[ir.TypeName, tuple[Hashable, tuple[Diagnostic, ...]]]
 
 
 class PackageRule(NamedTuple):
@@ -39,18 +48,22 @@ def verdicts() -> tuple[Rule, ...]:
     from idlc.checks import names, reserved, values
 
     return (
-        Rule(names.package_name, (codes.INVALID_PACKAGE_NAME,)),
+        Rule(names.package_name, (codes.INVALID_PACKAGE_NAME,), together=True),
         Rule(names.interface_names, (codes.INVALID_INTERFACE_NAME,)),
         Rule(names.unique_fields, (codes.DUPLICATE_FIELD,)),
         Rule(names.unique_constants, (codes.DUPLICATE_CONSTANT,)),
-        Rule(names.unique_modules, (codes.SAME_PYTHON_MODULE,)),
+        Rule(names.unique_modules, (codes.SAME_PYTHON_MODULE,), together=True),
         Rule(
             reserved.field_names,
             (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C, codes.BREAKS_CPP),
         ),
         Rule(reserved.constant_names, (codes.BREAKS_CPP,)),
         Rule(reserved.interface_names, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
-        Rule(reserved.package_name, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_CPP)),
+        Rule(
+            reserved.package_name,
+            (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_CPP),
+            together=True,
+        ),
         Rule(reserved.derived_suffixes, (codes.BREAKS_ROSIDL_PYTHON, codes.BREAKS_C)),
         Rule(
             values.constants_and_defaults,
@@ -105,17 +118,35 @@ def package_advice() -> tuple[PackageRule, ...]:
     )
 
 
-def check(model: Model, report: Report) -> None:
+def check(model: Model, report: Report, memory: Memory | None = None) -> None:
     """Report what the rules on meaning find in the model's own interfaces."""
-    for rule in verdicts():
-        rule.check(model, report)
+    _ask(verdicts(), model, report, memory)
 
 
-def advise(model: Model, report: Report, selection: Selection) -> None:
+def advise(
+    model: Model, report: Report, selection: Selection, memory: Memory | None = None
+) -> None:
     """Report what wanted advice there is on the model's own interfaces."""
-    for rule in advice():
-        if any(map(selection.has, rule.codes)):
+    rules = [rule for rule in advice() if any(map(selection.has, rule.codes))]
+    _ask(rules, model, report, memory)
+
+
+def _ask(rules: Sequence[Rule], model: Model, report: Report, memory: Memory | None) -> None:
+    """Ask rules; with a memory, only on interfaces that are not as they were."""
+    for rule in rules:
+        if rule.together or memory is None:
             rule.check(model, report)
+    if memory is None:
+        return
+    for one, reach in model.each():
+        name = one.own[0].name
+        if name not in memory or memory[name][0] != reach:
+            found = Report()
+            for rule in rules:
+                if not rule.together:
+                    rule.check(one, found)
+            memory[name] = reach, tuple(found)
+        report.extend(memory[name][1])
 
 
 def check_package(facts: Facts, model: Model, report: Report, selection: Selection) -> None:

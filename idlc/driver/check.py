@@ -17,10 +17,11 @@ from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage
 
 if TYPE_CHECKING:
+    from idlc.checks import registry
     from idlc.checks.package.facts import Facts
     from idlc.diagnostics.source import Source
+    from idlc.model import pool
     from idlc.model.link import Model
-    from idlc.model.pool import Memory
 
 
 class CheckOptions(msgspec.Struct, frozen=True):
@@ -110,7 +111,9 @@ class Checker:
     def __init__(self, packages: Sequence[inputs.Inputs], scope: Scope) -> None:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
-        self._memory: Memory = {}
+        self._lowered: pool.Memory = {}
+        self._checked: registry.Memory = {}
+        self._advised: registry.Memory = {}
         self._facts: dict[str, Facts | None] = {}
 
     def check(
@@ -119,7 +122,8 @@ class Checker:
         """Report what is wrong; return the model of each package, with only the given files."""
         self.library.report_to(report)
         models = []
-        for given, model in Compiler(self.library, self._memory).all(packages, report):
+        compiler = Compiler(self.library, self._lowered, self._checked)
+        for given, model in compiler.all(packages, report):
             models.append(model.only(given.names))
             self._advise(given, models[-1], selection, report)
         return models
@@ -131,13 +135,13 @@ class Checker:
         from idlc.checks.registry import advise, check_package
 
         with stage("advise", given.package):
-            advise(model, report, selection)
-        surroundings = self._around(given)
+            advise(model, report, selection, self._advised)
+        surroundings = self.around(given)
         if surroundings is not None:
             with stage("check package", given.package):
                 check_package(surroundings, model, report, selection)
 
-    def _around(self, given: inputs.Inputs) -> Facts | None:
+    def around(self, given: inputs.Inputs) -> Facts | None:
         """Return what surrounds a package, with the texts that it has now."""
         scope = self._scope
         if given.package not in self._facts:

@@ -49,6 +49,12 @@ def fmt(
 
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
+    new = laid_out(source, ir.TypeName("package", file.kind, file.name), report)
+    return Formatted(file.shown) if new is None else Formatted(file.shown, source.text, new)
+
+
+def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
+    """Return a text laid out; report its errors and return `None` if it has any."""
     from idlc.diagnostics.source import Source
     from idlc.model.distro import NEWEST
     from idlc.model.lowering.file import lower
@@ -57,15 +63,14 @@ def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
     from idlc.syntax.parse import parse
 
     problems, again = Report(), Report()
-    name = ir.TypeName("package", file.kind, file.name)
     tree = parse(source)
     before = lower(tree, name, problems, NEWEST)
     if problems.had_errors:
         report.extend(one for one in problems if one.severity is Severity.ERROR)
-        return Formatted(file.shown)
+        return None
     new = format_file(tree)
     if new != source.text:
-        after = lower(parse(Source(file.shown, new)), name, again, NEWEST)
+        after = lower(parse(Source(source.path, new)), name, again, NEWEST)
         if again.had_errors or meaning(after) != meaning(before):
             raise AssertionError("the layout would change the meaning; the file was left alone")
-    return Formatted(file.shown, source.text, new)
+    return new

@@ -19,8 +19,10 @@ from idlc.disk.scope import Scope
 from idlc.model import derive, ir
 
 if TYPE_CHECKING:
+    from idlc.checks import registry
+    from idlc.model import pool
     from idlc.model.link import Model
-    from idlc.model.pool import Memory, Pool
+    from idlc.model.pool import Pool
 
 
 class InternalError(Exception):
@@ -46,12 +48,19 @@ def stage(name: str, subject: str) -> Iterator[None]:
 class Compiler:
     """Compiles the packages of one run; what several of them use is read and lowered once.
 
-    Runs that share a `memory` and a library lower only what changed from one to the next.
+    Runs that share memories and a library do only what changed from one to the next: `memory`
+    is of what was lowered, `checked` of what rules found.
     """
 
-    def __init__(self, library: Library, memory: Memory | None = None) -> None:
+    def __init__(
+        self,
+        library: Library,
+        memory: pool.Memory | None = None,
+        checked: registry.Memory | None = None,
+    ) -> None:
         self.library = library
         self._memory = memory
+        self._checked = checked
 
     @cached_property
     def _pool(self) -> Pool:
@@ -88,7 +97,7 @@ class Compiler:
         with stage("link", package):
             model = link(package, own, self.library, report, self._pool)
         with stage("check", package):
-            check(model, report)
+            check(model, report, self._checked)
         return model
 
     def all(

@@ -6,13 +6,13 @@ next load: what an editor has open counts instead of what its file holds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, Severity
 from idlc.disk import command_settings, environment, inputs, pyproject
 from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.find import look, root_of
@@ -21,15 +21,15 @@ from idlc.disk.read import MAX_SIZE, Unsaved, absolute
 from idlc.disk.scope import scope
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
+from idlc.model import ir
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from idlc.checks.select import Selection
-    from idlc.diagnostics.report import Diagnostic
+    from idlc.diagnostics.report import Diagnostic, Edit
     from idlc.diagnostics.source import Source
     from idlc.disk.library import Library
-    from idlc.model import ir
     from idlc.model.link import Model
 
 
@@ -66,6 +66,28 @@ class State(msgspec.Struct, frozen=True, dict=True):
             for one in model.own
             if one.source
         }
+
+    @cached_property
+    def _broken(self) -> frozenset[str]:
+        """The files that have errors."""
+        errors = (one for one in self.problems if one.severity is Severity.ERROR)
+        return frozenset(one.where[0] for one in errors)
+
+    def model_of(self, interface: ir.Interface) -> Model | None:
+        """Return the model that an interface is in, `None` if there are errors in what it needs."""
+        for model in self.models.values():
+            if model.interfaces.get(interface.name) is interface:
+                reach = model.reach(interface.name)
+                paths = {one.source.path for one in reach if one and one.source}
+                return (
+                    model if model.is_sound(interface.name) and not paths & self._broken else None
+                )
+        return None
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface of any package."""
+        with working_in(self.folder):
+            return self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""
@@ -147,6 +169,33 @@ class Workspace:
             return True
         folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
         return any(path.is_relative_to(one) for one in (*folders, *environment.ament_prefixes()))
+
+    def name_of(self, path: Path) -> ir.TypeName:
+        """Return the name of the interface of one of the files that are checked."""
+        number, at = self._places[path]
+        file = self._packages[number].files[at].file
+        return ir.TypeName(self._packages[number].package, file.kind, file.name)
+
+    def packages(self) -> Iterable[str]:
+        """Return the packages that are known here and have messages."""
+        return (one for one in self._library.packages() if self.names(one))
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of the messages of a package."""
+        return self._library.names(package)
+
+    def dependency(self, path: Path, package: str) -> Edit | None:
+        """Return the edit of package.xml by which a file may use a package; `None` if it may."""
+        from idlc.checks.package.manifest import dependency
+
+        given = self._packages[self._places[path][0]]
+        with working_in(self.folder):
+            found = next(iter(self._checkers.values())).around(given)
+        return dependency(found, package) if found else None
+
+    @property
+    def _library(self) -> Library:
+        return next(iter(self._checkers.values())).library
 
     def state(self) -> State:
         """Return what is known now."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import positions
+from idlc.lsp import dependencies, positions
 from idlc.lsp.world import World
 
 
@@ -37,7 +37,20 @@ CAPABILITIES: dict[str, object] = {
         "interFileDependencies": True,
         "workspaceDiagnostics": True,
     },
+    "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "]},
+    "executeCommandProvider": {"commands": [dependencies.COMMAND]},
+    "hoverProvider": True,
+    "definitionProvider": True,
+    "typeDefinitionProvider": True,
+    "referencesProvider": True,
+    "documentHighlightProvider": True,
+    "documentSymbolProvider": True,
+    "workspaceSymbolProvider": True,
+    "documentFormattingProvider": True,
+    "documentRangeFormattingProvider": True,
+    "documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n"},
     "workspace": {
+        "textDocumentContent": {"schemes": ["idlc"]},
         "workspaceFolders": {"supported": True, "changeNotifications": True},
     },
 }

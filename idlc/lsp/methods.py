@@ -9,7 +9,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, NamedTuple
 
-from idlc.lsp.protocol import AskedDocument, AskedWorkspace
+from idlc.lsp import protocol
 
 
 class Method(NamedTuple):
@@ -28,6 +28,19 @@ class Method(NamedTuple):
 
 
 METHODS = {
-    "textDocument/diagnostic": Method("pull", "document", AskedDocument),
-    "workspace/diagnostic": Method("pull", "workspace", AskedWorkspace),
+    "textDocument/diagnostic": Method("pull", "document", protocol.AskedDocument),
+    "workspace/diagnostic": Method("pull", "workspace", protocol.AskedWorkspace),
+    "textDocument/completion": Method("completion", "complete", protocol.AtPosition),
+    "workspace/executeCommand": Method("commands", "execute", protocol.Command),
+    "textDocument/hover": Method("hover", "hover", protocol.AtPosition),
+    "textDocument/definition": Method("navigation", "definition", protocol.AtPosition),
+    "textDocument/typeDefinition": Method("navigation", "type_definition", protocol.AtPosition),
+    "textDocument/references": Method("navigation", "references", protocol.AskedReferences),
+    "textDocument/documentHighlight": Method("navigation", "highlights", protocol.AtPosition),
+    "textDocument/documentSymbol": Method("symbols", "document", protocol.OfDocument),
+    "workspace/symbol": Method("symbols", "workspace", protocol.AskedSymbols),
+    "workspace/textDocumentContent": Method("content", "text", protocol.AskedContent),
+    "textDocument/formatting": Method("formatting", "document", protocol.OfDocument),
+    "textDocument/rangeFormatting": Method("formatting", "part", protocol.OfRange),
+    "textDocument/onTypeFormatting": Method("formatting", "typed", protocol.AtPosition),
 }

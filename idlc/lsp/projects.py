@@ -5,6 +5,7 @@ What is known follows from what is on disk and what is open, never from the way 
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -60,7 +61,12 @@ class Project:
         """Read what is on disk, unless that was done; raises OSError."""
         if self._documents is None:
             self.workspace.load(documents.unsaved())
+            gc.freeze()  # to look at all of it for garbage takes longer than to check a file
             self._documents = documents
+
+    def has(self, path: Path) -> bool:
+        """Return whether a file is one of those that are checked, as far as was looked."""
+        return self._documents is not None and self.workspace.counts(path) is not None
 
     def holds(self, path: Path, documents: Documents) -> bool:
         """Return whether a file is one of those that are checked."""
@@ -68,7 +74,7 @@ class Project:
             self.load(documents)
         except OSError:
             return False
-        return self.workspace.counts(path) is not None
+        return self.has(path)
 
 
 def _failure(error: InternalError) -> Diagnostic:

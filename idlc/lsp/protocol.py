@@ -151,6 +151,37 @@ class OfRange(Part, frozen=True):
     range: Range
 
 
+class ReferenceContext(Part, frozen=True):
+    """Whether the place of the definition is asked for as well."""
+
+    include_declaration: bool = True
+
+
+class AskedReferences(AtPosition, frozen=True):
+    """textDocument/references."""
+
+    context: ReferenceContext = ReferenceContext()
+
+
+class AskedSymbols(Part, frozen=True):
+    """workspace/symbol."""
+
+    query: str = ""
+
+
+class Command(Part, frozen=True):
+    """workspace/executeCommand."""
+
+    command: str
+    arguments: tuple[Any, ...] = ()
+
+
+class AskedContent(Part, frozen=True):
+    """workspace/textDocumentContent."""
+
+    uri: str
+
+
 class Folder(Part, frozen=True):
     """A workspace folder."""
 

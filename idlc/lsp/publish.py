@@ -8,6 +8,7 @@ from idlc.diagnostics import code_pages, codes
 from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.driver.workspace import State
 from idlc.lsp import uris
+from idlc.lsp.projects import Project
 from idlc.lsp.protocol import Location, Part, Position, Range
 from idlc.lsp.world import World
 
@@ -49,7 +50,7 @@ class Shown(Part, frozen=True):
 def diagnostics(world: World) -> dict[str, list[Shown]]:
     """Return the problems of all documents that have any, by URI."""
     found: dict[str, dict[Shown, None]] = {}
-    held: set[Path] = set()
+    inner: list[Project] = []
     for project in world.projects.all():
         state = project.state(world.documents)
         if project.failure is not None:
@@ -59,9 +60,9 @@ def diagnostics(world: World) -> dict[str, list[Shown]]:
             continue
         for one in state.problems:
             path = _path(one, state)
-            if path is not None and path not in held:
+            if path is not None and not any(other.has(path) for other in inner):
                 found.setdefault(world.uri(path), {})[shown(one, state, world)] = None
-        held.update(state.interfaces)
+        inner.append(project)
     return {uri: list(some) for uri, some in found.items()}
 
 

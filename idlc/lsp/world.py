@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,7 +39,9 @@ class Known(NamedTuple):
 class World:
     """The state of a server."""
 
-    def __init__(self) -> None:
+    def __init__(self, ask: Callable[..., None] = lambda *_: None) -> None:
+        #: Asks the client something: a method, and what it is given.
+        self.ask = ask
         self.documents = Documents()
         self.projects = Projects(self.documents)
         self.encoding = positions.DEFAULT

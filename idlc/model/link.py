@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, MutableMapping
+from collections.abc import Container, Hashable, Iterable, Iterator, Mapping, MutableMapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -93,6 +93,19 @@ class Model:
         """Return the model with those of its own interfaces that have one of these names."""
         own = tuple(interface for interface in self.own if interface.name in names)
         return Model(self.package, own, self.interfaces, self._pool)
+
+    def each(self) -> Iterator[tuple[Model, Hashable]]:
+        """Yield the model with each of its own interfaces alone, and all that it depends on."""
+        for one in self.own:
+            yield Model(self.package, (one,), self.interfaces, self._pool), self.reach(one.name)
+
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        return self._pool.reach(name) if self._pool else (self.interfaces.get(name),)
+
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to were linked without errors."""
+        return self._pool is None or self._pool.is_sound(name)
 
     def sound(self, broken: Container[str]) -> Model:
         """Return the model without the interfaces in `broken` files, and those that hold them."""

@@ -112,6 +112,23 @@ class Pool:
             if self._entries.get(target):
                 yield field, target
 
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        seen = {name: self._entries.get(name)}
+        waiting = [name]
+        while waiting:
+            entry = seen[waiting.pop()]
+            for _, target in entry.references if entry else ():
+                if target not in seen:
+                    seen[target] = self._entries.get(target)
+                    waiting.append(target)
+        return tuple(entry.interface if entry else None for entry in seen.values())
+
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to exist and have no errors."""
+        entries = [self._entries.get(one.name) if one else None for one in self.reach(name)]
+        return all(entry is not None and not entry.errors for entry in entries)
+
     def crossings(self) -> Iterator[tuple[str, str, Span]]:
         """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
         for entry in filter(None, self._entries.values()):

@@ -5,10 +5,9 @@ import pytest
 from tests.support.editor import Editor
 
 
-@pytest.fixture
-def editor(monkeypatch):
+@pytest.fixture(scope="module")
+def editor():
     """Return a function that starts an editor in some folders."""
-    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
     started = []
 
     def start(*folders, **options):
@@ -20,12 +19,12 @@ def editor(monkeypatch):
         one.quit()
 
 
-@pytest.fixture
-def package(tmp_path):
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
     """Return a function that writes a package's files into a folder, and that folder."""
 
     def write(files, name="demo"):
-        folder = tmp_path / name
+        folder = tmp_path_factory.mktemp("workspace").resolve() / name
         manifest = f'<package format="3">\n  <name>{name}</name>\n</package>\n'
         for path, text in {".git/HEAD": "", "package.xml": manifest, **files}.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,7 @@ It refuses what is not of the protocol's types, and is used without coroutines.
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
 import threading
 from pathlib import Path
@@ -32,7 +33,8 @@ class Editor:
         self._client = BaseLanguageClient("tests", "1")
         self._listen()
         command = (sys.executable, "-m", "idlc", "lsp")
-        self._wait(self._client.start_io(*command))
+        environment = {**os.environ, "AMENT_PREFIX_PATH": ""}
+        self._wait(self._client.start_io(*command, env=environment))
         self.process = self._client._server
         self.answer = self.ask(
             lsp.INITIALIZE,
@@ -101,6 +103,14 @@ class Editor:
                 content_changes=[one],
             ),
         )
+
+    def answer_edits(self, taken: list[lsp.WorkspaceEdit]) -> None:
+        """Take the edits that the server asks for; nothing is written."""
+
+        @self._client.feature(lsp.WORKSPACE_APPLY_EDIT)
+        def _(params: lsp.ApplyWorkspaceEditParams) -> lsp.ApplyWorkspaceEditResult:
+            taken.append(params.edit)
+            return lsp.ApplyWorkspaceEditResult(applied=True)
 
     def close(self, uri: str) -> None:
         """Close a document."""

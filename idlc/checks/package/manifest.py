@@ -28,9 +28,7 @@ _RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 
 def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """Packages whose messages are used are declared."""
-    # what CMake does not install is there for the package's own tests
-    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
-    seen = {facts.name, *declared}
+    seen = _may_use(facts)
     for message in sections(model):
         for field, target in message.holders:
             package = target.package
@@ -44,13 +42,27 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
                 report.add(_with_lines(found, facts, [f"<depend>{package}</depend>"]))
 
 
+def _may_use(facts: Facts) -> set[str]:
+    """Return the packages whose messages a package may use: its own, and those that it declares."""
+    # what CMake does not install is there for the package's own tests
+    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
+    return {facts.name, *declared}
+
+
+def dependency(facts: Facts, package: str) -> Edit | None:
+    """Return the edit that declares a package; `None` if it is declared, or cannot be."""
+    if package in _may_use(facts):
+        return None
+    return _addition(facts, f"<depend>{package}</depend>")
+
+
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """A package of interfaces alone declares no interfaces that it does not use."""
-    if facts.modules or facts.native or not facts.whole or _has_gaps(model):
+    if facts.modules or facts.native or not facts.whole:
         return
     used = {name.package for name in model.interfaces} | _IMPLICIT
     for package, statement in facts.declared("depend", "build_depend").items():
-        if package not in used and catalog.is_standard(package):
+        if package not in used and catalog.is_standard(package) and not _has_gaps(model):
             report.add(
                 codes.UNUSED_DEPENDENCY.at(
                     statement.span,

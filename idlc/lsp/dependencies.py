@@ -1,0 +1,15 @@
+"""The command that declares a package in package.xml, for what is completed."""
+
+from __future__ import annotations
+
+from idlc.lsp.world import World
+
+COMMAND = "idlc.addDependency"
+
+
+def command(uri: str, package: str, world: World) -> dict[str, object] | None:
+    """Return the command for a document, if the client can have its files edited."""
+    if not world.supports("workspace", "applyEdit"):
+        return None
+    title = f"Declare {package} in package.xml"
+    return {"title": title, "command": COMMAND, "arguments": [uri, package]}

@@ -1,0 +1,183 @@
+"""What may come next in a line: types, names, values, units and codes.
+
+Only the line and the lists of what there is are looked at, so that it comes while one types.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.report import Severity
+from idlc.lsp import dependencies, suggestions
+from idlc.lsp.documents import Document
+from idlc.lsp.positions import in_lines, lines_of, units
+from idlc.lsp.projects import Project
+from idlc.lsp.protocol import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.world import World
+from idlc.model import ir
+from idlc.model.lowering.types import STRINGS
+
+_KEYWORD, _MODULE, _STRUCT, _VALUE, _UNIT, _FIELD, _SNIPPET = 14, 9, 22, 12, 11, 5, 15
+_AGAIN: dict[str, object] = {"title": "types", "command": "editor.action.triggerSuggest"}
+#: Types of any package that one word may mean; more letters leave fewer.
+MOST = 200
+
+
+class Item(Part, frozen=True):
+    """Something that may come next."""
+
+    label: str
+    kind: int
+    text_edit: TextEdit
+    detail: str = ""
+    sort_text: str = ""
+    filter_text: str = ""
+    command: dict[str, object] | None = None
+
+
+class Items(Part, frozen=True, omit_defaults=False):
+    """All that may come next; more letters may show others."""
+
+    is_incomplete: bool
+    items: tuple[Item, ...]
+
+
+class Typed(NamedTuple):
+    """What was typed of a line, and where the document goes on."""
+
+    document: Document
+    path: Path
+    project: Project
+    line: int
+    before: str
+    encoding: str
+
+    def replacing(self, length: int, text: str) -> TextEdit:
+        """Return the edit that puts a text in the place of the last characters."""
+        end = units(self.before, self.encoding)
+        start = end - units(self.before[len(self.before) - length :], self.encoding)
+        return TextEdit(Range(Position(self.line, start), Position(self.line, end)), text)
+
+
+def complete(world: World, asked: AtPosition) -> Items:
+    """Return what may come next at a position."""
+    document = world.documents.get(asked.text_document.uri)
+    path = document.path if document else None
+    project = world.projects.of(path) if path else None
+    if document is None or path is None or project is None:
+        return Items(False, ())
+    lines = lines_of(document.text)
+    line, at = in_lines(lines, asked.position, world.encoding)
+    typed = Typed(document, path, project, line, lines[line][:at], world.encoding)
+    items = tuple(_items(typed, world))
+    return Items(len(items) >= MOST, items)
+
+
+def _items(typed: Typed, world: World) -> Iterator[Item]:
+    code, sign, comment = typed.before.partition("#")
+    words = code.removeprefix("@optional").lstrip().split(maxsplit=2)
+    if sign:
+        yield from _in_comment(typed, comment, words)
+    elif not words or (len(words) == 1 and not code.endswith((" ", "\t"))):
+        yield from _types(typed, words[0] if words else "", world)
+    elif "=" in code and re.fullmatch(r"\S+\s+[A-Z]\w*\s*=.*", code.lstrip()):
+        word = code.partition("=")[2].lstrip()
+        if "<=" not in words[0] or "=" in words[-1]:
+            yield from _values(typed, words[0], word, "")
+    elif len(words) == 1 or (len(words) == 2 and not code.endswith((" ", "\t"))):
+        yield from _names(typed, words[0], words[1] if len(words) == 2 else "")
+    else:
+        yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
+
+
+def _types(typed: Typed, word: str, world: World) -> Iterator[Item]:
+    """Yield what may begin a line, or go on with its first word."""
+    if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
+        for size in suggestions.BOUNDS:
+            yield Item(size, _VALUE, typed.replacing(len(bound[1]), size))
+        return
+    if word and not (word[0].isalpha() and word.isascii()):
+        return
+    package, slash, _ = word.partition("/")
+    workspace = typed.project.workspace
+    if slash:
+        for one in workspace.names(package):
+            yield _type(typed, word, f"{package}/{one}", package, "0", world)
+        return
+    name = workspace.name_of(typed.path)
+    own = name.package
+    for one in (*ir.PRIMITIVES, *STRINGS):
+        yield Item(one, _KEYWORD, typed.replacing(len(word), one), sort_text=f"1{one}")
+    for one in workspace.names(own):
+        if name != (own, "msg", one):
+            yield _type(typed, word, one, own, "0", world)
+    for one in workspace.packages():
+        edit = typed.replacing(len(word), f"{one}/")
+        yield Item(f"{one}/", _MODULE, edit, sort_text=f"3{one}", command=_AGAIN)
+    if word:
+        yield from _elsewhere(typed, word, own, world)
+    if not typed.before and name.kind != "msg":
+        yield Item("---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4")
+
+
+def _elsewhere(typed: Typed, word: str, own: str, world: World) -> Iterator[Item]:
+    """Yield messages of other packages by their names alone."""
+    count = 0
+    for package in typed.project.workspace.packages():
+        for name in typed.project.workspace.names(package) if package != own else ():
+            if name.lower().startswith(word.lower()):
+                yield _type(typed, word, f"{package}/{name}", package, "2", world, name)
+                count += 1
+        if count >= MOST:
+            return
+
+
+def _type(
+    typed: Typed, word: str, text: str, package: str, rank: str, world: World, looked_for: str = ""
+) -> Item:
+    """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
+    missing = typed.project.workspace.dependency(typed.path, package)
+    return Item(
+        text,
+        _STRUCT,
+        typed.replacing(len(word), text),
+        sort_text=rank + text,
+        filter_text=looked_for,
+        detail=package if looked_for else "",
+        command=dependencies.command(typed.document.uri, package, world) if missing else None,
+    )
+
+
+def _names(typed: Typed, type_: str, word: str) -> Iterator[Item]:
+    """Yield what a field of a type is often called."""
+    if "/" in type_ or type_[:1].isupper():
+        name = suggestions.field_name(type_)
+        yield Item(name, _FIELD, typed.replacing(len(word), name))
+
+
+def _values(typed: Typed, type_: str, word: str, name: str) -> Iterator[Item]:
+    """Yield values that fit a type, the constants of the section for a field first."""
+    lines = lines_of(typed.document.text)
+    constants = suggestions.constants(lines, typed.line, type_) if name else ()
+    for constant, value in constants:
+        edit = typed.replacing(len(word), value)
+        yield Item(constant, _VALUE, edit, value, f"0{constant}", f"{value} {constant}")
+    for number, value in enumerate(suggestions.values(type_)):
+        yield Item(value, _VALUE, typed.replacing(len(word), value), sort_text=f"1{number}")
+
+
+def _in_comment(typed: Typed, comment: str, words: list[str]) -> Iterator[Item]:
+    if ignored := re.search(r"idlc:\s*ignore[\[(]\s*([\w, ]*)$", comment):
+        word = ignored[1].rpartition(",")[2].strip()
+        for code in CODES.values():
+            if code.severity is Severity.WARNING:
+                yield Item(code.id, _VALUE, typed.replacing(len(word), code.id), code.slug)
+    elif bracket := re.search(r"\[([^\[\]]*)$", comment):
+        name = words[1] if len(words) > 1 else ""
+        for number, unit in enumerate(suggestions.units_for(name)):
+            edit = typed.replacing(len(bracket[1]), unit)
+            yield Item(unit, _UNIT, edit, sort_text=f"{number:03}")

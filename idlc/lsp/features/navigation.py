@@ -1,0 +1,145 @@
+"""Where something is defined, and where it is used."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from idlc.diagnostics.source import Span
+from idlc.driver.workspace import State
+from idlc.lsp.elements import Element, elements, spot
+from idlc.lsp.protocol import AskedReferences, AtPosition, Location, Part, Range
+from idlc.lsp.world import Known, World
+from idlc.model import derive, ir
+
+_READ, _WRITE = 2, 3
+
+
+class Highlight(Part, frozen=True):
+    """A range that is about the same thing as the cursor's; `kind` 3 is where it is defined."""
+
+    range: Range
+    kind: int
+
+
+class Thing(NamedTuple):
+    """What a place is about: a definition, or the interface of that name."""
+
+    known: Known
+    name: ir.TypeName
+    element: Element | None
+
+
+def thing(world: World, asked: AtPosition) -> Thing | None:
+    """Return what a position is about; between definitions, that is the file's interface."""
+    known = world.known(asked.text_document.uri)
+    if known is None:
+        return None
+    found = spot(world, known, asked.position)
+    if found is None or found.part == "comment":
+        return Thing(known, known.interface.name, None)
+    if found.part == "type":
+        target = found.element.target
+        return Thing(known, target, None) if target else None
+    return Thing(known, known.interface.name, found.element)
+
+
+def definition(world: World, asked: AtPosition) -> Location | None:
+    """Return where the thing at a position is defined."""
+    found = thing(world, asked)
+    if found is None:
+        return None
+    if found.element is not None:
+        return world.location(found.element.name, found.known.state)
+    return _top(found.name, found.known.state, world)
+
+
+def type_definition(world: World, asked: AtPosition) -> Location | None:
+    """Return where the type of the field at a position is defined."""
+    found = thing(world, asked)
+    if found is None:
+        return None
+    target = found.element.target if found.element else found.name
+    return _top(target, found.known.state, world) if target else None
+
+
+def _top(name: ir.TypeName, state: State, world: World) -> Location | None:
+    """Return the beginning of the file of an interface."""
+    for model in state.models.values():
+        interface = model.interfaces.get(name)
+        if interface is not None and interface.source is not None:
+            return world.location(Span(interface.source, 0, 0), state)
+    source = state.source(name)
+    return world.location(Span(source, 0, 0), state) if source else None
+
+
+def references(world: World, asked: AskedReferences) -> list[Location]:
+    """Return where the thing at a position is used, in all folders, and where it is defined."""
+    found = thing(world, asked)
+    if found is None:
+        return []
+    if found.element is not None:
+        spans = list(mentions(found.element, found.known))
+        first = 0 if asked.context.include_declaration else 1
+        return [world.location(span, found.known.state) for span in spans[first:]]
+    top = _top(found.name, found.known.state, world)
+    declared = [top] if top and asked.context.include_declaration else []
+    used = [world.location(span, state) for state, span in users(found.name, world)]
+    return list(dict.fromkeys((*declared, *used)))
+
+
+def users(name: ir.TypeName, world: World) -> Iterator[tuple[State, Span]]:
+    """Yield where fields name a message in their types."""
+    for project in world.projects.all():
+        state = project.state(world.documents)
+        for model in state.models.values() if state else ():
+            for interface in model.own:
+                for section in derive.sections(interface):
+                    for field, target in section.holders:
+                        if target == name and field.type_span is not None:
+                            assert state is not None
+                            yield state, field.type_span
+
+
+def mentions(element: Element, known: Known) -> Iterator[Span]:
+    """Yield where a field or constant is defined, and where comments of its file name it.
+
+    A constant is named by its name. Fields are called like words, so they count in backticks only.
+    """
+    yield element.name
+    name = re.escape(element.body.name.text)
+    if not name:
+        return
+    is_constant = isinstance(element.meaning, ir.Constant)
+    pattern = re.compile(rf"\b{name}\b" if is_constant else rf"(?<=`){name}(?=`)")
+    for span in comments(known):
+        for match in pattern.finditer(span.text):
+            yield span.at(*match.span())
+
+
+def comments(known: Known) -> Iterator[Span]:
+    """Yield every comment of a file."""
+    from idlc.syntax.parse import parse
+
+    for section in parse(known.source).sections:
+        for line in section.lines:
+            if line.comment:
+                start = line.start + len(line.code)
+                yield Span(known.source, start, start + len(line.comment))
+
+
+def highlights(world: World, asked: AtPosition) -> list[Highlight]:
+    """Return the places of the document that are about the thing at a position."""
+    found = thing(world, asked)
+    if found is None:
+        return []
+    if found.element is not None:
+        first, *others = mentions(found.element, found.known)
+        places = [Highlight(world.range(span), _READ) for span in others]
+        return [Highlight(world.range(first), _WRITE), *places]
+    return [
+        Highlight(world.range(one.type), _READ)
+        for one in elements(found.known.source, found.known.interface)
+        if one.target == found.name
+    ]

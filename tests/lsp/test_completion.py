@@ -1,0 +1,119 @@
+"""What may come next, where one types."""
+
+import pytest
+from lsprotocol import types as lsp
+
+from tests.support.editor import at
+
+MANIFEST = """\
+<package format="3">
+  <name>demo</name>
+  <depend>std_msgs</depend>
+</package>
+"""
+
+
+@pytest.fixture(scope="module")
+def typing(editor, package):
+    """Return a function that types a text up to `|`, and returns what may come next."""
+    files = {
+        "package.xml": MANIFEST,
+        "msg/Drive.msg": "int8 x\n",
+        "msg/Wheel.msg": "int8 x\n",
+        "srv/Stop.srv": "---\n",
+    }
+    folder = package(files)
+    edits = lsp.WorkspaceClientCapabilities(apply_edit=True)
+    one = editor(folder, capabilities=lsp.ClientCapabilities(workspace=edits))
+    version = 1
+
+    def complete(text, name="msg/Drive.msg"):
+        nonlocal version
+        version += 1
+        uri = (folder / name).as_uri()
+        if version == 2 or uri not in opened:
+            opened.add(one.open(folder / name))
+        before, _, after = text.partition("|")
+        one.change(uri, before + after, version)
+        line = before.count("\n")
+        place = at(line, len(before) - before.rfind("\n") - 1)
+        found = one.ask(
+            lsp.TEXT_DOCUMENT_COMPLETION,
+            lsp.CompletionParams(lsp.TextDocumentIdentifier(uri=uri), place),
+        )
+        return {each.label: each for each in found.items}
+
+    opened = set()
+    complete.editor, complete.folder = one, folder
+    return complete
+
+
+def test_a_line_begins_with_a_type(typing):
+    found = typing("|")
+    assert {"float64", "string", "Wheel", "std_msgs/", "geometry_msgs/"} <= found.keys()
+    assert not {"Drive", "---"} & found.keys()  # itself; and a message has one section
+    assert "---" in typing("|", "srv/Stop.srv")
+
+
+def test_types_of_a_package_replace_what_was_typed(typing):
+    found = typing("std_msgs/He|")
+    item = found["std_msgs/Header"]
+    assert item.text_edit.new_text == "std_msgs/Header"
+    assert item.text_edit.range == lsp.Range(start=at(0, 0), end=at(0, 11))
+    assert item.command is None  # package.xml declares it
+    assert "std_msgs/String" in found
+
+
+def test_a_name_alone_finds_its_package(typing):
+    found = typing("int8 x\nTwistW|")
+    item = found["geometry_msgs/TwistWithCovariance"]
+    assert item.filter_text == "TwistWithCovariance"
+
+
+def test_a_package_that_is_missing_is_declared_with_the_type(typing):
+    item = typing("geometry_msgs/Tw|")["geometry_msgs/Twist"]
+    edits = []
+    client = typing.editor
+    client.answer_edits(edits)
+    command = lsp.ExecuteCommandParams(item.command.command, item.command.arguments)
+    client.ask(lsp.WORKSPACE_EXECUTE_COMMAND, command)
+    ((uri, (edit,)),) = edits[0].changes.items()
+    assert uri == (typing.folder / "package.xml").as_uri()
+    assert edit.new_text == "\n  <depend>geometry_msgs</depend>"
+    assert edit.range.start == at(2, 27)
+    assert "geometry_msgs" not in (typing.folder / "package.xml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("string<=|", "32"),
+        ("int8[<=|", "16"),
+        ("int8[|", "3"),
+        ("std_msgs/Header |", "header"),
+        ("geometry_msgs/PoseStamped[] p|", "pose_stamped"),
+        ("bool on |", "true"),
+        ("int16 a |", "-32768"),
+        ("string text |", '""'),
+        ("int8[] list |", "[]"),
+        ("uint8 LEVEL=|", "255"),
+        ("float64 MAX=|", "0.0"),
+        ("uint8 FAST=2\nuint8 mode |", "FAST"),
+        ("float64 speed  # [|", "m/s"),
+        ("float64 speed  # forwards [m|", "m/s"),
+        ("float64 speed  # [km/h] idlc: ignore[|", "IDL405"),
+    ],
+)
+def test_what_fits_comes_next(typing, text, expected):
+    assert expected in typing(text)
+
+
+@pytest.mark.parametrize("text", ["int8 x  # a |", "int8 |", "std_msgs/Header header |", "---|"])
+def test_where_nothing_fits_nothing_comes(typing, text):
+    assert typing(text) == {}
+
+
+def test_a_constant_is_written_as_its_value(typing):
+    item = typing("uint8 FAST=2\nuint8 mode |")["FAST"]
+    assert item.text_edit.new_text == "2"
+    assert "OTHER" not in typing("uint8 OTHER=3\n---\nuint8 mode |", "srv/Stop.srv")
