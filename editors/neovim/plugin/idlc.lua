@@ -1,5 +1,9 @@
 -- Starts the server for interface files, and shows the interfaces that are built into it.
 
+if not vim.lsp.enable then
+  return -- before Neovim 0.11, somebody else has to start it; there is a description in docs/editors.md
+end
+
 -- `idlc:///jazzy/std_msgs/msg/Header.msg` is a document that only the server has.
 vim.api.nvim_create_autocmd('BufReadCmd', {
   group = vim.api.nvim_create_augroup('idlc', {}),
