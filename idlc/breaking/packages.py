@@ -47,7 +47,7 @@ def compare(before: Model, after: Model) -> Comparison:
     come = [interface for name, interface in new.items() if name not in old]
     renamed = dict(_renamed(gone, come))
     changes = [_removed(one) for one in gone if one.name not in renamed]
-    changes += [_called(one, renamed[one.name]) for one in gone if one.name in renamed]
+    changes += [called(one, renamed[one.name]) for one in gone if one.name in renamed]
     found = {new.name for new in renamed.values()}
     additions = [_added(one) for one in come if one.name not in found]
     differs = bool(gone or come)
@@ -135,7 +135,8 @@ def _added(interface: ir.Interface) -> str:
     return f"{_what(interface.name.kind)} `{interface.name}`"
 
 
-def _called(old: ir.Interface, new: ir.Interface) -> Change:
+def called(old: ir.Interface, new: ir.Interface) -> Change:
+    """Return the change of an interface's name."""
     return Change(
         codes.INTERFACE_RENAMED,
         str(old.name),

@@ -20,7 +20,7 @@ from idlc.syntax import tree
 from idlc.syntax.parse import parse
 
 # the lengths are bounded, or a long comment without an end would take for ever
-_REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
+REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
 
 
 class Remark(msgspec.Struct, frozen=True):
@@ -109,7 +109,7 @@ def _remarks(source: Source) -> Iterator[Remark]:
 
 
 def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Iterator[Remark]:
-    match = re.search(_REMARK, line.comment)
+    match = re.search(REMARK, line.comment)
     if match is None:
         return
     start = line.start + len(line.code)

@@ -112,12 +112,41 @@ def _against(
     return _compare(options, given, None, report)
 
 
+def earlier(
+    options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
+) -> dict[str, Model]:
+    """Return the models of packages as they are in a folder or git revision; empty after errors."""
+    if not options.against.startswith(GIT):
+        return _before(options, given, None, report)
+    with checked_out(options.against.removeprefix(GIT), options.paths[0], report) as revision:
+        return _before(options, given, revision, report) if revision else {}
+
+
 def _compare(
     options: BreakingOptions,
     given: tuple[inputs.Inputs, ...],
     revision: Revision | None,
     report: Report,
 ) -> Comparison | None:
+    before = _before(options, given, revision, report)
+    after = _models(given, options.scope, report)
+    if report.had_errors:
+        return None
+    with stage("compare", options.against):
+        found = [
+            compare(model, after[package]) if package in after else removed_package(model)
+            for package, model in before.items()
+        ]
+        new = (model for package, model in after.items() if package not in before)
+        return together([*found, *map(added_package, new)])
+
+
+def _before(
+    options: BreakingOptions,
+    given: tuple[inputs.Inputs, ...],
+    revision: Revision | None,
+    report: Report,
+) -> dict[str, Model]:
     scope = options.scope
     if revision is None:
         files = find([options.against], report, scope.exclude)
@@ -128,17 +157,7 @@ def _compare(
             scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
         )
     old = _named_alike(inputs.packages(files, scope, report), given, files, scope, report)
-    after = _models(given, options.scope, report)
-    before = _models(old, scope, report)
-    if report.had_errors:
-        return None
-    with stage("compare", options.against):
-        found = [
-            compare(model, after[package]) if package in after else removed_package(model)
-            for package, model in before.items()
-        ]
-        new = (model for package, model in after.items() if package not in before)
-        return together([*found, *map(added_package, new)])
+    return _models(old, scope, report)
 
 
 def _named_alike(

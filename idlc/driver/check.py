@@ -56,13 +56,13 @@ def check(options: CheckOptions, report: Report) -> Checked:
 
         found = _once(options, report)[1]
         if not report.had_errors:
-            fixed = edit((one for problem in found for one in problem.edits), report, _tidied)
+            fixed = edit((one for problem in found for one in problem.edits), report, tidied)
     checked, found = _once(options, report)
     report.extend(found)
     return msgspec.structs.replace(checked, fixed=fixed)
 
 
-def _tidied(name: str, old: str, new: str) -> str:
+def tidied(name: str, old: str, new: str) -> str:
     """Return an edited file as `idlc fmt` has it, if it was so before."""
     from idlc.diagnostics.source import Source
     from idlc.model.ir import KINDS

@@ -17,7 +17,7 @@ from idlc.disk import command_settings, environment, inputs, pyproject
 from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.find import look, root_of
 from idlc.disk.package_names import locks, places
-from idlc.disk.read import MAX_SIZE, Unsaved, absolute
+from idlc.disk.read import MAX_SIZE, NOTHING_OPEN, Unsaved, absolute
 from idlc.disk.scope import scope
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
@@ -113,6 +113,7 @@ class Workspace:
         Raises OSError if the folder is gone.
         """
         self._fixed = report = Report()
+        self._earlier: dict[str, Mapping[str, Model]] = {}
         self._packages: tuple[inputs.Inputs, ...] = ()
         with working_in(self.folder):
             wishes = self._wishes
@@ -159,6 +160,14 @@ class Workspace:
         self._packages = tuple(packages)
         return True
 
+    def state_with(self, path: Path, text: str) -> State | None:
+        """Return what would be known with another text for a file; nothing is changed."""
+        packages = self._packages
+        try:
+            return self.state() if self.change(path, text.encode("utf-8", "replace")) else None
+        finally:
+            self._packages = packages
+
     def _is_named_by_lock(self, number: int) -> bool:
         """Return whether the texts of a package may decide what it is called."""
         home = self._packages[number].home
@@ -194,6 +203,23 @@ class Workspace:
         with working_in(self.folder):
             found = next(iter(self._checkers.values())).around(given)
         return dependency(found, package) if found else None
+
+    def earlier(self, against: str) -> Mapping[str, Model]:
+        """Return the packages' models as they are in a git revision or folder.
+
+        They are compiled once after each load; empty if they cannot be.
+        """
+        if against not in self._earlier:
+            from idlc.driver.breaking import BreakingOptions, earlier
+
+            report = Report()
+            paths = tuple(one.home.as_posix() for one in self._packages)
+            scope = msgspec.structs.replace(self._scope, unsaved=NOTHING_OPEN)
+            options = BreakingOptions(paths, against, scope)
+            with working_in(self.folder):
+                found = earlier(options, self._packages, report) if paths else {}
+            self._earlier[against] = {} if report.had_errors else found
+        return self._earlier[against]
 
     @property
     def _library(self) -> Library:

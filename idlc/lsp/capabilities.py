@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import dependencies, positions
+from idlc.lsp import dependencies, positions, token_kinds
 from idlc.lsp.world import World
 
 
@@ -38,6 +38,18 @@ CAPABILITIES: dict[str, object] = {
         "workspaceDiagnostics": True,
     },
     "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "]},
+    "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc"]},
+    "renameProvider": {"prepareProvider": True},
+    "inlayHintProvider": True,
+    "codeLensProvider": {"resolveProvider": True},
+    "semanticTokensProvider": {
+        "legend": {"tokenTypes": token_kinds.TYPES, "tokenModifiers": token_kinds.MODIFIERS},
+        "full": True,
+        "range": True,
+    },
+    "foldingRangeProvider": True,
+    "selectionRangeProvider": True,
+    "documentLinkProvider": {},
     "executeCommandProvider": {"commands": [dependencies.COMMAND]},
     "hoverProvider": True,
     "definitionProvider": True,
@@ -51,6 +63,9 @@ CAPABILITIES: dict[str, object] = {
     "documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n"},
     "workspace": {
         "textDocumentContent": {"schemes": ["idlc"]},
+        "fileOperations": {
+            "willRename": {"filters": [{"pattern": {"glob": "**/*.{msg,srv,action}"}}]}
+        },
         "workspaceFolders": {"supported": True, "changeNotifications": True},
     },
 }

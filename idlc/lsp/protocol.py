@@ -44,7 +44,7 @@ class Message(msgspec.Struct):
 
 
 class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
-    """What all parts of messages have in common: camel case, and nothing that is not needed."""
+    """What all parts of messages have in common: camel case, and only what is not a default."""
 
 
 class Position(Part, frozen=True):
@@ -144,6 +144,29 @@ class AtPosition(Part, frozen=True):
     position: Position
 
 
+class AtPositions(Part, frozen=True):
+    """What is asked about several places of a document."""
+
+    text_document: DocumentId
+    positions: tuple[Position, ...]
+
+
+class Action(Part, frozen=True):
+    """What a lens does, or only says if there is no command."""
+
+    title: str
+    command: str
+    arguments: tuple[Any, ...] = ()
+
+
+class Lens(Part, frozen=True):
+    """A text above a line; it gets its `command` when it is shown."""
+
+    range: Range
+    command: Action | None = None
+    data: Any = None
+
+
 class OfRange(Part, frozen=True):
     """What is asked about a part of a document."""
 
@@ -167,6 +190,46 @@ class AskedSymbols(Part, frozen=True):
     """workspace/symbol."""
 
     query: str = ""
+
+
+class GivenProblem(Part, frozen=True):
+    """A diagnostic that the client shows."""
+
+    range: Range
+    message: str = ""
+    code: Any = None
+
+
+class ActionContext(Part, frozen=True):
+    """Which actions are asked for; all without `only`."""
+
+    diagnostics: tuple[GivenProblem, ...] = ()
+    only: tuple[str, ...] | None = None
+
+
+class AskedActions(OfRange, frozen=True):
+    """textDocument/codeAction."""
+
+    context: ActionContext = ActionContext()
+
+
+class AskedRename(AtPosition, frozen=True):
+    """textDocument/rename."""
+
+    new_name: str
+
+
+class FileRename(Part, frozen=True):
+    """The old and the new URI of a file."""
+
+    old_uri: str
+    new_uri: str
+
+
+class AskedFileRenames(Part, frozen=True):
+    """workspace/willRenameFiles."""
+
+    files: tuple[FileRename, ...]
 
 
 class Command(Part, frozen=True):

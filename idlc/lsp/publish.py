@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from idlc.diagnostics import code_pages, codes
@@ -50,20 +51,26 @@ class Shown(Part, frozen=True):
 def diagnostics(world: World) -> dict[str, list[Shown]]:
     """Return the problems of all documents that have any, by URI."""
     found: dict[str, dict[Shown, None]] = {}
-    inner: list[Project] = []
-    for project in world.projects.all():
-        state = project.state(world.documents)
+    for path, one, state in problems(world):
+        found.setdefault(world.uri(path), {})[shown(one, state, world)] = None
+    for project in world.projects:
         if project.failure is not None:
             failed = world.uri(project.folder / project.failure.path)
             found.setdefault(failed, {})[_shown(project.failure, _TOP)] = None
-        if state is None:
-            continue
-        for one in state.problems:
+    return {uri: list(some) for uri, some in found.items()}
+
+
+def problems(world: World) -> Iterator[tuple[Path, Diagnostic, State]]:
+    """Yield the problems of all folders, each with its file; the innermost folder counts."""
+    inner: list[Project] = []
+    for project in world.projects.all():
+        state = project.state(world.documents)
+        for one in state.problems if state else ():
+            assert state is not None
             path = _path(one, state)
             if path is not None and not any(other.has(path) for other in inner):
-                found.setdefault(world.uri(path), {})[shown(one, state, world)] = None
+                yield path, one, state
         inner.append(project)
-    return {uri: list(some) for uri, some in found.items()}
 
 
 def _path(problem: Diagnostic, state: State) -> Path | None:

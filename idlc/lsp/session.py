@@ -42,7 +42,7 @@ class Session:
         self.is_shut_down = False
         self._notify = notify
         self._ask = ask
-        self.world = World(ask)
+        self.world = World(ask, notify)
         self._begun = False
         self._client: int | None = None
         self._changed = False

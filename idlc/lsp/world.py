@@ -39,9 +39,14 @@ class Known(NamedTuple):
 class World:
     """The state of a server."""
 
-    def __init__(self, ask: Callable[..., None] = lambda *_: None) -> None:
-        #: Asks the client something: a method, and what it is given.
+    def __init__(
+        self,
+        ask: Callable[..., None] = lambda *_: None,
+        tell: Callable[..., None] = lambda *_: None,
+    ) -> None:
+        #: Ask the client something, and tell it something: a method, and what it is given.
         self.ask = ask
+        self.tell = tell
         self.documents = Documents()
         self.projects = Projects(self.documents)
         self.encoding = positions.DEFAULT
@@ -53,7 +58,7 @@ class World:
         found: Any = self.client
         for name in path:
             found = found.get(name) if isinstance(found, dict) else None
-        return bool(found)
+        return found not in (None, False)
 
     def settle(self, given: object) -> str:
         """Take the client's settings; return what is wrong with them, empty if nothing is."""

@@ -52,7 +52,7 @@ def definition(world: World, asked: AtPosition) -> Location | None:
         return None
     if found.element is not None:
         return world.location(found.element.name, found.known.state)
-    return _top(found.name, found.known.state, world)
+    return top(found.name, found.known.state, world)
 
 
 def type_definition(world: World, asked: AtPosition) -> Location | None:
@@ -61,10 +61,10 @@ def type_definition(world: World, asked: AtPosition) -> Location | None:
     if found is None:
         return None
     target = found.element.target if found.element else found.name
-    return _top(target, found.known.state, world) if target else None
+    return top(target, found.known.state, world) if target else None
 
 
-def _top(name: ir.TypeName, state: State, world: World) -> Location | None:
+def top(name: ir.TypeName, state: State, world: World) -> Location | None:
     """Return the beginning of the file of an interface."""
     for model in state.models.values():
         interface = model.interfaces.get(name)
@@ -81,10 +81,11 @@ def references(world: World, asked: AskedReferences) -> list[Location]:
         return []
     if found.element is not None:
         spans = list(mentions(found.element, found.known))
-        first = 0 if asked.context.include_declaration else 1
-        return [world.location(span, found.known.state) for span in spans[first:]]
-    top = _top(found.name, found.known.state, world)
-    declared = [top] if top and asked.context.include_declaration else []
+        if not asked.context.include_declaration:
+            del spans[0]
+        return [world.location(span, found.known.state) for span in spans]
+    first = top(found.name, found.known.state, world)
+    declared = [first] if first and asked.context.include_declaration else []
     used = [world.location(span, state) for state, span in users(found.name, world)]
     return list(dict.fromkeys((*declared, *used)))
 
