@@ -74,14 +74,16 @@ class State(msgspec.Struct, frozen=True, dict=True):
         return frozenset(one.where[0] for one in errors)
 
     def model_of(self, interface: ir.Interface) -> Model | None:
-        """Return the model that an interface is in, `None` if there are errors in what it needs."""
+        """Return a model of an interface, `None` if there are errors in what it needs.
+
+        Other interfaces of the package may have some.
+        """
         for model in self.models.values():
             if model.interfaces.get(interface.name) is interface:
                 reach = model.reach(interface.name)
                 paths = {one.source.path for one in reach if one and one.source}
-                return (
-                    model if model.is_sound(interface.name) and not paths & self._broken else None
-                )
+                is_sound = model.is_sound(interface.name) and not paths & self._broken
+                return model.alone(interface) if is_sound else None
         return None
 
     def source(self, name: ir.TypeName) -> Source | None:

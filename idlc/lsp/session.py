@@ -158,6 +158,7 @@ class Session:
 
     def _open(self, given: DidOpen) -> None:
         document = self.world.documents.open(given.text_document)
+        self._told.pop(document.uri, None)  # the client may have dropped it since
         self._follow(document, document.data)
 
     def _change(self, given: DidChange) -> None:

@@ -99,6 +99,11 @@ class Model:
         for one in self.own:
             yield Model(self.package, (one,), self.interfaces, self._pool), self.reach(one.name)
 
+    def alone(self, interface: ir.Interface) -> Model:
+        """Return the model of one interface and all that it refers to."""
+        needed = {one.name: one for one in self.reach(interface.name) if one}
+        return Model(self.package, (interface,), needed, self._pool)
+
     def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
         """Return an interface with all that it refers to, `None` for what there is not."""
         return self._pool.reach(name) if self._pool else (self.interfaces.get(name),)

@@ -61,7 +61,8 @@ def test_types_of_a_package_replace_what_was_typed(typing):
     assert item.text_edit.new_text == "std_msgs/Header"
     assert item.text_edit.range == lsp.Range(start=at(0, 0), end=at(0, 11))
     assert item.command is None  # package.xml declares it
-    assert "std_msgs/String" in found
+    assert "std_msgs/String" in typing("std_msgs/|")
+    assert "std_msgs/String" not in found  # Neovim leaves it to the server
 
 
 def test_a_name_alone_finds_its_package(typing):

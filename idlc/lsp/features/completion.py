@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,6 +57,11 @@ class Typed(NamedTuple):
     before: str
     encoding: str
 
+    def after(self, start: int) -> str:
+        """Return what was typed after a place in the line."""
+        places = accumulate((units(one, self.encoding) for one in self.before), initial=0)
+        return self.before[list(places).index(start) :]
+
     def replacing(self, length: int, text: str) -> TextEdit:
         """Return the edit that puts a text in the place of the last characters."""
         end = units(self.before, self.encoding)
@@ -74,7 +80,14 @@ def complete(world: World, asked: AtPosition) -> Items:
     line, at = in_lines(lines, asked.position, world.encoding)
     typed = Typed(document, path, project, line, lines[line][:at], world.encoding)
     items = tuple(_items(typed, world))
-    return Items(len(items) >= MOST, items)
+    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, typed)))
+
+
+def _fits(item: Item, typed: Typed) -> bool:
+    """Return whether what an item replaces has its letters in that order; not all editors look."""
+    start = item.text_edit.range.start.character
+    letters = iter((item.filter_text or item.label).lower())
+    return all(one in letters for one in typed.after(start).lower())
 
 
 def _items(typed: Typed, world: World) -> Iterator[Item]:

@@ -1,0 +1,1 @@
+vim.filetype.add({ extension = { msg = 'rosmsg', srv = 'rosmsg', action = 'rosmsg' } })

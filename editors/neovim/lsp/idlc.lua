@@ -1,0 +1,8 @@
+-- The server, for `vim.lsp.enable('idlc')`. `rosidlc` is idlc; Cyclone DDS has another program of that name.
+return {
+  cmd = { 'rosidlc', 'lsp' },
+  filetypes = { 'rosmsg' },
+  -- the whole workspace if it is a repository, so that users in other packages are found
+  root_markers = { '.git', 'package.xml' },
+  settings = { idlc = {} },
+}

@@ -1,0 +1,119 @@
+/** The server's life: found, started, stopped, started again; and what is told of it. */
+
+import * as vscode from "vscode";
+import { LanguageClient, State, TransportKind } from "vscode-languageclient/node";
+import { find, setting, words, type Found } from "./find";
+
+/** What is synchronized: interfaces, and the files that say what they belong to. */
+const DOCUMENTS = [
+  { language: "rosmsg" },
+  { scheme: "file", pattern: "**/package.xml" },
+  { scheme: "file", pattern: "**/pyproject.toml" },
+];
+
+export class Server {
+  /** Which idlc serves, once it was found. */
+  found: Found | undefined;
+  private client: LanguageClient | undefined;
+  private last: Promise<void> = Promise.resolve();
+  private readonly status: vscode.LanguageStatusItem;
+
+  constructor(
+    private readonly log: vscode.LogOutputChannel,
+    private readonly folder: string,
+  ) {
+    this.status = vscode.languages.createLanguageStatusItem("idlc", { language: "rosmsg" });
+    this.status.name = "idlc";
+  }
+
+  /** Start the server, or stop it and start it again. */
+  restart(): Promise<void> {
+    return this.next(async () => {
+      await this.end();
+      await this.begin();
+    });
+  }
+
+  stop(): Promise<void> {
+    return this.next(() => this.end());
+  }
+
+  /** Do one thing after the other, whatever became of the one before. */
+  private next(work: () => Promise<void>): Promise<void> {
+    this.last = this.last.then(work).catch((error: unknown) => {
+      this.log.error(String(error));
+      this.show("idlc failed", vscode.LanguageStatusSeverity.Error, "idlc.log", "Show the log");
+    });
+    return this.last;
+  }
+
+  private async end(): Promise<void> {
+    const client = this.client;
+    this.client = undefined;
+    await client?.dispose();
+  }
+
+  private async begin(): Promise<void> {
+    this.status.busy = true;
+    this.found = await find((line) => this.log.info(line), this.folder);
+    this.status.busy = false;
+    if (this.found === undefined) {
+      this.missing();
+      return;
+    }
+    const { command, version } = this.found;
+    this.log.info(`${words(command)}: idlc ${version}`);
+    const options = {
+      command: command.program,
+      args: [...command.args, "lsp"],
+      options: { cwd: this.folder },
+      transport: TransportKind.stdio,
+    };
+    this.client = new LanguageClient("idlc", "idlc", options, {
+      documentSelector: DOCUMENTS,
+      outputChannel: this.log,
+    });
+    this.client.onDidChangeState(({ newState }) => {
+      if (newState === State.Running) {
+        this.show(`idlc ${version}`, vscode.LanguageStatusSeverity.Information);
+        this.status.detail = words(command);
+      } else if (newState === State.Stopped) {
+        this.show("idlc stopped", vscode.LanguageStatusSeverity.Error, "idlc.restart", "Restart");
+      }
+    });
+    await this.client.start();
+  }
+
+  private show(
+    text: string,
+    severity: vscode.LanguageStatusSeverity,
+    command = "idlc.log",
+    title = "Log",
+  ): void {
+    this.status.text = text;
+    this.status.detail = "";
+    this.status.severity = severity;
+    this.status.command = { command, title };
+  }
+
+  /** Say that there is no server, and what leads on. */
+  private missing(): void {
+    const named = setting("path") || setting("interpreter");
+    const text = named ? `${named} does not serve editors` : "idlc is not installed";
+    this.show(text, vscode.LanguageStatusSeverity.Warning, "idlc.install", "Install idlc");
+    const ways: Record<string, () => unknown> = {
+      "Install": () => vscode.commands.executeCommand("idlc.install"),
+      "Use uvx": () => vscode.workspace.getConfiguration("idlc").update("uvx", true, true),
+      "Settings": () => vscode.commands.executeCommand("workbench.action.openSettings", "idlc."),
+      "Log": () => this.log.show(),
+    };
+    const offered = Object.keys(ways).filter((way) => !(named && way === "Use uvx"));
+    void vscode.window
+      .showWarningMessage(`${text}, so .msg, .srv and .action files only have colours.`, ...offered)
+      .then((way) => way && ways[way]?.());
+  }
+
+  dispose(): void {
+    this.status.dispose();
+  }
+}

@@ -1,0 +1,235 @@
+-- What Neovim shows of a package, as JSON in the file that $SEEN names; `scenario.py` is what it does.
+--
+-- Keys are typed, and the editor's own functions are called. All of it runs between events, in a
+-- coroutine, or the editor could not do what it is asked for.
+
+local PATIENCE = 4000 -- milliseconds that anything may take
+local seen = {}
+local script
+
+local function wait(what, check)
+  local left = PATIENCE / 20
+  while left > 0 do
+    local found = check()
+    if found then
+      return found
+    end
+    left = left - 1
+    vim.defer_fn(function()
+      coroutine.resume(script)
+    end, 20)
+    coroutine.yield()
+  end
+  error('there was no ' .. what)
+end
+
+local function text()
+  return table.concat(vim.api.nvim_buf_get_lines(0, 0, -1, false), '\n') .. '\n'
+end
+
+local function name(path)
+  return vim.fn.fnamemodify(path, ':t')
+end
+
+local function type_keys(keys)
+  vim.api.nvim_feedkeys(vim.api.nvim_replace_termcodes(keys, true, false, true), 't', false)
+end
+
+-- Open a file as it is on disk, with the cursor on a word of a line.
+local function open(path, line, word)
+  vim.cmd('silent edit! ' .. path)
+  local at = line and vim.fn.getline(line):find(word, 1, true)
+  vim.api.nvim_win_set_cursor(0, { line or 1, (at or 1) - 1 })
+end
+
+local function problems()
+  local found = {}
+  for _, one in ipairs(vim.diagnostic.get(0)) do
+    table.insert(found, { one.code, one.message, one.lnum, one.col, one.end_lnum, one.end_col })
+  end
+  return #found > 0 and found
+end
+
+local function places(list)
+  local found = {}
+  for _, one in ipairs(list) do
+    table.insert(found, { name(vim.fn.bufname(one.bufnr)), one.lnum, one.col, one.text })
+  end
+  return #found > 0 and found
+end
+
+-- What a command put into the list of places.
+local function listed(what, command)
+  vim.fn.setqflist({})
+  vim.fn.setloclist(0, {})
+  command()
+  local found = wait(what, function()
+    return places(vim.fn.getqflist()) or places(vim.fn.getloclist(0))
+  end)
+  vim.cmd('silent! cclose | silent! lclose')
+  return found
+end
+
+local CAPABILITIES = {
+  diagnostic = function()
+    open('msg/Broken.msg')
+    return wait('problem', problems)
+  end,
+  fix = function()
+    open('msg/Broken.msg', 1, 'flot64')
+    wait('problem', problems)
+    local titles = {}
+    vim.ui.select = function(actions, options, choose)
+      for _, one in ipairs(actions) do
+        table.insert(titles, options.format_item(one))
+      end
+      choose(actions[1], 1)
+    end
+    local before = text()
+    vim.lsp.buf.code_action()
+    wait('fix', function()
+      return text() ~= before
+    end)
+    return { titles = titles, text = text() }
+  end,
+  hover = function()
+    open('msg/Fleet.msg', 1, 'Drive')
+    vim.lsp.buf.hover()
+    return wait('window', function()
+      for _, window in ipairs(vim.api.nvim_list_wins()) do
+        if vim.api.nvim_win_get_config(window).relative ~= '' then
+          local lines = vim.api.nvim_buf_get_lines(vim.api.nvim_win_get_buf(window), 0, -1, false)
+          vim.api.nvim_win_close(window, true)
+          return table.concat(lines, '\n')
+        end
+      end
+    end)
+  end,
+  definition = function()
+    open('msg/Fleet.msg', 1, 'Drive')
+    vim.lsp.buf.definition()
+    wait('jump', function()
+      return name(vim.fn.bufname()) ~= 'Fleet.msg'
+    end)
+    return name(vim.fn.bufname())
+  end,
+  built_in = function()
+    open('msg/Drive.msg', 3, 'Header')
+    vim.lsp.buf.definition()
+    wait('jump', function()
+      return name(vim.fn.bufname()) == 'Header.msg'
+    end)
+    return { text = text(), line = vim.fn.getline('.'), language = vim.bo.filetype }
+  end,
+  references = function()
+    open('msg/Fleet.msg', 1, 'Drive')
+    return listed('reference', function()
+      vim.lsp.buf.references()
+    end)
+  end,
+  completion = function()
+    open('msg/Fleet.msg')
+    type_keys('Gostd_msgs/Head<C-x><C-o>')
+    wait('menu', function()
+      return vim.fn.pumvisible() == 1
+    end)
+    local words = {}
+    for _, one in ipairs(vim.fn.complete_info({ 'items' }).items) do
+      table.insert(words, one.abbr ~= '' and one.abbr or one.word)
+    end
+    type_keys('<C-y><Esc>')
+    wait('end', function()
+      return vim.fn.mode() == 'n'
+    end)
+    return { words = words, line = vim.fn.getline('.') }
+  end,
+  rename = function()
+    open('msg/Drive.msg', 4, 'speed')
+    vim.lsp.buf.rename('velocity')
+    wait('rename', function()
+      return text():find('velocity', 1, true)
+    end)
+    return text()
+  end,
+  format = function()
+    open('msg/Untidy.msg')
+    local format = vim.lsp.buf.format or vim.lsp.buf.formatting_sync
+    format()
+    return text()
+  end,
+  symbol = function()
+    open('msg/Drive.msg')
+    return listed('symbol', function()
+      vim.lsp.buf.document_symbol()
+    end)
+  end,
+  inlay_hint = vim.lsp.inlay_hint and function()
+    open('msg/Drive.msg')
+    vim.lsp.inlay_hint.enable(true)
+    return wait('hint', function()
+      local found = {}
+      for _, one in ipairs(vim.lsp.inlay_hint.get({ bufnr = 0 })) do
+        local label = one.inlay_hint.label
+        if type(label) == 'table' then
+          label = label[1].value
+        end
+        table.insert(found, { one.inlay_hint.position.line, label })
+      end
+      return #found > 0 and found
+    end)
+  end,
+}
+
+-- Neovim 0.7 has neither `vim.lsp.enable`, which the plugin calls, nor `vim.lsp.start`.
+local function attach_old()
+  local client
+  vim.api.nvim_create_autocmd('FileType', {
+    pattern = 'rosmsg',
+    callback = function()
+      client = client
+        or vim.lsp.start_client({
+          name = 'idlc',
+          cmd = { 'rosidlc', 'lsp' },
+          root_dir = vim.fn.getcwd(),
+        })
+      vim.lsp.buf_attach_client(0, client)
+      vim.bo.omnifunc = 'v:lua.vim.lsp.omnifunc'
+    end,
+  })
+end
+
+local function main()
+  if not vim.lsp.enable then
+    attach_old()
+  end
+  vim.o.completeopt = 'menuone'
+  open('msg/Drive.msg')
+  wait('server', function()
+    local clients = vim.lsp.get_clients or vim.lsp.buf_get_clients
+    for _, client in pairs(clients()) do
+      return client.initialized
+    end
+  end)
+  for capability, look in pairs(CAPABILITIES) do
+    local ok, found = pcall(look)
+    seen[capability] = ok and found or { failed = found }
+    vim.cmd('silent! stopinsert | silent! pclose')
+  end
+  vim.cmd('silent edit! msg/Drive.msg')
+  seen.language = vim.bo.filetype
+  seen.syntax = vim.fn.synIDattr(vim.fn.synID(4, 1, 1), 'name')
+end
+
+local function run()
+  local ok, problem = pcall(main)
+  if not ok then
+    seen.failed = problem
+  end
+  vim.fn.writefile({ vim.fn.json_encode(seen) }, vim.env.SEEN)
+  vim.cmd('qa!')
+end
+
+script = coroutine.create(run)
+vim.defer_fn(function()
+  coroutine.resume(script)
+end, 0)
