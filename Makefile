@@ -14,7 +14,7 @@ PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
 BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/dev/null),yes,no)
 LOCKED ?= no
-INTERPRETERS ?= 3.10 3.11 3.12 3.13
+INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
 ARGS ?=
 FUZZ ?= 5000
 SEED ?= 2
@@ -26,6 +26,7 @@ KILTED_ENV := .venv/kilted-$(KIND)
 LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 DEMO_ENV := .venv/demo-$(TAG)
+RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
@@ -35,7 +36,7 @@ SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
-LOCKS := build test-ros test-kilted test-lowest
+LOCKS := build release test-ros test-kilted test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
 # Nothing that we run leaves this machine.
@@ -43,7 +44,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench lock clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench lock site \
+    release-check clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -100,6 +102,12 @@ example: $(TEST_ENV)/installed ## compile the committed example again
 bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says what else it can do
 	@$(BENCH_ENV)/bin/python -m benchmarks --json build/benchmarks.json $(ARGS)
 
+site: $(RELEASE_ENV)/installed ## write the pages that are published, into build/site
+	$(RELEASE_ENV)/bin/python -m idlc docs examples/my_robot_controller -o build/site
+
+release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
+	$(RELEASE_ENV)/bin/python -m release check $(ARGS)
+
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
@@ -109,6 +117,8 @@ lock: ## choose the versions for CI again, and write down their hashes
 	    --output-file requirements/test-lowest.txt
 	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints requirements/test-ros.txt \
 	    --output-file requirements/build.txt
+	$(UV_COMPILE) pyproject.toml --extra release --constraints requirements/build.txt \
+	    --output-file requirements/release.txt
 
 clean: ## remove environments and everything that was built
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
@@ -118,6 +128,7 @@ $(TEST_ENV)/installed: EXTRA := $(TEST_EXTRA)
 $(KILTED_ENV)/installed: EXTRA := test-kilted
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
 $(DEMO_ENV)/installed: EXTRA := ros
+$(RELEASE_ENV)/installed: EXTRA := release
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
 # there already is brought up to date.

@@ -1,3 +1,3 @@
 """idlc: the ROS 2 interface compiler for Python."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
