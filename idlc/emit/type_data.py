@@ -39,7 +39,8 @@ def content(model: link.Model) -> TypesDict:
             for one in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[one["type_name"]] = one
     sources = {
-        str(interface.name): interface.source.text
+        # rosidl reads texts so, and no checkout of git's makes a difference then
+        str(interface.name): interface.source.text.replace("\r\n", "\n").replace("\r", "\n")
         for interface in model.own
         if interface.source is not None
     }
