@@ -66,8 +66,8 @@ ifeq ($(BROWSER),no)
 endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
-test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
-	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py tests/ros/test_native_*.py $(ARGS)
+test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
+	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/project/every_python.sh $(INTERPRETERS)
