@@ -28,6 +28,7 @@ LOWEST_ENV := .venv/lowest-$(TAG)
 BENCH_ENV := $(if $(filter no,$(ROS)),$(TEST_ENV),.venv/bench-$(TAG))
 DEMO_ENV := .venv/demo-$(TAG)
 SITE_ENV := $(if $(filter no,$(ROS)),.venv/site-$(TAG),$(TEST_ENV))
+RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
@@ -38,7 +39,7 @@ SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
-LOCKS := build test-ros test-kilted test-lowest
+LOCKS := build release test-ros test-kilted test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
 # Nothing that we run leaves this machine.
@@ -46,7 +47,8 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench site lock clean
+.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench site lock \
+    release-check clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -106,6 +108,9 @@ bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says w
 site: $(SITE_ENV)/installed ## write the documentation site into build/site
 	$(SITE_ENV)/bin/python -m website build/site
 
+release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
+	$(RELEASE_ENV)/bin/python -m release check $(ARGS)
+
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
@@ -115,6 +120,8 @@ lock: ## choose the versions for CI again, and write down their hashes
 	    --output-file requirements/test-lowest.txt
 	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints requirements/test-ros.txt \
 	    --output-file requirements/build.txt
+	$(UV_COMPILE) pyproject.toml --extra release --constraints requirements/build.txt \
+	    --output-file requirements/release.txt
 
 clean: ## remove environments and everything that was built
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
@@ -125,6 +132,7 @@ $(KILTED_ENV)/installed: EXTRA := test-kilted
 $(BENCH_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),test,bench)
 $(DEMO_ENV)/installed: EXTRA := ros
 $(SITE_ENV)/installed: EXTRA := $(if $(filter no,$(ROS)),docs,test-ros)
+$(RELEASE_ENV)/installed: EXTRA := release
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
 # there already is brought up to date.

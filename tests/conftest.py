@@ -1,18 +1,18 @@
 import os
 import signal
+import sys
 import tempfile
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.support import generated
+from tests.support.windows import NOT_THERE
 
 # Who starts tests in the background may ignore these, and what tests start would, too.
-for number, handler in (
-    (signal.SIGINT, signal.default_int_handler),
-    (signal.SIGHUP, signal.SIG_DFL),
-):
-    if signal.getsignal(number) == signal.SIG_IGN:
+for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.SIG_DFL)):
+    number = getattr(signal, name, None)  # Windows has only the first
+    if number is not None and signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
 
 # What tests load is kept for this run alone, in all its processes.
@@ -24,6 +24,14 @@ settings.register_profile(
     "idlc", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("idlc")
+
+
+def pytest_collection_modifyitems(items):
+    """Leave out on Windows, and name, what cannot be there."""
+    for item in items if sys.platform == "win32" else ():
+        for name, reason in NOT_THERE.items():
+            if name in item.nodeid:
+                item.add_marker(pytest.mark.skip(reason=reason))
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from idlc.cli import streams
+
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
 PIPE_CLOSED = 141
@@ -20,9 +22,7 @@ class PipeClosedError(Exception):
 
 def ended(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, ValueError):
-            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+    streams.set_up()
     try:
         Path.cwd()
     except OSError:

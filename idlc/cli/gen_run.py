@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
-from idlc.cli import output
+from idlc.cli import output, reports
 from idlc.diagnostics.formats.terminal import counted, summary
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
@@ -22,25 +23,50 @@ def completed(wanted: GenOptions, settings: Config) -> GenOptions:
     )
 
 
+def refuse(report: Report, style: str) -> None:
+    """Show problems that leave nothing to be done."""
+    if style == "text":
+        output.show(report, style, sys.stderr)
+    else:
+        _document(report, style)
+
+
 def once(wanted: GenOptions, style: str) -> int:
     """Run once, show what happened and return the exit status."""
     report = Report()
     packages = gen(wanted, report)
-    if style == "json":
-        output.show(report, style, sys.stdout)
-        for package in packages:
-            output.fact(sys.stdout, "package", **package._asdict(), check=wanted.check)
-        output.fact(sys.stdout, "summary", **output.counts(report))
-        return output.status(report)
-    output.show(report, style, sys.stderr)
+    if style == "text":
+        _tell(report, packages, wanted.check)
+    else:
+        _document(report, style, packages, check=wanted.check)
+    return output.status(report)
+
+
+def _document(
+    report: Report, style: str, packages: Sequence[Generated] = (), *, check: bool = False
+) -> None:
+    """Write what happened in a format for programs."""
+    if style != "json":
+        from idlc.driver.check import Checked  # with its rules, which a run does without
+
+        folders = tuple(package.out for package in packages)
+        reports.write(report, style, Checked(folders), sys.stdout, command="gen")
+        return
+    output.show(report, style, sys.stdout)
+    for package in packages:
+        output.fact(sys.stdout, "package", **package._asdict(), check=check)
+    output.fact(sys.stdout, "summary", **output.counts(report))
+
+
+def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
+    output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     if report.had_errors:
-        outcome = "" if wanted.check else "; nothing was written"
+        outcome = "" if check else "; nothing was written"
         sys.stderr.write(f"{summary(report)}{outcome}\n")
     else:
         for package in packages:
-            sys.stdout.write(_line(package, wanted.check))
-    return output.status(report)
+            sys.stdout.write(_line(package, check))
 
 
 def _line(package: Generated, check: bool) -> str:

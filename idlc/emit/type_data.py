@@ -40,7 +40,8 @@ def content(model: link.Model) -> TypesDict:
             for one in (full["type_description"], *full["referenced_type_descriptions"]):
                 descriptions[one["type_name"]] = one
     sources = {
-        str(interface.name): file_text(interface)
+        # rosidl reads texts so, and no checkout of git's makes a difference then
+        str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
         for interface in model.own
         if interface.source is not None
     }

@@ -15,6 +15,7 @@ from idlc import __version__
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
 from idlc.diagnostics import codes
+from idlc.diagnostics.formats import DOCUMENTS
 from tests.support.files import write
 from tests.support.paths import ROOT
 
@@ -274,6 +275,27 @@ def test_json_output_is_one_object_per_line():
         "IDL617",
     }
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("style", DOCUMENTS)
+def test_what_ci_systems_read_of_generated_code(style):
+    """One whole document, whatever there is to say, and nothing of it for people."""
+    make("demo/msg/A.msg", "float64 a\n")
+    words = ("gen", "demo", "-o", "out/demo", "--format", style)
+    missing = idlc(*words, "--check")
+    assert missing.returncode == 1
+    assert missing.stdout.count("IDL616") >= 1
+    written = idlc(*words)
+    current = idlc(*words, "--check")
+    assert (written.returncode, current.returncode) == (0, 0)
+    assert written.stdout == current.stdout
+    make("pyproject.toml", "[tool.idlc]\nout = 5\n")
+    wrong = idlc(*words, "--check")
+    assert wrong.returncode == 2
+    assert "IDL611" in wrong.stdout
+    assert [done.stderr for done in (missing, written, current, wrong)] == [""] * 4
+    Path("pyproject.toml").unlink()
+    assert idlc(*words, "--watch").returncode == 2
 
 
 @pytest.mark.parametrize("colour", [False, True])

@@ -17,7 +17,12 @@ else:
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 #: Lock files, and the extra that each is for.
-LOCKED = {"test-ros": "test-ros", "test-kilted": "test-kilted", "test-lowest": "test"}
+LOCKED = {
+    "release": "release",
+    "test-ros": "test-ros",
+    "test-kilted": "test-kilted",
+    "test-lowest": "test",
+}
 #: Where CI runs, on each interpreter.
 MACHINES = [
     {
@@ -29,7 +34,7 @@ MACHINES = [
         "implementation_name": "cpython",
         "platform_python_implementation": "CPython",
     }
-    for version in ("3.10", "3.11", "3.12", "3.13")
+    for version in ("3.10", "3.11", "3.12", "3.13", "3.14")
 ]
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import click
 
 from idlc.cli import completion, options
+from idlc.diagnostics.formats import DOCUMENTS
 
 EPILOG = """\
 Example:
@@ -54,7 +54,7 @@ All options can be kept in pyproject.toml:
     "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
 )
 @click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
-@options.style
+@options.report_style
 def command(style: str, watch: bool, **given: Any) -> int:
     """Compile interface files into a Python package.
 
@@ -74,7 +74,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     report = Report()
     settings = pyproject.load(report)
     if report.had_errors:
-        output.show(report, style, sys.stdout if style == "json" else sys.stderr)
+        gen_run.refuse(report, style)
         return output.status(report)
     words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
     wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
@@ -85,6 +85,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
         )
+    if watch and style in DOCUMENTS:
+        raise click.UsageError("--watch goes with --format text and json only")
     if watch:
         from idlc.cli.watch import run_again
 

@@ -24,7 +24,9 @@ def document(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     )
     cases = [_failed(one) for one in found]
     cases += [f'  <testcase classname="idlc" name={_quoted(file)}/>' for file in clean]
-    return "\n".join(['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""])
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""]
+    # whatever encoding it is written in, it is read alike
+    return "\n".join(lines).encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
 def _failed(one: Diagnostic) -> str:

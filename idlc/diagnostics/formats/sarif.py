@@ -88,6 +88,8 @@ def _location(span: Span | None, path: str) -> dict[str, object]:
 def _artifact(path: str) -> dict[str, str]:
     if path.startswith("/"):
         return {"uri": "file://" + quote(path, errors="replace")}
+    if re.match(r"[A-Za-z]:/", path):  # on a drive of Windows
+        return {"uri": "file:///" + quote(path, safe="/:", errors="replace")}
     return {"uri": quote(path, errors="replace")}
 
 

@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,9 +25,16 @@ def alone(folder: Path) -> Iterator[None]:
 
     The lock is the operating system's, on the folder itself, or the nearest above as long as
     there is none: it leaves no file and ends with the process. Where folders cannot be
-    locked, nothing is. A run that holds one folder may only ask for others below it.
+    locked, nothing is; on Windows one lock is for all. A run that holds one folder may only ask
+    for others below it.
     """
     place = _nearest(folder)
+    if sys.platform == "win32" and not _held:
+        from idlc.disk.output import windows
+
+        with windows.alone(), _holding(place):
+            yield
+        return
     if sys.platform == "win32" or place in _held:
         yield
         return
@@ -34,12 +42,20 @@ def alone(folder: Path) -> Iterator[None]:
     while (now := _nearest(folder)) != place or not _is(handle, place):
         _unlock(handle)
         handle = _lock(place := now)
+    try:
+        with _holding(place):
+            yield
+    finally:
+        _unlock(handle)
+
+
+@contextlib.contextmanager
+def _holding(place: Path) -> Iterator[None]:
     _held.add(place)
     try:
         yield
     finally:
         _held.discard(place)
-        _unlock(handle)
 
 
 def _nearest(folder: Path) -> Path:
@@ -82,7 +98,8 @@ def _is(handle: int | None, place: Path) -> bool:
 def uninterrupted() -> Iterator[None]:
     """Let signals that would end the process wait."""
     if sys.platform == "win32":
-        yield
+        with _without_ctrl_c():
+            yield
         return
     ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
@@ -90,3 +107,19 @@ def uninterrupted() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C wait where signals cannot be blocked; only the main thread hears it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if pressed:
+            signal.raise_signal(signal.SIGINT)

@@ -53,10 +53,23 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def digest(data: bytes) -> str:
-    """Return the SHA-256 of bytes."""
+    """Return the SHA-256 of a file, of a text one with line ends as idlc writes them.
+
+    On Windows, git checks texts out with other ones.
+    """
     import hashlib  # loads OpenSSL, which a check does without
 
-    return hashlib.sha256(data).hexdigest()
+    return hashlib.sha256(_plain(data)).hexdigest()
+
+
+def is_same(old: bytes | None, new: bytes | None) -> bool:
+    """Return whether a file has a content already, whatever git made of its line ends."""
+    return old == new or (old is not None and new is not None and _plain(old) == new)
+
+
+def _plain(data: bytes) -> bytes:
+    is_text = b"\r\n" in data and b"\0" not in data
+    return data.replace(b"\r\n", b"\n") if is_text else data
 
 
 def meaning(text: str, package: str) -> str:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.output import transaction
+from idlc.disk.output.lock_file import is_same
 from idlc.disk.output.tree import Obstacle, Tree
 from idlc.disk.output.write_plan import Change, Plan, difference
 from idlc.disk.read import absolute, decode, read_bytes
@@ -76,7 +77,7 @@ class Project:
             if isinstance(old, Obstacle):
                 self._in_the_way(path, old)
                 refused = True
-            elif old == new:
+            elif is_same(old, new):
                 done.append(Done(path, "unchanged"))
             elif old is None:
                 changes.append(Change(path, None, new))

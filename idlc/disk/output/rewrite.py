@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.edits import apply
+from idlc.disk.output.whole_files import replace as replace_file
 from idlc.disk.read import reason
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def replace(path: Path, name: str, old: str, new: str, report: Report) -> bool:
             with os.fdopen(handle, "wb") as file:
                 file.write(new.encode("utf-8"))
             shutil.copymode(target, draft)
-            Path(draft).replace(target)
+            replace_file(draft, str(target))
         except BaseException:
             with contextlib.suppress(OSError):
                 Path(draft).unlink()

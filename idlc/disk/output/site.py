@@ -9,7 +9,7 @@ from pathlib import Path
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk.output.folder_lock import alone
-from idlc.disk.output.lock_file import digest
+from idlc.disk.output.lock_file import digest, is_same
 from idlc.disk.output.transaction import apply_changes, journals, sweep
 from idlc.disk.output.tree import Obstacle, Tree, may_be_own
 from idlc.disk.output.write_plan import Change, Plan
@@ -33,14 +33,17 @@ def _write(folder: Path, out: str, files: Mapping[str, str], report: Report) -> 
     listed = {path: digest(data) for path, data in sorted(pages.items())}
     listing = json.dumps(listed, indent=1).encode() + b"\n"
     changes: list[Change] = []
-    for path in (*pages, *sorted({path for path, _ in mine} - pages.keys())):
+    stale = {path for path, _ in mine} - pages.keys()
+    renamed = tree.renamed(stale, pages)
+    mine |= {(renamed[path], one) for path, one in mine if path in renamed}
+    for path in (*pages, *sorted(stale - renamed.keys())):
         old, new = tree.read(path), pages.get(path)
         foreign = isinstance(old, Obstacle) or (
-            old is not None and old != new and (path, digest(old)) not in mine
+            old is not None and not is_same(old, new) and (path, digest(old)) not in mine
         )
         if foreign and new is not None:
             report.add(_in_the_way(f"{out}/{path}", old))
-        elif not foreign and not isinstance(old, Obstacle) and old != new:
+        elif not foreign and not isinstance(old, Obstacle) and not is_same(old, new):
             changes.append(Change(path, old, new))
     record = tree.read(LISTING)
     if isinstance(record, Obstacle):

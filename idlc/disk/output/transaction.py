@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,13 +18,11 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.disk.output import lock_file
 from idlc.disk.output.folder_lock import alone, uninterrupted
 from idlc.disk.output.tree import Tree
+from idlc.disk.output.whole_files import create, replace
 from idlc.disk.output.write_plan import Change, Plan, emptied
 from idlc.disk.read import is_folder, reason
 
 STAGE = ".idlc-stage-"
-_WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
-#: Seconds after which a staging folder counts as abandoned where processes cannot be asked.
-ABANDONED = 3600
 
 
 def owned(out: Path, known: lock_file.Lock | None) -> dict[str, frozenset[str]]:
@@ -59,7 +56,9 @@ def _in_use(stage: Path) -> bool:
     if not number.isdigit() or int(number) == os.getpid():
         return False
     if sys.platform == "win32":
-        return time.time() - stage.stat().st_mtime < ABANDONED
+        from idlc.disk.output import windows
+
+        return windows.is_running(int(number))
     try:
         os.kill(int(number), 0)
     except ProcessLookupError:
@@ -162,6 +161,7 @@ def _remove(stage: Path) -> None:
     """Remove a staging folder, which holds no folders."""
     with contextlib.suppress(OSError):
         for path in stage.iterdir():
+            path.chmod(0o600)  # Windows removes no file that is not for writing
             path.unlink()
         stage.rmdir()
 
@@ -190,11 +190,11 @@ class _Transaction:
     def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
         """Make all changes, in order; raises what stopped it."""
         self._make_folder(self._stage)
-        _create(f"{self._stage}/{lock_file.FILE}", journal)
+        create(f"{self._stage}/{lock_file.FILE}", journal)
         for number, change in enumerate(changes):
             if change.new is not None:
                 self.current = change.path
-                _create(f"{self._stage}/{number}", change.new)
+                create(f"{self._stage}/{number}", change.new)
         with uninterrupted():
             self._move(changes)
         self.current = ""
@@ -214,7 +214,7 @@ class _Transaction:
                 if change.old is not None:
                     Path(staged).chmod(Path(target).stat().st_mode & 0o7777)
                 self._make_parent(change.path)
-                os.replace(staged, target)  # noqa: PTH105 - a Path costs as much as moving
+                replace(staged, target)
             self._done.append((change.path, change.old))
 
     def _make_parent(self, path: str) -> None:
@@ -227,7 +227,7 @@ class _Transaction:
         """Write a copy of a file beside it, under a name that is free."""
         for suffix in _suffixes():
             with contextlib.suppress(FileExistsError):
-                _create(f"{self._out}/{path}{suffix}", content, os.O_EXCL)
+                create(f"{self._out}/{path}{suffix}", content, os.O_EXCL)
                 self._done.append((path + suffix, None))
                 return
 
@@ -253,9 +253,9 @@ class _Transaction:
                     target.unlink(missing_ok=True)
                 else:
                     spare = self._stage / "old"
-                    _create(str(spare), old)
+                    create(str(spare), old)
                     target.parent.mkdir(parents=True, exist_ok=True)
-                    spare.replace(target)
+                    replace(str(spare), str(target))
             except OSError:
                 torn.append(path)
         if not torn:
@@ -264,21 +264,6 @@ class _Transaction:
             with contextlib.suppress(OSError):
                 folder.rmdir()
         return torn
-
-
-def _create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
-    """Write a whole file or none; past `open`, which takes as long as the operating system."""
-    handle = os.open(path, _WRITING | how, 0o666)
-    try:
-        rest = memoryview(data)
-        while rest:
-            rest = rest[os.write(handle, rest) :]
-    except BaseException:
-        with contextlib.suppress(OSError):
-            Path(path).unlink()
-        raise
-    finally:
-        os.close(handle)
 
 
 def _suffixes() -> Iterator[str]:

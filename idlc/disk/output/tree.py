@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import stat
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -50,6 +51,22 @@ class Tree:
             return None
         except OSError as error:
             return Obstacle(f"`{path}` cannot be read: {reason(error)}")
+
+    def renamed(self, old: Iterable[str], new: Iterable[str]) -> dict[str, str]:
+        """Return which of the old files lie under new names that differ in capitals only.
+
+        They do where a file system ignores capitals, as those of Windows and macOS.
+        """
+        names = {path.casefold(): path for path in new}
+        pairs = ((path, names.get(path.casefold())) for path in old)
+        return {path: name for path, name in pairs if name and self._is_one(path, name)}
+
+    def _is_one(self, path: str, other: str) -> bool:
+        try:
+            first, second = (os.lstat(f"{self._root}/{one}") for one in (path, other))
+        except OSError:
+            return False
+        return path != other and os.path.samestat(first, second)
 
     def _folder(self, path: str) -> Obstacle | bool:
         """Return whether a folder is there, or what is there instead of it or above it."""

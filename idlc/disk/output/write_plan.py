@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.disk.output.lock_file import FILE, digest
+from idlc.disk.output.lock_file import FILE, digest, is_same
 from idlc.disk.output.tree import Obstacle, Tree
 
 #: Files of a package that are the user's where they exist already.
@@ -67,8 +67,10 @@ def plan(
     changes: list[Change] = []
     refused: list[Diagnostic] = []
     outputs: dict[str, str] = {}
-    stale = [path for path in owned if path not in files and path != home + FILE]
-    for path in (*files, *sorted(stale)):
+    stale = {path for path in owned if path not in files and path != home + FILE}
+    renamed = tree.renamed(stale, files)
+    owned = {**owned, **{new: owned[old] | owned.get(new, set()) for old, new in renamed.items()}}
+    for path in (*files, *sorted(stale - renamed.keys())):
         old, new = tree.read(path), files.get(path)
         if isinstance(old, Obstacle):
             refused += [_in_the_way(name, path, old)] if new is not None else []
@@ -78,7 +80,7 @@ def plan(
             continue
         if new is not None:
             outputs[path] = digest(new)
-        if old != new:
+        if not is_same(old, new):
             if ground is not Ground.OWN and not force:
                 diff = _diff(old, new) if len(refused) < DIFFS else ""
                 refused.append(_refusal(f"{name}/{path}", ground, diff, removed=new is None))
