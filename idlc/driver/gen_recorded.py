@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 
+import msgspec
+
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
-from idlc.disk.environment import python_folders
+from idlc.disk import environment, inputs
 from idlc.disk.library import Library
+from idlc.disk.read import absolute
 from idlc.disk.requested import borrowed
 from idlc.driver.gen import GenOptions
 from idlc.driver.recorded import topics_of, versions
@@ -46,7 +48,8 @@ def recorded_packages(
     if not options.ament:
         _tell_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
-    return packages, types.texts
+    home = absolute(paths[0])
+    return [msgspec.structs.replace(one, home=home) for one in packages], types.texts
 
 
 def _tell_hidden(
@@ -56,7 +59,7 @@ def _tell_hidden(
     hidden = [
         package
         for package, mine in names.items()
-        if python_folders(package) and set(library.interfaces(package)) - mine
+        if environment.python_folders(package) and set(library.interfaces(package)) - mine
     ]
     if hidden:
         listed = first_few((f"`{package}`" for package in sorted(hidden)), NAMED)
