@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from importlib import import_module
+from importlib import import_module, invalidate_caches
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -43,13 +43,20 @@ class CompileError(ValueError):
 class Loaded(ModuleType):
     """Packages that were compiled together, and by their own names the interfaces asked for."""
 
-    def __init__(self, name: str, packages: Iterable[str], asked: Iterable[ir.TypeName]) -> None:
+    def __init__(
+        self, name: str, models: Mapping[str, Model], asked: Iterable[ir.TypeName]
+    ) -> None:
         super().__init__(name, "What `idlc.load` compiled.")
-        self._packages = sorted(packages)
+        self._packages = {
+            package: sorted({own.name.kind for own in model.own})
+            for package, model in sorted(models.items())
+        }
         self._asked = {str(class_(one)): one for one in asked}
 
     def __getattr__(self, name: str) -> Any:
         if name in self._packages:
+            for kind in self._packages[name]:
+                import_module(f"{self.__name__}.{name}.{kind}")
             return import_module(f"{self.__name__}.{name}")
         if name in self._asked:
             return self[str(self._asked[name])]
@@ -161,6 +168,7 @@ def _kept(models: Mapping[str, Model], key: str = "") -> str:
         key = _key(texts)
     if not cache.has(key):
         cache.keep(key, _files(models, f"{LOADED}.{key}"))
+        invalidate_caches()
     return key
 
 
