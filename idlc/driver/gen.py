@@ -43,9 +43,9 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
 
 def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    paths = [word for word in options.paths if not _is_name(word)]
-    words = [word for word in options.paths if _is_name(word)]
-    named = _named(words, options.scope, report, whole=bool(options.ament))
+    paths = [word for word in options.paths if not is_name(word)]
+    words = [word for word in options.paths if is_name(word)]
+    named = named_packages(words, options.scope, report, whole=bool(options.ament))
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
@@ -78,13 +78,13 @@ def _targets(
     return tuple(found) if found[0].usable() else ()
 
 
-def _is_name(word: str) -> bool:
+def is_name(word: str) -> bool:
     """Return whether a word means a type, or a package, rather than a path that is not there."""
     last = word.rpartition("/")[2]
     return not is_path(word) and ("/" not in word or not last[:1].islower())
 
 
-def _named(
+def named_packages(
     words: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> list[inputs.Inputs]:
     """Return the packages that names mean, with those of their interfaces that are meant.
