@@ -11,6 +11,7 @@ from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import find
 from idlc.disk.output.site import write
 from idlc.disk.scope import Scope
+from idlc.driver.gen import is_name, named_packages
 from idlc.driver.stages import sound_models, stage
 
 if TYPE_CHECKING:
@@ -18,11 +19,11 @@ if TYPE_CHECKING:
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
-    """Write a site about the interfaces that paths mean; return how many pages it has.
+    """Write a site about the interfaces that paths and names mean; return how many pages it has.
 
     Interfaces with errors, and those that hold them, are left out.
     """
-    given = inputs.packages(find(paths, report, scope.exclude), scope, report)
+    given = _given(paths, scope, report)
     if report.had_errors:
         return 0
     models = [model for model, _ in sound_models(given, scope, report) if model.own]
@@ -39,6 +40,16 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     done = write(out, files, written)
     report.extend(written)
     return sum(path.endswith(".html") for path in files) if done else 0
+
+
+def _given(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
+    names = [word for word in words if is_name(word)]
+    known = named_packages(names, scope, report, whole=False)
+    paths = [word for word in words if not is_name(word)]
+    if not paths or report.had_errors:
+        return tuple(known)
+    files = find(paths, report, scope.exclude)
+    return inputs.without_duplicates((*inputs.packages(files, scope, report), *known), report)
 
 
 def _about(given: inputs.Inputs) -> About:

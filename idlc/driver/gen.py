@@ -50,9 +50,9 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
 def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     recordings, others = divided(options.paths)
-    paths = [word for word in others if not _is_name(word)]
-    words = [word for word in others if _is_name(word)]
-    named = _named(words, options.scope, report, whole=bool(options.ament))
+    paths = [word for word in others if not is_name(word)]
+    words = [word for word in others if is_name(word)]
+    named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: Mapping[ir.TypeName, Source] = {}
     if recordings and not report.had_errors:
         from idlc.driver.gen_recorded import recorded_packages
@@ -91,13 +91,13 @@ def _targets(
     return tuple(found) if found[0].usable() else ()
 
 
-def _is_name(word: str) -> bool:
+def is_name(word: str) -> bool:
     """Return whether a word means a type, or a package, rather than a path that is not there."""
     last = word.rpartition("/")[2]
     return not is_path(word) and ("/" not in word or not last[:1].islower())
 
 
-def _named(
+def named_packages(
     words: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> list[inputs.Inputs]:
     """Return the packages that names mean, with those of their interfaces that are meant.

@@ -1,7 +1,8 @@
-"""The title page: every package with what its package.xml says, and its interfaces."""
+"""The pages that list: of a package, with what its package.xml says, and of several packages."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -28,9 +29,11 @@ class Entry(NamedTuple):
     about: str
 
 
-class PackageEntry(NamedTuple):
-    """A package; `described` is whether any of its interfaces says what it is for."""
+class PackagePage(NamedTuple):
+    """The page of a package; `described` is whether any interface says what it is for."""
 
+    title: str
+    root: str
     words: Sequence[str]
     description: Sequence[Block]
     facts: str
@@ -38,43 +41,66 @@ class PackageEntry(NamedTuple):
     entries: Sequence[Entry]
 
 
+class Row(NamedTuple):
+    """A package in the list of packages."""
+
+    page: str
+    words: Sequence[str]
+    facts: str
+    about: str
+
+
 class Front(NamedTuple):
-    """The title page; `heading` is the element of a package's name."""
+    """The title page of several packages."""
 
     title: str
     root: str
-    several: bool
-    heading: str
-    packages: Sequence[PackageEntry]
+    rows: Sequence[Row]
 
 
-def front(interfaces: Sequence[ir.Interface], pages: Pages, about: Mapping[str, About]) -> Front:
-    """Return the title page of interfaces; `about` tells of packages by name."""
-    names = sorted({one.name.package for one in interfaces})
-    several = len(names) > 1
-    return Front(
-        title="Interfaces" if several else names[0],
-        root="",
-        several=several,
-        heading="h2" if several else "h1",
-        packages=[
-            _package(
-                name,
-                about.get(name, About()),
-                [_entry(one, pages) for one in interfaces if one.name.package == name],
-            )
-            for name in names
-        ],
+def homes(names: Sequence[str]) -> dict[str, str]:
+    """Return the page of each package; that of a single one is the title page."""
+    return {name: f"{name}/index.html" if len(names) > 1 else "index.html" for name in names}
+
+
+def package_page(
+    name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
+) -> PackagePage:
+    """Return the page of a package, which is `home`."""
+    entries = [_entry(one, pages) for one in interfaces]
+    return PackagePage(
+        title=name,
+        root="../" * home.count("/"),
+        words=words(name),
+        description=blocks(about.description.split("\n")),
+        facts=" · ".join([*_facts(about), counted(interfaces)]),
+        described=any(entry.about for entry in entries),
+        entries=entries,
     )
 
 
-def _package(name: str, about: About, entries: Sequence[Entry]) -> PackageEntry:
-    return PackageEntry(
-        words(name),
-        blocks(about.description.split("\n")),
-        _facts(about),
-        any(entry.about for entry in entries),
-        entries,
+def front(
+    packages: Mapping[str, Sequence[ir.Interface]],
+    pages: Mapping[str, str],
+    about: Mapping[str, About],
+) -> Front:
+    """Return the title page of packages, whose own pages are `pages`."""
+    rows = []
+    for name, interfaces in packages.items():
+        own = about.get(name, About())
+        version = [f"version {own.version}"] if own.version else []
+        facts = " · ".join([*version, counted(interfaces)])
+        rows.append(Row(pages[name], words(name), facts, own.description))
+    return Front("Interfaces", "", rows)
+
+
+def counted(interfaces: Sequence[ir.Interface]) -> str:
+    """Return how many interfaces of each kind there are, in words."""
+    kinds: Counter[str] = Counter(one.name.kind for one in interfaces)
+    return ", ".join(
+        f"{kinds[kind]} {word}{'s' * (kinds[kind] > 1)}"
+        for kind, word in KINDS.items()
+        if kinds[kind]
     )
 
 
@@ -84,13 +110,13 @@ def _entry(interface: ir.Interface, pages: Pages) -> Entry:
     return Entry(pages[name], words(name.name), name.kind, KINDS[name.kind], about)
 
 
-def _facts(about: About) -> str:
+def _facts(about: About) -> list[str]:
     listed = (
         ("version", (about.version,)),
         ("maintained by", about.maintainers),
         ("licence", about.licenses),
     )
-    return " · ".join(f"{label} {', '.join(values)}" for label, values in listed if any(values))
+    return [f"{label} {', '.join(values)}" for label, values in listed if any(values)]
 
 
 def first_line(interface: ir.Interface) -> str:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
 
 from idlc.diagnostics.visible import printable
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.site.front import About, first_line, front
-from idlc.site.view import Pages, page, prefix
+from idlc.site.front import About, first_line, front, homes, package_page
+from idlc.site.view import Home, Pages, page, prefix
 from idlc.templating import RenderedFile, html, verbatim
+
+#: The interfaces of each package that is shown.
+Packages = Mapping[str, Sequence[ir.Interface]]
 
 
 def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedFile, ...]:
@@ -26,23 +30,36 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     own = {interface.name for model in models for interface in model.own}
     pages = {name: _path(name) for name in sorted(known)}
     users = _users(interface for interface, _ in known.values())
-    template = html().get_template("site/interface.html.jinja")
-    files = [
-        RenderedFile(
-            pages[name],
-            template.render(page=page(interface, model, users.get(name, set()), pages)),
-        )
-        for name, (interface, model) in sorted(known.items())
-    ]
     shown = [known[name][0] for name in sorted(own)]
-    title = html().get_template("site/index.html.jinja")
+    packages = {name: tuple(found) for name, found in groupby(shown, lambda one: one.name.package)}
+    home = homes([*packages])
+    owners = {name: Home(there, about.get(name, About()).version) for name, there in home.items()}
+    template = html().get_template("site/interface.html.jinja")
+    files = []
+    for name, (interface, model) in sorted(known.items()):
+        owner = owners.get(name.package, Home())
+        shown_page = page(interface, model, users.get(name, set()), pages, owner)
+        files.append(RenderedFile(pages[name], template.render(page=shown_page)))
     return (
-        RenderedFile("index.html", title.render(page=front(shown, pages, about))),
-        RenderedFile("index.js", f"const INDEX = {_index(shown, pages)};\n"),
+        *_lists(packages, home, pages, about),
+        RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
         RenderedFile("search.js", verbatim("site/search.js")),
         RenderedFile("style.css", verbatim("site/style.css")),
         *files,
     )
+
+
+def _lists(
+    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
+) -> Iterator[RenderedFile]:
+    """Yield the pages that list interfaces, and for several packages the one that lists those."""
+    template = html().get_template("site/package.html.jinja")
+    for name, interfaces in packages.items():
+        text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
+        yield RenderedFile(home[name], template.render(page=text))
+    if len(packages) > 1:
+        title = html().get_template("site/index.html.jinja")
+        yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
 
 
 def _path(name: ir.TypeName) -> str:
@@ -57,17 +74,27 @@ def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeN
     return found
 
 
-def _index(interfaces: Sequence[ir.Interface], pages: Pages) -> str:
-    """Return what is searched: name, page and a line about it."""
-    entries = []
-    for one in interfaces:
-        path = pages[one.name]
-        entries.append([str(one.name), path, printable(first_line(one))])
-        for part in derive.sections(one):
-            before = prefix(one, part)
-            items = [(item.name, item.comment) for item in part.constants]
-            items += [(item.name, item.comment) for item in part.fields]
-            for item, comment in items:
-                about = printable(" ".join(comment[:1]))
-                entries.append([f"{part.name}.{item}", f"{path}#{before}{item}", about])
-    return json.dumps(entries)
+def _index(
+    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
+) -> str:
+    """Return what is searched: names, pages, lines about them, and the same of what is in them."""
+    entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
+    for package, interfaces in packages.items():
+        described = printable(about.get(package, About()).description)
+        entries.append((package, home[package], described, []))
+        entries += [
+            (str(one.name), pages[one.name], printable(first_line(one)), [*_items(one)])
+            for one in interfaces
+        ]
+    return json.dumps(entries, separators=(",", ":"))
+
+
+def _items(interface: ir.Interface) -> Iterator[tuple[str, str]]:
+    """Yield fields and constants, as they follow the interface's name, and a line about each."""
+    for part in derive.sections(interface):
+        before = prefix(interface, part)
+        divider = "_" if before else "."
+        items = [(one.name, one.comment) for one in part.constants]
+        items += [(one.name, one.comment) for one in part.fields]
+        for name, comment in items:
+            yield f"{divider}{before}{name}", printable(" ".join(comment[:1]))

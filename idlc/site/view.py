@@ -70,23 +70,34 @@ class Section(NamedTuple):
     empty: bool
 
 
+class Home(NamedTuple):
+    """The page of a package and its version; empty what it has not."""
+
+    page: str = ""
+    version: str = ""
+
+
 class Page(NamedTuple):
-    """The page of an interface."""
+    """The page of an interface; `statement` imports its class in Python."""
 
     title: str
     root: str
     package: str
+    home: Home
     kind: str
     what: str
     words: Sequence[str]
     sections: Sequence[Section]
     picture: Picture | None
     users: Sequence[Link]
+    statement: str
     hash: str
     source: str
 
 
-def page(interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pages: Pages) -> Page:
+def page(
+    interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pages: Pages, home: Home
+) -> Page:
     """Return the page of an interface; `users` are the interfaces that refer to it."""
     own = interface.name
     titles = _SECTIONS.get(own.kind, ("",))
@@ -95,12 +106,14 @@ def page(interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pa
         title=str(own),
         root="../",
         package=own.package,
+        home=home,
         kind=own.kind,
         what=KINDS[own.kind],
         words=words(own.name),
         sections=[_section(title, part, prefix(interface, part), pages) for title, part in parts],
         picture=picture(own, users, derive.references(interface), pages),
         users=[_link(user, str(user), pages) for user in sorted(users)],
+        statement=f"from {own.package}.{own.kind} import {own.name}",
         hash=model.describer.hash(str(own)) if model.distro.has_hashes else "",
         source="\n".join(interface.source.text.splitlines()) if interface.source else "",
     )

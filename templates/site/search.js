@@ -1,8 +1,25 @@
 "use strict";
-// INDEX holds [name, page, what it is for]; text is set as text, never as HTML.
+// INDEX, which comes when somebody wants to search, has [name, page, what it is for, what is in it]
+// of packages and interfaces. Text is set as text, never as HTML.
 const field = document.getElementById("search");
 const found = document.getElementById("found");
 const root = document.body.dataset.root;
+let entries = null;
+
+function load() {
+  if (entries !== null) return;
+  entries = [];
+  const script = document.createElement("script");
+  script.src = `${root}index.js`;
+  script.addEventListener("load", () => {
+    entries = INDEX.flatMap(([name, page, about, items]) => [
+      [name, page, about],
+      ...items.map(([item, note]) => [name + item, `${page}#${item.slice(1)}`, note]),
+    ]);
+    search();
+  });
+  document.head.append(script);
+}
 
 // The smaller, the better: all words in the name before words in what it is for.
 function rank([name, , about], words) {
@@ -28,7 +45,7 @@ function line([name, page, about]) {
 
 function search() {
   const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
-  const hits = INDEX
+  const hits = entries
     .map((entry) => [words.length === 0 ? -1 : rank(entry, words), entry])
     .filter(([place]) => place >= 0)
     .sort(([one], [other]) => one - other)
@@ -43,7 +60,11 @@ function search() {
   found.hidden = words.length === 0;
 }
 
-field.addEventListener("input", search);
+field.addEventListener("focus", load);
+field.addEventListener("input", () => {
+  load();
+  search();
+});
 field.addEventListener("keydown", (event) => {
   if (event.key === "Enter" && found.querySelector("a")) found.querySelector("a").click();
 });

@@ -66,6 +66,9 @@ export function measure(window, width) {
 SEARCH = """
 export async function measure(window) {
   const field = window.document.getElementById("search");
+  field.dispatchEvent(new window.Event("focus"));
+  const script = window.document.querySelector("script[src$='index.js']");
+  await new Promise((ready) => { script.addEventListener("load", ready); });
   const answer = {};
   for (const words of ["batery volt", "heading", "euler yaw", "table", ""]) {
     field.value = words;

@@ -79,8 +79,8 @@ export async function measure(window) {
     input.dispatchEvent(new window.Event("input", { bubbles: true }));
     await until(() => told?.[0] === question, `answer to ${question}, but to ${told}`);
     const links = () => [...host.shadowRoot.querySelectorAll("ol a[href]")];
-    await until(() => told[1] === undefined || (links()[0] && place(links()[0]) === place({ href: told[1] })),
-      `results for ${told}`);
+    const first = told[1] && place({ href: told[1] });
+    await until(() => !first || (links()[0] && place(links()[0]) === first), `results: ${told}`);
     answers[question] = told[1] ? links().map(place) : [];
   }
   return { answers };

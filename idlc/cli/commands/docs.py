@@ -19,7 +19,7 @@ Example:
 
 
 @click.command("docs", epilog=EPILOG)
-@click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
+@click.argument("paths", metavar="[PATH|PACKAGE|TYPE]...", nargs=-1, type=click.Path())
 @click.option("-o", "--out", metavar="DIR", required=True, type=click.Path(), help="The site.")
 @options.package
 @options.include
@@ -35,7 +35,7 @@ def command(
 ) -> int:
     """Write a static HTML site about interfaces: links, units, constants, hashes, a search.
 
-    It needs no server and loads nothing from elsewhere.
+    It needs no server and loads nothing from elsewhere. PACKAGE and TYPE are names, as for `gen`.
     """
     from idlc.cli import output
     from idlc.diagnostics.formats.terminal import counted
