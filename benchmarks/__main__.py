@@ -12,6 +12,7 @@ from benchmarks import (
     codec,
     columns,
     compiling,
+    editing,
     imports,
     report,
     results,
@@ -22,7 +23,10 @@ from benchmarks.measure import Row, measure
 from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work, in_memory
 
-GROUPS = (codec, batches, columns, classes, imports, compiling, starting, topics)
+GROUPS = (
+    *(codec, batches, columns, classes, imports),
+    *(compiling, starting, editing, topics),
+)
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:

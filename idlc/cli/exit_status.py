@@ -6,7 +6,6 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 from idlc.cli import streams
 
@@ -24,7 +23,7 @@ def ended(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
     streams.set_up()
     try:
-        Path.cwd()
+        os.getcwd()  # noqa: PTH109 - a server starts without pathlib
     except OSError:
         sys.stderr.write("Error: the working folder is gone\n")
         return 2

@@ -95,7 +95,7 @@ def test_what_is_no_message_is_answered_or_passed_over():
         beginning(),
         *END,
     )
-    assert errors(found) == [-32700, -32600, -32600, -32600, -32700, -32600, -32700]
+    assert errors(found) == [-32700, -32600, -32600, -32600, -32700, -32700, -32700]
     assert found[-1]["id"] == "last"
 
 

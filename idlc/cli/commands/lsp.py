@@ -26,15 +26,9 @@ def command(check: bool) -> int:
         import json
 
         from idlc.lsp.capabilities import answer
-        from idlc.lsp.world import World
 
-        sys.stdout.write(json.dumps(answer(World()), indent=2) + "\n")
+        sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
         return 0
-    from idlc.lsp.server import serve
+    from idlc.cli.lsp_run import run
 
-    if sys.stdin.isatty():
-        sys.stderr.write("an editor starts this, and talks to it; Ctrl-C ends it\n")
-    # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
-    # what it waits in is never closed
-    reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115
-    return serve(reader, sys.stdout.buffer)
+    return run()
