@@ -10,6 +10,7 @@ from benchmarks import (
     batches,
     classes,
     codec,
+    columns,
     compiling,
     imports,
     report,
@@ -21,7 +22,7 @@ from benchmarks.measure import Row, measure
 from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work, in_memory
 
-GROUPS = (codec, batches, classes, imports, compiling, starting, topics)
+GROUPS = (codec, batches, columns, classes, imports, compiling, starting, topics)
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:

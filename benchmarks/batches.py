@@ -87,6 +87,7 @@ def decoders(work: Work, name: str, buffers: list[bytes]) -> dict[str, Candidate
     return {
         label(who, "deserialize"): one_by_one([implementation.decoder(name, b) for b in buffers])
         for who, implementation in work.implementations.items()
+        if work.message(who, name) is not None
     }
 
 

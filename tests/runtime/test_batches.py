@@ -1,9 +1,7 @@
-"""Many messages at once: lists of buffers, streams, numpy columns; and views instead of copies."""
+"""Many messages at once: lists of buffers, streams; and views instead of copies."""
 
 import pickle
 import random
-import struct
-from contextlib import suppress
 from copy import deepcopy
 
 import numpy as np
@@ -142,109 +140,6 @@ def test_the_chunks_of_an_mcap_file(msg, runtime, batches, tmp_path):
     for size in (1, 8, 9, 20, len(chunks[0]) - 1):
         with pytest.raises(runtime.DecodeError, match="ends within a record"):
             list(runtime.on_demand.batches.split_mcap_chunk(chunks[0][:size], channels["Point"]))
-
-
-# columns
-
-
-def row_of(plain):
-    """Return what a row of columns holds of a message given as a dictionary."""
-    if isinstance(plain, dict):
-        return {name: row_of(value) for name, value in plain.items()}
-    if isinstance(plain, list):
-        return [row_of(value) for value in plain]
-    return plain.encode().rstrip(b"\0") if isinstance(plain, str) else plain
-
-
-def dictionary(row):
-    """Return a row of columns as a dictionary."""
-    if getattr(row.dtype, "names", None) is not None:
-        if row.ndim:
-            return [dictionary(one) for one in row]
-        return {name: dictionary(row[name]) for name in row.dtype.names}
-    return row.tolist()
-
-
-def same_sizes(messages):
-    """Give sequences the same number of elements in all messages, so that columns can hold them."""
-    first = messages[0]
-    for message in messages:
-        for field in first.get_fields_and_field_types():
-            held = getattr(message, field)
-            wanted = getattr(first, field)
-            if isinstance(held, list) or hasattr(held, "typecode"):
-                setattr(message, field, deepcopy(wanted))
-    return messages
-
-
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("name", ["Point", "Odd", "Header", "Sample", "Joints", "Marks", "Image"])
-def test_columns_hold_what_the_messages_hold(msg, name, seed):
-    cls = getattr(msg, name)
-    messages = same_sizes(many(cls, 40, seed))
-    orders = [random.Random(seed).choice(["little", "big"]) for _ in messages]
-    buffers = [
-        message.serialize(byteorder=order) + b"\0" * (seed % 3)
-        for message, order in zip(messages, orders, strict=True)
-    ]
-    table = cls.to_columns(iter(buffers))
-    assert table.shape == (40,)
-    for row, message in zip(table, messages, strict=True):
-        assert dictionary(row) == row_of(message.to_dict())
-
-
-def test_columns_of_one_layout_and_of_thousands(msg):
-    messages = many(msg.Sample, 3000)
-    table = msg.Sample.to_columns(map(memoryview, msg.Sample.serialize_many(messages)))
-    assert table["position"]["x"].tolist() == [message.position.x for message in messages]
-    assert table["header"]["stamp"]["sec"].tolist() == [m.header.stamp.sec for m in messages]
-    assert table["weights"].shape == (3000, 4)
-    assert table["valid"].dtype == bool
-
-
-def test_columns_without_rows_have_names(msg):
-    assert msg.Joints.to_columns([]).dtype.names == ("header", "name", "position", "moving")
-    assert msg.Empty.to_columns(msg.Empty.serialize_many(many(msg.Empty, 3))).shape == (3,)
-    assert msg.Marks.to_columns([msg.Marks().serialize()])["points"]["x"].shape == (1, 0)
-
-
-def test_any_byte_but_zero_is_true_in_a_column(msg):
-    raw = bytearray(msg.Joints(moving=[True, False]).serialize())
-    raw[-2] = 77
-    assert msg.Joints.to_columns([raw])["moving"].tolist() == [[True, False]]
-
-
-def test_what_columns_cannot_hold_is_said(msg, runtime):
-    two = [msg.Joints(position=[1.0] * count).serialize() for count in (2, 2, 3)]
-    with pytest.raises(ValueError, match=r"\[2\]\.position: has 3 elements and 2 before"):
-        msg.Joints.to_columns(two, ragged=False)
-    with pytest.raises(ValueError, match="text is a wstring"):
-        msg.Wide.to_columns([msg.Wide().serialize()], ragged=False)
-    good = msg.Header(frame_id="map").serialize()
-    with pytest.raises(runtime.DecodeError, match=r"^\[1\]\.frame_id: 4 bytes of text expected"):
-        msg.Header.to_columns([good, good[:-4]])
-    with pytest.raises(runtime.DecodeError, match=r"^\[0\]: the encapsulation header"):
-        msg.Header.to_columns([b"\0"])
-    huge = good[:12] + struct.pack("<I", 0xFFFF_FFFF) + good[16:]
-    with pytest.raises(runtime.DecodeError, match="bytes of text expected"):
-        msg.Header.to_columns([huge])
-
-
-def test_mutated_buffers_end_in_rows_or_in_an_error(msg, runtime):
-    rng = random.Random(5)
-    for cls in (msg.Sample, msg.Joints, msg.Marks, msg.Image):
-        for message in many(cls, 60, 7):
-            raw = bytearray(message.serialize())
-            for _ in range(rng.choice([1, 1, 3])):
-                raw[rng.randrange(len(raw))] = rng.choice([0, 1, 5, 127, 255])
-            raw = raw[: rng.choice([len(raw), rng.randrange(len(raw))])]
-            with suppress(runtime.DecodeError):
-                assert len(cls.to_columns([raw])) == 1
-
-
-def test_thousands_of_layouts(msg):
-    buffers = [msg.Header(frame_id="x" * size).serialize() for size in range(1001)]
-    assert msg.Header.to_columns(buffers)["frame_id"][-1] == b"x" * 1000
 
 
 # views

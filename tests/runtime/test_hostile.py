@@ -7,11 +7,7 @@ from contextlib import suppress
 
 import pytest
 
-from idlc.diagnostics.report import Report
-from idlc.model import catalog, derive
-from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model import catalog
 from tests.support import generated, values
 
 pytestmark = pytest.mark.usefixtures("standard")
@@ -29,13 +25,6 @@ BULKY = [
     "idlc_fixtures/msg/Sequences",
     "idlc_fixtures/msg/WithDeps",
 ]
-
-
-def structures(name):
-    report = Report()
-    own = lower(parse(catalog.source(name)), name, report)
-    link(name.package, [own], catalog, report)
-    return [str(message.name) for message in derive.messages(own)]
 
 
 def mutated(raw, rng):
@@ -58,7 +47,7 @@ def mutated(raw, rng):
 @pytest.mark.parametrize("name", INTERFACES, ids=str)
 def test_mutated_buffers_end_in_a_value_or_in_decode_error(name):
     rng = random.Random(str(name))
-    for full_name in structures(name):
+    for full_name in generated.structures(name):
         cls = generated.class_of(full_name)
         message = values.randomized(cls(), rng)
         error = __import__(f"{name.package}._idlc")._idlc.DecodeError
@@ -120,6 +109,7 @@ READERS = {
     "copy=False": lambda cls, raw: cls.deserialize(raw, copy=False),
     "deserialize_many": lambda cls, raw: cls.deserialize_many([raw]),
     "to_columns": lambda cls, raw: cls.to_columns([raw]),
+    "ragged": lambda cls, raw: cls.to_columns([raw] * 20, ragged=True),
 }
 
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.emit.render import render_package
-from idlc.model import catalog, ir
+from idlc.model import catalog, derive, ir
 from idlc.model.link import link
 from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
@@ -46,6 +46,14 @@ def catalog_files():
         text = catalog.source(name).text
         found.setdefault(name.package, {})[f"{name.kind}/{name.name}.{name.kind}"] = text
     return found
+
+
+def structures(name):
+    """Return the full names of the messages of an interface of the catalogue."""
+    report = Report()
+    own = lower(parse(catalog.source(name)), name, report)
+    link(name.package, [own], catalog, report)
+    return [str(message.name) for message in derive.messages(own)]
 
 
 def write_package(folder, package, files):

@@ -10,7 +10,7 @@ import numpy as np
 from ..typeinfo import type_name, types
 from .definition import definition_of
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
-from .read import reading
+from .read import table_of
 from .table import columns_of
 
 #: The unit of times in Arrow, by their dtype.
@@ -34,8 +34,8 @@ def to_arrow(
             f"pip install pyarrow",
             name="pyarrow",
         ) from error
-    with reading(kind, messages, fields, datetimes) as (table, top):
-        columns = columns_of(table, top)
+    table, top = table_of(kind, messages, fields, datetimes)
+    columns = columns_of(table, top)
     made = _Arrays(pyarrow, dictionary).struct(top.level.node, columns)
     while flat and any(pyarrow.types.is_struct(field.type) for field in made.type):
         made = _flattened(pyarrow, made)

@@ -78,6 +78,11 @@ class Level:
         return None if first.size % first.align else first
 
     @cached_property
+    def narrow(self) -> bool:
+        """Whether it consists of strings, and none of them is wide."""
+        return all(isinstance(step, Text) and not step.wide for step in self.steps)
+
+    @cached_property
     def wanted(self) -> bool:
         """Whether there is a column in it."""
         return any(map(is_wanted, self.steps))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
@@ -30,6 +29,12 @@ class Messages(NamedTuple):
     starts: Any
     stops: Any
 
+    def part(self, first: int, last: int) -> Messages:
+        """Return some of the messages."""
+        return self._replace(
+            starts=self.starts[first:last], stops=self.stops[first:last]
+        )
+
     def raw(self, index: int) -> bytes:
         """Return one message."""
         start, stop = (np.array([int(one[index])]) for one in (self.starts, self.stops))
@@ -53,10 +58,11 @@ def messages_of(messages: Any) -> Messages:
 
 def _of_batch(batch: Any) -> Messages:
     array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
-    starts, stops = (
-        np.asarray(one).astype(np.int64, casting="same_kind")
-        for one in (batch.starts, batch.stops)
-    )
+    starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
+    for one in (starts, stops):
+        if one.size and one.dtype.kind not in "iu":
+            raise TypeError("starts and stops of a batch must be integers")
+    starts, stops = starts.astype(np.int64), stops.astype(np.int64)
     if starts.shape != stops.shape or starts.ndim != 1:
         raise ValueError("starts and stops of a batch must be as many")
     if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
@@ -64,19 +70,18 @@ def _of_batch(batch: Any) -> Messages:
     return Messages(Flat(array), starts, stops)
 
 
-@contextmanager
-def reading(
+def table_of(
     kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
-) -> Iterator[tuple[Table, Elements]]:
-    """Give what is in messages, and the rows of the table; raise DecodeError."""
+) -> tuple[Table, Elements]:
+    """Return what is in messages, and the rows of the table; raise DecodeError."""
     name = type_name(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
     plan = plan_of(name, None if wanted is None else tuple(wanted), datetimes)
-    found = messages_of(messages)
+    all_of_them = messages_of(messages)
     try:
-        yield _read(plan, found)
+        return _read(plan, all_of_them)
     except UnreadableError:
-        explain(name, found)
+        explain(name, plan, all_of_them)
 
 
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
@@ -111,11 +116,18 @@ def big_endian(messages: Messages) -> Any:
     return second == 0
 
 
-def explain(name: str, messages: Messages) -> NoReturn:
+def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
     """Raise DecodeError for the first message that is not of a type."""
-    for index in range(len(messages.starts)):
+    first, last = 0, len(messages.starts)
+    while last - first > 1:  # the first one that cannot be read is in between
+        middle = (first + last) // 2
         try:
-            check(name, messages.raw(index))
-        except DecodeError as error:
-            failed(error, index)
-    raise AssertionError("all messages can be read one by one")
+            _read(plan, messages.part(first, middle))
+            first = middle
+        except UnreadableError:
+            last = middle
+    try:
+        check(name, messages.raw(first))
+    except DecodeError as error:
+        failed(error, first)
+    raise AssertionError(f"[{first}] can be read by itself")

@@ -14,10 +14,11 @@ import numpy as np
 from .gather import Source
 from .lanes import Found, Lanes, UnreadableError, repeat_fixed
 from .plan import Level, List, Segment, Text
+from .texts import utf16_units
 from .walk import Walk
 
 #: So few messages are faster one by one.
-FEW = 12
+FEW = 16
 
 
 class Scan:
@@ -52,6 +53,11 @@ class Scan:
         """Go over a string in each lane."""
         size = self.number(lanes)
         start = lanes.take(size * 4 if step.wide else size)
+        if (
+            step.wide
+            and (utf16_units(self.source, start, size, self.order) >> 16).any()
+        ):
+            raise UnreadableError
         if step.key is not None:
             self.found.at[step.key].append(start)
             self.found.size[step.key].append(size)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from .gather import Source
-from .lanes import UnreadableError
 from .values import Texts
 
 
@@ -22,14 +21,17 @@ def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
 
 def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
     """Return the strings at some places, of so many UTF-16 units of four bytes."""
-    units = source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
+    units = utf16_units(source, starts, sizes, order)
     if big is not None:
         swapped = np.repeat(big, sizes)
         units[swapped] = units[swapped].byteswap()
-    if len(units) and units.max() > 0xFFFF:
-        raise UnreadableError
     made = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
     return _encoded(part.decode("utf-16-le", "replace") for part in _parts(made))
+
+
+def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:
+    """Return the units of strings, one after the other, as numbers."""
+    return source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
 
 
 def offsets_of(sizes: Any) -> Any:

@@ -23,6 +23,7 @@ class Walk:
 
     def __init__(self, order: str, found: Found) -> None:
         self.unpack = Struct(order + "I").unpack_from
+        self.dtype = np.dtype(order + "u4")
         self.found = found
         self.end = self.phase = self.shift = 0
         self.view: Any = b""
@@ -34,7 +35,12 @@ class Walk:
 
     def repeat(self, level: Level, at: int, parent: int, indices: range) -> int:
         """Go over elements of a sequence; return the position after them."""
-        first = self.found.enter(level, [parent] * len(indices), indices)
+        first = self.found.count[level.key]
+        self.found.count[level.key] += len(indices)
+        tail(self.found.parent[level.key]).extend([parent] * len(indices))
+        tail(self.found.index[level.key]).extend(indices)
+        if level.narrow:
+            return self.strings(level, at, len(indices))
         for number in range(first, first + len(indices)):
             at = self.level(level, at, number)
         return at
@@ -45,7 +51,7 @@ class Walk:
             if isinstance(step, Segment):
                 at = aligned(at, self.phase, step.align)
                 if step.leaves:
-                    add(self.found.at[step.key], at)
+                    tail(self.found.at[step.key]).append(at)
                 at = self.take(at, step.size)
             elif isinstance(step, Text):
                 at = self.text(step, at)
@@ -71,9 +77,32 @@ class Walk:
         """Go over a string."""
         size, at = self.number(at)
         if step.key is not None:
-            add(self.found.at[step.key], at)
-            add(self.found.size[step.key], size)
-        return self.take(at, size * 4 if step.wide else size)
+            tail(self.found.at[step.key]).append(at)
+            tail(self.found.size[step.key]).append(size)
+        after = self.take(at, size * 4 if step.wide else size)
+        if step.wide:
+            units = np.frombuffer(self.view, self.dtype, size, at - self.shift)
+            if (units >> 16).any():
+                raise UnreadableError
+        return after
+
+    def strings(self, level: Level, at: int, count: int) -> int:
+        """Go over elements of strings alone, of which there may be very many."""
+        unpack, view, shift, end = self.unpack, self.view, self.shift, self.end
+        phase, starts, sizes = self.phase, [], []
+        for _ in range(count * len(level.steps)):
+            at += ((phase - at) & 3) + 4
+            if at > end:
+                raise UnreadableError
+            (size,) = unpack(view, at - 4 - shift)
+            starts.append(at)
+            sizes.append(size)
+            at += size
+        for index, step in enumerate(level.steps):
+            if isinstance(step, Text) and step.key is not None:
+                tail(self.found.at[step.key]).extend(starts[index :: len(level.steps)])
+                tail(self.found.size[step.key]).extend(sizes[index :: len(level.steps)])
+        return self.take(at, 0)
 
     def list(self, step: List, at: int, number: int) -> int:
         """Go over a sequence."""
@@ -82,13 +111,13 @@ class Walk:
             raise UnreadableError
         self.take(at, count * step.least)
         if step.key is not None:
-            add(self.found.size[step.key], count)
+            tail(self.found.size[step.key]).append(count)
         level = step.level
         packed = level.packed
         if packed:
             at = aligned(at, self.phase, packed.align) if count else at
             if step.key is not None:
-                add(self.found.at[step.key], at)
+                tail(self.found.at[step.key]).append(at)
             return self.take(at, count * packed.size)
         if not level.fixed:
             return self.repeat(level, at, number, range(count))
@@ -97,8 +126,9 @@ class Walk:
         return int(lane.at[0])
 
 
-def add(parts: list[Any], value: int) -> None:
-    """Add a value to the last part, if that is no array."""
+def tail(parts: list[Any]) -> list[Any]:
+    """Return the last part to add to it: a list, where the others may be arrays."""
     if not parts or type(parts[-1]) is not list:
         parts.append([])
-    parts[-1].append(value)
+    last: list[Any] = parts[-1]
+    return last

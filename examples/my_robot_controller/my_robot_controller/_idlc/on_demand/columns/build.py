@@ -89,7 +89,7 @@ class _Builder:
         self.level.node = self.structure(name, wanted)
         return self.level
 
-    def structure(self, name: str, wanted: Wanted) -> Node:
+    def structure(self, name: str, wanted: Wanted) -> Struct:
         """Go over a structure."""
         fields = fields_of(name)
         if not fields:
@@ -100,11 +100,6 @@ class _Builder:
             node = self.field(field, inner)
             if inner != NOTHING:
                 made[field.name] = node
-        if self.datetimes and name in INSTANTS and wanted is None:
-            seconds, nanoseconds = made.values()
-            assert isinstance(seconds, Numbers)
-            assert isinstance(nanoseconds, Numbers)
-            return Instant(INSTANTS[name], seconds, nanoseconds)
         return Struct(made)
 
     def field(self, field: FieldInfo, wanted: Wanted) -> Node:
@@ -129,7 +124,14 @@ class _Builder:
     def element(self, field: FieldInfo, wanted: Wanted) -> Node:
         """Go over one value."""
         if field.nested:
-            return self.structure(field.nested, wanted)
+            made = self.structure(field.nested, wanted)
+            known = INSTANTS.get(field.nested)
+            if known is None or not self.datetimes or wanted is not None:
+                return made
+            seconds, nanoseconds = made.fields.values()
+            assert isinstance(seconds, Numbers)
+            assert isinstance(nanoseconds, Numbers)
+            return Instant(known, seconds, nanoseconds)
         if field.primitive is not None:
             return self.numbers(field, wanted)
         text = Text(None if wanted == NOTHING else next(self.keys), field.wide)

@@ -1,4 +1,4 @@
-"""Copying what is at many places of a buffer, with as few operations as possible."""
+"""Copying what is at many places of messages, with as few operations as possible."""
 
 from __future__ import annotations
 
@@ -8,89 +8,144 @@ import numpy as np
 
 #: From this mean size on, ranges are copied one by one.
 LONG = 256
-VERY_LONG = 1 << 16
 #: Up to this largest size, ranges are cut out of windows that are all as wide.
 SHORT = 32
-
-
-def window(buffer: Any, dtype: Any) -> Any:
-    """Return an array of what begins at each byte of a buffer."""
-    dtype = np.dtype(dtype)
-    count = max(0, len(buffer) - dtype.itemsize + 1)
-    return np.ndarray((count,), dtype, buffer, strides=(1,))
-
-
-def regular(starts: Any) -> int | None:
-    """Return the distance of places that are all as far from each other."""
-    if len(starts) < 2:
-        return None
-    distance = int(starts[1] - starts[0])
-    return distance if (np.diff(starts) == distance).all() else None
+#: No dtype is larger.
+LARGEST_ITEM = 1 << 16
 
 
 class Place(NamedTuple):
-    """Where an array is in the memory of a buffer."""
+    """Where an array is in memory."""
 
-    buffer: Any
+    memory: Any
     offset: int
     shape: tuple[int, ...]
     strides: tuple[int, ...]
 
 
-def blocks(buffer: Any, starts: Any, size: int) -> Place:
-    """Return where as many bytes from each start are, which may be in the buffer itself."""
-    distance = regular(starts)
-    if distance is not None and distance >= size:
-        return Place(buffer, int(starts[0]), (len(starts),), (distance,))
-    if size > VERY_LONG:
-        rows = _one_by_one(buffer, starts, np.full(len(starts), size))
-    else:
-        rows = window(buffer, f"V{size}")[starts].view(np.uint8)
-    return Place(rows, 0, (len(starts),), (size,))
+class Flat:
+    """Messages in one array of bytes."""
+
+    def __init__(self, array: Any) -> None:
+        self.array = array
+        self.view = memoryview(array)
+
+    def around(self, _position: int) -> tuple[Any, int]:
+        """Return what holds a position, and the position at which that begins."""
+        return self.view, 0
+
+    def shares(self, numbers: Any) -> bool:
+        """Return whether an array may be in this memory."""
+        return np.may_share_memory(numbers, self.array)
+
+    def items(self, starts: Any, dtype: str) -> Any:
+        """Return what begins at each of some positions."""
+        return self._windows(dtype)[starts]
+
+    def blocks(self, starts: Any, size: int) -> Place:
+        """Return where the bytes from each start are: if they are regular, where they were."""
+        distance = _regular(starts)
+        if distance is not None and distance >= size:
+            return Place(self.array, int(starts[0]), (len(starts),), (distance,))
+        if size > LARGEST_ITEM:
+            rows = self._one_by_one(starts, np.full(len(starts), size))
+        else:
+            rows = self.items(starts, f"V{size}").view(np.uint8)
+        return Place(rows, 0, (len(starts),), (size,))
+
+    def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
+        """Return bytes, so many from each start, one after the other.
+
+        All sizes are multiples of `item`.
+        """
+        total = int(sizes.sum())
+        if not total:
+            return np.empty(0, np.uint8)
+        if total >= LONG * len(sizes):
+            return self._one_by_one(starts, sizes)
+        longest = int(sizes.max())
+        if longest <= SHORT and (starts + longest <= len(self.array)).all():
+            rows = self.items(starts, f"V{longest}").view(np.uint8)
+            return rows.reshape(-1, longest)[np.arange(longest) < sizes[:, None]]
+        counts = sizes // item
+        shift = starts - (np.cumsum(counts) - counts) * item
+        places = np.repeat(shift, counts)
+        places += np.arange(len(places)) * item
+        return self.items(places, f"V{item}").view(np.uint8)
+
+    def _windows(self, dtype: str) -> Any:
+        """Return an array of what begins at each byte."""
+        count = max(0, len(self.array) - np.dtype(dtype).itemsize + 1)
+        return np.ndarray((count,), dtype, self.array, strides=(1,))
+
+    def _one_by_one(self, starts: Any, sizes: Any) -> Any:
+        result: Any = np.empty(int(sizes.sum()), np.uint8)
+        target, source, at = memoryview(result), self.view, 0
+        for start, size in zip(starts.tolist(), sizes.tolist(), strict=True):
+            end = at + size
+            target[at:end] = source[start : start + size]
+            at = end
+        return result
 
 
-def rows_of(buffer: Any, starts: Any, counts: Any, item: int) -> Place | None:
+class Pieces:
+    """Large messages where they are, with positions as if they were one array."""
+
+    def __init__(self, raws: list[Any], starts: Any) -> None:
+        self.raws = [memoryview(raw) for raw in raws]
+        self.starts = starts
+
+    def around(self, position: int) -> tuple[Any, int]:
+        """Return what holds a position, and the position at which that begins."""
+        row = int(np.searchsorted(self.starts, position, "right")) - 1
+        return self.raws[row], int(self.starts[row])
+
+    def shares(self, _numbers: Any) -> bool:
+        """Return whether an array may be in this memory."""
+        return False
+
+    def items(self, starts: Any, dtype: str) -> Any:
+        """Return what begins at each of some positions."""
+        made = np.dtype(dtype)
+        return self.ranges(starts, np.full(len(starts), made.itemsize)).view(made)
+
+    def blocks(self, starts: Any, size: int) -> Place:
+        """Return where copies of the bytes from each start are."""
+        rows = self.ranges(starts, np.full(len(starts), size))
+        return Place(rows, 0, (len(starts),), (size,))
+
+    def ranges(self, starts: Any, sizes: Any, _item: int = 1) -> Any:
+        """Return bytes, so many from each start, one after the other."""
+        rows = np.searchsorted(self.starts, starts, "right") - 1
+        inside = starts - self.starts[rows]
+        result: Any = np.empty(int(sizes.sum()), np.uint8)
+        target, raws, at = memoryview(result), self.raws, 0
+        for row, start, size in zip(
+            rows.tolist(), inside.tolist(), sizes.tolist(), strict=True
+        ):
+            end = at + size
+            target[at:end] = raws[row][start : start + size]
+            at = end
+        return result
+
+
+Source = Flat | Pieces
+
+
+def rows_of(source: Source, starts: Any, counts: Any, item: int) -> Place | None:
     """Return where as many items from each start are; None if they are not as many."""
     if not len(counts) or (counts != counts[0]).any():
         return None
     count = int(counts[0])
-    place = (
-        blocks(buffer, starts, count * item)
-        if count
-        else Place(b"", 0, (len(counts),), (0,))
-    )
+    place = Place(b"", 0, (len(counts),), (0,))
+    if count:
+        place = source.blocks(starts, count * item)
     return place._replace(shape=(*place.shape, count), strides=(*place.strides, item))
 
 
-def ranges(buffer: Any, starts: Any, sizes: Any, item: int = 1) -> Any:
-    """Return bytes, so many from each start, one after the other.
-
-    All sizes are multiples of `item`.
-    """
-    total = int(sizes.sum())
-    longest = int(sizes.max()) if total else 0
-    if not total:
-        return np.empty(0, np.uint8)
-    if total >= LONG * len(sizes):
-        return _one_by_one(buffer, starts, sizes)
-    if longest <= SHORT and (starts + longest <= len(buffer)).all():
-        rows: Any = window(buffer, f"V{longest}")[starts]
-        inside = np.arange(longest) < sizes[:, None]
-        return rows.view(np.uint8).reshape(-1, longest)[inside]
-    counts = sizes // item
-    shift = starts - (np.cumsum(counts) - counts) * item
-    places = np.repeat(shift, counts)
-    places += np.arange(len(places)) * item
-    items: Any = window(buffer, f"V{item}")[places]
-    return items.view(np.uint8)
-
-
-def _one_by_one(buffer: Any, starts: Any, sizes: Any) -> Any:
-    result: Any = np.empty(int(sizes.sum()), np.uint8)
-    target, source = memoryview(result), memoryview(buffer)
-    at = 0
-    for start, size in zip(starts.tolist(), sizes.tolist(), strict=True):
-        end = at + size
-        target[at:end] = source[start : start + size]
-        at = end
-    return result
+def _regular(starts: Any) -> int | None:
+    """Return the distance of positions that are all as far from each other."""
+    if len(starts) < 2:
+        return None
+    distance = int(starts[1] - starts[0])
+    return distance if (np.diff(starts) == distance).all() else None

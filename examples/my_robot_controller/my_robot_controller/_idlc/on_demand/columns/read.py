@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from typing import Any, NoReturn
+from collections.abc import Iterable
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -13,86 +12,122 @@ from ..batches import failed
 from ..field_reader import check
 from ..typeinfo import type_name
 from .build import plan_of
+from .gather import Flat, Pieces, Source
 from .lanes import Found, Lanes, UnreadableError
 from .plan import Level
 from .scan import Scan
 from .table import Elements, Table
-from .values import Batch
+
+#: From this mean size on, messages are not copied into one array.
+LARGE = 1 << 15
 
 
-def batch_of(messages: Any) -> Batch:
-    """Return messages as arrays of bytes and of positions; an iterable's are copied."""
+class Messages(NamedTuple):
+    """Serialized messages: where they begin and end in a source, as arrays."""
+
+    source: Source
+    starts: Any
+    stops: Any
+
+    def part(self, first: int, last: int) -> Messages:
+        """Return some of the messages."""
+        return self._replace(
+            starts=self.starts[first:last], stops=self.stops[first:last]
+        )
+
+    def raw(self, index: int) -> bytes:
+        """Return one message."""
+        start, stop = (np.array([int(one[index])]) for one in (self.starts, self.stops))
+        return bytes(self.source.ranges(start, stop - start))
+
+
+def messages_of(messages: Any) -> Messages:
+    """Return the messages of a batch, or of an iterable; small ones of that are copied."""
     if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
-        return _checked(messages)
+        return _of_batch(messages)
     raws = [
         raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages
     ]
     sizes = np.fromiter(map(len, raws), np.int64, len(raws))
     stops = np.cumsum(sizes)
-    return Batch(np.frombuffer(b"".join(raws), np.uint8), stops - sizes, stops)
+    starts = stops - sizes
+    if len(raws) and stops[-1] >= LARGE * len(raws):
+        return Messages(Pieces(raws, starts), starts, stops)
+    return Messages(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
 
 
-def _checked(batch: Any) -> Batch:
-    buffer = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
-    starts, stops = (
-        np.asarray(one).astype(np.int64, casting="same_kind")
-        for one in (batch.starts, batch.stops)
-    )
+def _of_batch(batch: Any) -> Messages:
+    array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
+    starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
+    for one in (starts, stops):
+        if one.size and one.dtype.kind not in "iu":
+            raise TypeError("starts and stops of a batch must be integers")
+    starts, stops = starts.astype(np.int64), stops.astype(np.int64)
     if starts.shape != stops.shape or starts.ndim != 1:
         raise ValueError("starts and stops of a batch must be as many")
-    if ((starts < 0) | (starts > stops) | (stops > len(buffer))).any():
+    if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
         raise ValueError("a message of the batch is not within its buffer")
-    return Batch(buffer, starts, stops)
+    return Messages(Flat(array), starts, stops)
 
 
-@contextmanager
-def reading(
+def table_of(
     kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
-) -> Iterator[tuple[Table, Elements]]:
-    """Give what is in messages, and the rows of the table; raise DecodeError."""
+) -> tuple[Table, Elements]:
+    """Return what is in messages, and the rows of the table; raise DecodeError."""
     name = type_name(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
     plan = plan_of(name, None if wanted is None else tuple(wanted), datetimes)
-    batch = batch_of(messages)
+    all_of_them = messages_of(messages)
     try:
-        yield _read(plan, batch)
+        return _read(plan, all_of_them)
     except UnreadableError:
-        explain(name, batch)
+        explain(name, plan, all_of_them)
 
 
-def _read(plan: Level, batch: Batch) -> tuple[Table, Elements]:
-    big = orders(batch)
-    found = Found()
-    done, mixed = [], bool(big.any() and not big.all())
+def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
+    big = big_endian(messages)
+    mixed = bool(big.any() and not big.all())
+    source, found = messages.source, Found()
+    done = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         if len(rows):
-            starts = batch.starts[rows]
-            lanes = Lanes(starts + 4, batch.stops[rows], starts + 4)
+            starts = messages.starts[rows] + 4
+            lanes = Lanes(starts, messages.stops[rows], starts)
             first = found.count[plan.key]
             found.count[plan.key] += len(rows)
-            Scan(batch.buffer, order, found).level(plan, lanes, first)
+            Scan(source, order, found).level(plan, lanes, first)
             done.append(rows)
-    order_of_rows = np.concatenate(done) if mixed else None
     order = ">" if big.any() and not mixed else "<"
-    top = Elements(plan, len(big), order_of_rows, big if mixed else None)
-    return Table(batch, order, found), top
+    size = int((messages.stops - messages.starts).sum())
+    table = Table(source, size, order, found)
+    if mixed:
+        return table, Elements(plan, len(big), np.concatenate(done), big)
+    return table, Elements(plan, len(big), None, None)
 
 
-def orders(batch: Batch) -> Any:
-    """Return which messages are big-endian, as their encapsulation headers say."""
-    if (batch.stops - batch.starts < 4).any():
+def big_endian(messages: Messages) -> Any:
+    """Return which messages are, as their encapsulation headers say."""
+    starts = messages.starts
+    if (messages.stops - starts < 4).any():
         raise UnreadableError
-    first, second = batch.buffer[batch.starts], batch.buffer[batch.starts + 1]
+    first, second = (messages.source.items(starts + at, "u1") for at in (0, 1))
     if (first != 0).any() or (second > 1).any():
         raise UnreadableError
     return second == 0
 
 
-def explain(name: str, batch: Batch) -> NoReturn:
+def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
     """Raise DecodeError for the first message that is not of a type."""
-    for index, raw in enumerate(batch):
+    first, last = 0, len(messages.starts)
+    while last - first > 1:  # the first one that cannot be read is in between
+        middle = (first + last) // 2
         try:
-            check(name, bytes(raw))
-        except DecodeError as error:
-            failed(error, index)
-    raise AssertionError("all messages can be read one by one")
+            _read(plan, messages.part(first, middle))
+            first = middle
+        except UnreadableError:
+            last = middle
+    try:
+        check(name, messages.raw(first))
+    except DecodeError as error:
+        failed(error, first)
+    raise AssertionError(f"[{first}] can be read by itself")

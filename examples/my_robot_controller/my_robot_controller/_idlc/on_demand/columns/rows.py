@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
-from .read import reading
+from .read import table_of
 from .table import Elements, Table, columns_of, instants
 from .values import Texts
 
@@ -30,15 +30,14 @@ def to_columns(
     datetimes: bool = False,
 ) -> Any:
     """Return a row for each message, as a structured array or as Columns."""
-    with reading(kind, messages, fields, datetimes) as (table, top):
-        if ragged:
-            return columns_of(table, top)
+    table, top = table_of(kind, messages, fields, datetimes)
+    if not ragged:
         try:
             return _structured(table, top)
         except UnevenError as error:
-            if ragged is None:
-                return columns_of(table, top)
-            raise ValueError(f"{error}; ragged=True takes it") from None
+            if ragged is not None:
+                raise ValueError(f"{error}; ragged=True takes it") from None
+    return columns_of(table, top)
 
 
 def _structured(table: Table, top: Elements) -> Any:

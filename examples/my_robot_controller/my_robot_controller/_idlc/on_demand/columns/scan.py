@@ -11,22 +11,24 @@ from typing import Any
 
 import numpy as np
 
+from .gather import Source
 from .lanes import Found, Lanes, UnreadableError, repeat_fixed
 from .plan import Level, List, Segment, Text
+from .texts import utf16_units
 from .walk import Walk
 
 #: So few messages are faster one by one.
-FEW = 12
+FEW = 16
 
 
 class Scan:
     """Goes over messages of one byte order."""
 
-    def __init__(self, buffer: Any, order: str, found: Found) -> None:
+    def __init__(self, source: Source, order: str, found: Found) -> None:
         self.found = found
-        shape = max(0, len(buffer) - 3)
-        self.words = np.ndarray((shape,), order + "u4", buffer, strides=(1,))
-        self.walk = Walk(buffer, order, found)
+        self.source = source
+        self.order = order
+        self.walk = Walk(order, found)
 
     def level(self, level: Level, lanes: Lanes, first: int) -> None:
         """Go over a structure in each lane, which in its level count from `first` on."""
@@ -44,12 +46,18 @@ class Scan:
     def number(self, lanes: Lanes) -> Any:
         """Read a size or count in each lane."""
         lanes.align(4)
-        return self.words[lanes.take(4)].astype(np.int64)
+        numbers = self.source.items(lanes.take(4), f"{self.order}u4")
+        return numbers.astype(np.int64)
 
     def text(self, step: Text, lanes: Lanes) -> None:
         """Go over a string in each lane."""
         size = self.number(lanes)
         start = lanes.take(size * 4 if step.wide else size)
+        if (
+            step.wide
+            and (utf16_units(self.source, start, size, self.order) >> 16).any()
+        ):
+            raise UnreadableError
         if step.key is not None:
             self.found.at[step.key].append(start)
             self.found.size[step.key].append(size)
@@ -99,7 +107,7 @@ class Scan:
             index += 1
             active = int(np.searchsorted(descending, -index))
         for row in range(active):
-            self.walk.end, self.walk.phase = int(rest.end[row]), int(rest.phase[row])
+            self.walk.enter(self.source, rest, row)
             elements = range(index, -int(descending[row]))
             at = int(rest.at[row])
             rest.at[row] = self.walk.repeat(

@@ -6,18 +6,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .gather import Place, blocks, ranges, rows_of
+from .gather import Place, Source, rows_of
 from .lanes import Found
 from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings
 from .texts import narrow_texts, offsets_of, wide_texts
-from .values import Batch, Columns, Ragged, Texts
+from .values import Columns, Ragged, Texts
 
 
 class Elements(NamedTuple):
     """The elements of a level.
 
     `order` has the place of each, in the order in which they were found; None if that is the
-    order. `big` says which are big-endian, where there are both.
+    order. `big` says which are big-endian, if only some are.
     """
 
     level: Level
@@ -27,11 +27,14 @@ class Elements(NamedTuple):
 
 
 class Table:
-    """What was found in messages, by column. `order` is theirs, or "<" if there are both."""
+    """What was found in messages of `size` bytes, by column.
 
-    def __init__(self, batch: Batch, order: str, found: Found) -> None:
-        self.buffer = batch.buffer
-        self.size = int((batch.stops - batch.starts).sum())
+    `order` is that of all messages; "<" if only some are big-endian.
+    """
+
+    def __init__(self, source: Source, size: int, order: str, found: Found) -> None:
+        self.source = source
+        self.size = size
         self.order = order
         self.found = found
         self.texts: dict[int, Texts] = {}
@@ -55,9 +58,9 @@ class Table:
             sizes = self.sorted(elements, self.found.size[key])
             if node.text.wide:
                 big = elements.big
-                made = wide_texts(self.buffer, starts, sizes, self.order, big)
+                made = wide_texts(self.source, starts, sizes, self.order, big)
             else:
-                made = narrow_texts(self.buffer, starts, sizes)
+                made = narrow_texts(self.source, starts, sizes)
             self.texts[key] = made
         return self.texts[key]
 
@@ -86,7 +89,7 @@ class Table:
         for step in elements.level.steps:
             if isinstance(step, Segment) and step.leaves:
                 starts = self.sorted(elements, self.found.at[step.key])
-                place = blocks(self.buffer, starts, step.size)
+                place = self.source.blocks(starts, step.size)
                 self.cut(step, place, result)
         return result
 
@@ -106,9 +109,9 @@ class Table:
             starts = self.sorted(around, self.found.at[step.key])
             counts = self.sorted(around, self.found.size[step.key])
             size = packed.size
-            place = rows_of(self.buffer, starts, counts, size) if even else None
+            place = rows_of(self.source, starts, counts, size) if even else None
             if place is None:
-                made = ranges(self.buffer, starts, counts * size, size)
+                made = self.source.ranges(starts, counts * size, size)
                 place = Place(made, 0, (elements.total,), (size,))
             self.cut(packed, place, result)
         return result
@@ -120,7 +123,7 @@ class Table:
         """
         if code == "?":
             return numbers != 0
-        if np.may_share_memory(numbers, self.buffer):
+        if self.source.shares(numbers):
             numbers = numbers.copy()
         result = np.ascontiguousarray(numbers, code)
         if big is not None:
@@ -137,7 +140,7 @@ class Table:
                 made: Any = np.empty(shape, dtype)
             else:
                 start = place.offset + leaf.offset
-                made = np.ndarray(shape, dtype, place.buffer, start, strides)
+                made = np.ndarray(shape, dtype, place.memory, start, strides)
             result[leaf.key] = made
 
 

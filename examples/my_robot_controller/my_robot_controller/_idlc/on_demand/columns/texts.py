@@ -7,29 +7,31 @@ from typing import Any
 
 import numpy as np
 
-from .gather import ranges
-from .lanes import UnreadableError
+from .gather import Source
 from .values import Texts
 
 
-def narrow_texts(buffer: Any, starts: Any, sizes: Any) -> Texts:
+def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
     """Return the strings at some places, mostly with a terminating zero."""
     last = np.maximum(starts + sizes, 1) - 1
-    sizes = sizes - ((sizes > 0) & (buffer[last] == 0))
-    made = Texts(offsets_of(sizes), ranges(buffer, starts, sizes))
+    sizes = sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
+    made = Texts(offsets_of(sizes), source.ranges(starts, sizes))
     return made if _is_utf8(made) else _encoded(map(_text, _parts(made)))
 
 
-def wide_texts(buffer: Any, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
+def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
     """Return the strings at some places, of so many UTF-16 units of four bytes."""
-    units = ranges(buffer, starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
+    units = utf16_units(source, starts, sizes, order)
     if big is not None:
         swapped = np.repeat(big, sizes)
         units[swapped] = units[swapped].byteswap()
-    if len(units) and units.max() > 0xFFFF:
-        raise UnreadableError
     made = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
     return _encoded(part.decode("utf-16-le", "replace") for part in _parts(made))
+
+
+def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:
+    """Return the units of strings, one after the other, as numbers."""
+    return source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
 
 
 def offsets_of(sizes: Any) -> Any:
