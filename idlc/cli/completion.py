@@ -33,7 +33,8 @@ def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     from idlc.driver import completion
 
     typed: Any = context.params.get("paths") or (context.params.get("wanted"),)
-    return completion.topics(word, [path for path in typed if path])
+    # what comes before an option without its value is left as it was typed
+    return completion.topics(word, [path for path in (*typed, *context.args) if path])
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:

@@ -7,8 +7,9 @@ import time
 
 from idlc.cli.gen_run import once
 from idlc.diagnostics.visible import one_line
-from idlc.disk.watch import snapshot
+from idlc.disk.watch import snapshot, stamps
 from idlc.driver.gen import GenOptions
+from idlc.recordings.find import files
 
 INTERVAL = 0.25
 
@@ -16,14 +17,14 @@ INTERVAL = 0.25
 def run_again(wanted: GenOptions, style: str) -> int:
     """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
     try:
-        seen = snapshot(wanted.paths, wanted.scope.include)
+        seen = _snapshot(wanted)
         once(wanted, style)
         sys.stderr.write(f"watching {one_line(', '.join(wanted.paths))}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()
             time.sleep(INTERVAL)
-            now = snapshot(wanted.paths, wanted.scope.include)
+            now = _snapshot(wanted)
             if now == seen:
                 continue
             while (later := _after(wanted)) != now:
@@ -38,4 +39,8 @@ def run_again(wanted: GenOptions, style: str) -> int:
 def _after(wanted: GenOptions) -> dict[str, tuple[int, int]]:
     """Return a snapshot from a moment later, so that a burst of changes counts as one."""
     time.sleep(INTERVAL)
-    return snapshot(wanted.paths, wanted.scope.include)
+    return _snapshot(wanted)
+
+
+def _snapshot(wanted: GenOptions) -> dict[str, tuple[int, int]]:
+    return snapshot(wanted.paths, wanted.scope.include) | stamps(files(wanted.paths))

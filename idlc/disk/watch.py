@@ -14,10 +14,12 @@ def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[in
     """Return time and size of each input file, of its package.xml and of files along -I."""
     files = [file.path for file in look((*paths, *include), Report()).files]
     manifests = {path.parent.parent / MANIFEST for path in files}
-    found = {}
-    for path in (*files, *sorted(manifests)):
-        found[path.as_posix()] = _stamp(path)
-    return found
+    return stamps((*files, *sorted(manifests)))
+
+
+def stamps(paths: Iterable[Path]) -> dict[str, tuple[int, int]]:
+    """Return time and size of each file."""
+    return {path.as_posix(): _stamp(path) for path in paths}
 
 
 def _stamp(path: Path) -> tuple[int, int]:

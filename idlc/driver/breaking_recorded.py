@@ -41,7 +41,9 @@ def compare_with_recordings(
     """
     there = look(options.paths, report, options.scope.exclude)
     report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
-    given = inputs.packages(there.files, options.scope, report)
+    found = Report()
+    given = inputs.packages(there.files, options.scope, found)
+    report.extend(found)
     topics = topics_of(recordings, (), report)
     if topics is None or report.had_errors:
         return None
@@ -55,8 +57,8 @@ def compare_with_recordings(
         for old, new in here.pairs(models, types.texts):
             seen |= {one.name for one in old.own}
             with stage("compare", old.package):
-                found = compare(old, new).changes
-            changes = {**{(one.subject, one.message): one for one in found}, **changes}
+                new_ones = compare(old, new).changes
+            changes = {**{(one.subject, one.message): one for one in new_ones}, **changes}
     here.tell(report)
     if given and not seen:
         report.notes.append("none of these interfaces was recorded")

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+
+import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
+from idlc.disk import environment, inputs
+from idlc.disk.library import Library
+from idlc.disk.read import absolute
 from idlc.disk.requested import borrowed
 from idlc.driver.gen import GenOptions
 from idlc.driver.recorded import topics_of, versions
 from idlc.driver.recorded_models import check_versions, contradicted
-from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.recorded_types import NAMED, Around, RecordedTypes
 from idlc.model import ir
 
 
@@ -40,5 +45,25 @@ def recorded_packages(
             f"no topic of {' or '.join(f'`{path}`' for path in paths)} has a type that is known"
         )
         report.add(codes.NO_INTERFACES.of(paths[0], message))
+    if not options.ament:
+        _tell_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
-    return packages, types.texts
+    home = absolute(paths[0])
+    return [msgspec.structs.replace(one, home=home) for one in packages], types.texts
+
+
+def _tell_hidden(
+    names: Mapping[str, AbstractSet[ir.TypeName]], library: Library, report: Report
+) -> None:
+    """Note the packages that are installed here with more than was recorded."""
+    hidden = [
+        package
+        for package, mine in names.items()
+        if environment.python_folders(package) and set(library.interfaces(package)) - mine
+    ]
+    if hidden:
+        listed = first_few((f"`{package}`" for package in sorted(hidden)), NAMED)
+        report.notes.append(
+            f"{listed}: installed here with more than was recorded, which programs do not see "
+            "where what is written comes first on Python's path"
+        )

@@ -85,7 +85,8 @@ def versions(topics: Iterable[Recorded]) -> list[Version]:
             version = Version([], {})
             found.append(version)
         version.topics.append(one)
-        version.texts = {**one.texts, **version.texts}
+        if not one.texts.keys() <= version.texts.keys():
+            version.texts = {**one.texts, **version.texts}
     return found
 
 
@@ -95,7 +96,8 @@ def contradictions(found: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Sour
     seen: dict[ir.TypeName, Source] = {}
     told: set[ir.TypeName] = set()
     for version in found:
-        for name, source in version.texts.items():
+        repeated = (pair for topic in version.topics for pair in topic.repeated)
+        for name, source in (*version.texts.items(), *repeated):
             first = seen.setdefault(name, source)
             if name not in told and not contents.same(name, first, source):
                 told.add(name)

@@ -37,7 +37,8 @@ class Recorded(NamedTuple):
     """A topic, the interface that its messages are of, and all texts that came with it.
 
     `name` may be derived from the `interface`; both are `None` for what is no type of ROS 2.
-    `recording` is how messages call the recording.
+    `recording` is how messages call the recording. Of what is defined twice the first counts, and
+    the others are `repeated`.
     """
 
     recording: str
@@ -45,6 +46,7 @@ class Recorded(NamedTuple):
     name: ir.TypeName | None
     interface: ir.TypeName | None
     texts: dict[ir.TypeName, Source]
+    repeated: tuple[tuple[ir.TypeName, Source], ...] = ()
 
 
 def recorded(topic: Topic, recording: str) -> Recorded:
@@ -54,10 +56,12 @@ def recorded(topic: Topic, recording: str) -> Recorded:
         return Recorded(recording, topic, None, None, {})
     interface = interface_of(name)
     texts: dict[ir.TypeName, Source] = {}
+    repeated = []
     for one, extension, text in _definitions(topic, interface):
-        place = f"{recording}: topic {topic.name}: {one}.{extension}"
-        texts.setdefault(one, Source(place, text))
-    return Recorded(recording, topic, name, interface, texts)
+        source = Source(f"{recording}: topic {topic.name}: {one}.{extension}", text)
+        if texts.setdefault(one, source).text != text:
+            repeated.append((one, source))
+    return Recorded(recording, topic, name, interface, texts, tuple(repeated))
 
 
 def type_name(text: str, kind: ir.Kind = "msg") -> ir.TypeName | None:

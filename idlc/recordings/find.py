@@ -51,6 +51,12 @@ def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
     return recordings, others
 
 
+def files(words: Iterable[str]) -> list[Path]:
+    """Return the files of the recordings among words."""
+    paths = [Path(word) for word in words if is_recording(word)]
+    return [one for path in paths for one in (path.iterdir() if is_folder(path) else [path])]
+
+
 def expanded(word: str) -> list[str]:
     """Return the paths that a word means, which may be a pattern such as `bags/*.mcap`."""
     if has_magic(word) and not is_there(word):

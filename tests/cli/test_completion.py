@@ -10,6 +10,7 @@ import pytest
 
 from idlc.cli.app import COMMANDS
 from idlc.diagnostics.codes import CODES
+from tests.support import recorded_text
 
 MANIFEST = '<package format="3"><name>greenhouse</name></package>'
 CODE = "import sys\nfrom idlc.cli.main import main\nsys.argv = ['idlc']\nmain()\n"
@@ -155,3 +156,11 @@ complete -p idlc
     first, second = done.stdout.splitlines()
     assert first == "std_msgs/Header"
     assert "_idlc_completion idlc" in second
+
+
+def test_topics_of_a_recording_are_completed():
+    text = "@ /wheels demo/msg/Wheels\nint32 a\n@ /whistle demo/msg/Whistle\nint32 a\n"
+    recorded_text.write("drive.mcap", text)
+    assert complete("show", "drive.mcap", "/wh") == ["/wheels", "/whistle"]
+    assert complete("gen", "drive.mcap", "--topic", "/whe") == ["/wheels"]
+    assert complete("show", "nothing.mcap", "") == []

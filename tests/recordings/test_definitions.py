@@ -10,7 +10,7 @@ from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.scope import Scope
-from idlc.driver.recorded import versions
+from idlc.driver.recorded import contradictions, versions
 from idlc.driver.recorded_types import Around, RecordedTypes
 from idlc.export.file_text import file_text
 from idlc.export.idl import idl
@@ -116,9 +116,13 @@ def test_what_is_no_name_is_none(name):
     assert texts("a/msg/B", f"int32 a\n{LINE}MSG: {name}\nint32 b\n") == {"a/msg/B": "int32 a\n"}
 
 
-def test_the_first_of_two_definitions_counts():
-    text = f"int32 a\n{LINE}MSG: a/B\nint32 b\n{LINE}MSG: a/B\nint32 c\n{LINE}MSG: a/A\nint32 d\n"
+def test_the_first_of_two_definitions_counts_and_that_is_told():
+    text = (
+        f"int32 a\n{LINE}MSG: a/B\nint32 b\n{LINE}MSG: a/B\nint32 c\n{LINE}MSG: a/A\nint32 a # x\n"
+    )
     assert texts("a/msg/A", text) == {"a/msg/A": "int32 a\n", "a/msg/B": "int32 b\n"}
+    ((name, first, second),) = contradictions(versions([topic("a/msg/A", text)]))
+    assert (str(name), first.text, second.text) == ("a/msg/B", "int32 b\n", "int32 c\n")
 
 
 def types_of(*topics):
