@@ -36,6 +36,7 @@ MEANT = {
     **dict.fromkeys(("diff", "compare", "compat", "changes"), "breaking"),
     **dict.fromkeys(("info", "cat", "view", "print", "proto"), "show"),
     **dict.fromkeys(("ls", "packages", "types", "search", "find"), "list"),
+    **dict.fromkeys(("export", "convert", "extract", "parquet", "arrow", "csv", "read"), "columns"),
     **dict.fromkeys(("rule", "rules", "why", "codes"), "explain"),
 }
 

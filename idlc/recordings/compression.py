@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import Any
 
 from idlc.recordings.errors import RecordingError
 
+#: What hands out new bytes does so for this many at a time.
+PIECE = 1 << 22
 #: A chunk may not be larger, whatever it says: no writer makes chunks that come near.
 MOST_IN_A_CHUNK = 1 << 29
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -97,10 +100,9 @@ def _newer_zstd(data: memoryview, target: memoryview) -> int:
     from compression import zstd  # type: ignore[import-not-found] # Python 3.14
 
     try:
-        found = zstd.ZstdDecompressor().decompress(data, max_length=len(target) + 1)
+        return _by_pieces(zstd.ZstdDecompressor(), data, target)
     except zstd.ZstdError as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
-    return _copy(found, target)
 
 
 def _lz4(data: memoryview, target: memoryview) -> int:
@@ -109,10 +111,24 @@ def _lz4(data: memoryview, target: memoryview) -> int:
     except ImportError:
         raise missing("lz4", "chunks are compressed with lz4") from None
     try:
-        found = LZ4FrameDecompressor().decompress(data, max_length=len(target) + 1)
+        return _by_pieces(LZ4FrameDecompressor(), data, target)
     except (RuntimeError, ValueError, EOFError) as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
-    return _copy(found, target)
+
+
+def _by_pieces(decompressor: Any, data: memoryview, target: memoryview) -> int:
+    """Decompress one frame, so that never more than a piece is in memory twice."""
+    rest, done = data, 0
+    while done <= len(target):
+        room = min(PIECE, len(target) - done + 1)
+        found = decompressor.decompress(rest, max_length=room)
+        size = min(len(found), len(target) - done)
+        target[done : done + size] = found[:size]
+        done += len(found)
+        rest = memoryview(b"")
+        if decompressor.eof or decompressor.needs_input:
+            break
+    return done
 
 
 def missing(library: str, why: str) -> RecordingError:
