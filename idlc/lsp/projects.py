@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from idlc.diagnostics import codes
@@ -49,8 +50,9 @@ class Project:
         if self._state is None:
             self.failure = None
             try:
-                self.load(documents)
-                self._state = self.workspace.state()
+                with _without_garbage(anew=self._documents is None):
+                    self.load(documents)
+                    self._state = self.workspace.state()
             except OSError:
                 self.forget()
             except InternalError as error:
@@ -61,7 +63,6 @@ class Project:
         """Read what is on disk, unless that was done; raises OSError."""
         if self._documents is None:
             self.workspace.load(documents.unsaved())
-            gc.freeze()  # to look at all of it for garbage takes longer than to check a file
             self._documents = documents
 
     def has(self, path: Path) -> bool:
@@ -75,6 +76,23 @@ class Project:
         except OSError:
             return False
         return self.has(path)
+
+
+@contextmanager
+def _without_garbage(*, anew: bool) -> Iterator[None]:
+    """Keep what a whole folder is read into from being searched for garbage, now and later.
+
+    That takes longer than to check a file, and finds nothing.
+    """
+    if not anew:
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        gc.enable()
 
 
 def _failure(error: InternalError) -> Diagnostic:
