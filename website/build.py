@@ -19,7 +19,9 @@ NOT_SEARCHED = b"---\nsearch:\n  exclude: true\n---\n\n"
 
 
 def build(out: Path) -> None:
-    """Write the site into `out`, which is replaced; raise if there is anything to complain of."""
+    """Write the site into `out`, where only another one is replaced; any warning ends it."""
+    if out.exists() and any(out.iterdir()) and not (out / "search.json").is_file():
+        raise SystemExit(f"{out} holds something else than a site: name another folder")
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         files = {**sources.files(), **rules.pages()}
@@ -31,7 +33,8 @@ def build(out: Path) -> None:
         interfaces.write(work / "docs" / interfaces.PLACE)
         config = (HERE / "zensical.toml").read_text(encoding="utf-8")
         nav = _navigation(files)
-        (work / "zensical.toml").write_text(config.replace("nav = []", f"nav = {nav}", 1))
+        config = config.replace("nav = []", f"nav = {nav}", 1)
+        (work / "zensical.toml").write_text(config, encoding="utf-8")
         done = subprocess.run(
             [sys.executable, "-m", "zensical", "build", "--strict"],
             cwd=work,

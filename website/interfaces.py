@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 from idlc.cli.main import main
@@ -18,5 +20,7 @@ def write(folder: Path) -> None:
     """Write the pages of all packages of common_interfaces into `folder`."""
     share = Path(sys.prefix) / "share"
     paths = [str(share / name) for name in PACKAGES if (share / name / "package.xml").is_file()]
-    if main(["docs", *(paths or PACKAGES), "-o", str(folder)]):
+    with redirect_stdout(StringIO()):  # it tells of a folder that is temporary
+        failed = main(["docs", *(paths or PACKAGES), "-o", str(folder)])
+    if failed:
         raise SystemExit("idlc docs failed, see above")

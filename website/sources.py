@@ -13,7 +13,7 @@ START = "docs/index.md"
 PLACES = {"README.md": "about.md", "examples/my_robot_controller/README.md": "tutorial.md"}
 RULES = "docs/rules.md"
 
-_CODE = re.compile(r"(?ms)^(```+).*?^\1$|`[^`\n]+`")
+_CODE = re.compile(r"(?ms)^ *(```+).*?^ *\1$|`[^`\n]+`")
 _LINK = re.compile(r"(?<=\]\()([^)\s#]*)(#[^)\s]*)?(?=\))")
 
 
@@ -83,7 +83,9 @@ def navigation(found: Mapping[str, bytes]) -> list[tuple[str, list[tuple[str, st
     for section in found["index.md"].decode("utf-8").split("\n## ")[1:]:
         heading, _, text = section.partition("\n")
         entries = re.findall(r"(?<!!)\[([^\]]+)\]\(([^)\s#]+)\)", text)
-        sections.append((heading, [(title, there) for title, there in entries if there in found]))
+        titles = {there: title[:1].upper() + title[1:] for title, there in reversed(entries)}
+        places = [there for there in reversed(titles) if there in found]
+        sections.append((heading, [(titles[there], there) for there in places]))
     return sections
 
 

@@ -11,6 +11,7 @@ import pytest
 from idlc.diagnostics.codes import CODES
 from tests.support.paths import DOCS, ROOT
 from website import sources
+from website.build import build
 from website.dialect import translated
 
 #: Elements that load what they name.
@@ -89,6 +90,13 @@ def test_pages_are_reached_from_the_navigation(site, pages):
     assert {(site / there).with_suffix(".html") for there in named} <= linked
 
 
+def test_only_a_site_is_replaced(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    with pytest.raises(SystemExit, match="something else"):
+        build(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
 # the dialect
 
 
@@ -139,4 +147,5 @@ def test_what_is_no_list_stays(text):
 def test_links_hold_where_the_page_is(link, moved):
     deeper = link if link[0] == "#" or ":" in link else f"../{link}"
     path = Path("docs/contributing/style.md").as_posix()
-    assert sources.moved(path, f"[a]({deeper}) `[a]({deeper})`") == f"[a]({moved}) `[a]({deeper})`"
+    code = f"`[a]({deeper})`\n\n   ```sh\n   [a]({deeper})\n   ```\n"
+    assert sources.moved(path, f"[a]({deeper}) {code}") == f"[a]({moved}) {code}"

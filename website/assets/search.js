@@ -39,7 +39,7 @@ class FrameWorker {
 
 // The engine finds what begins with a word: without its ending it finds the other forms, too.
 function stem(word) {
-  return word.length > 5 ? word.replace(/(?:ing|ed|es|s)$/, "") : word;
+  return word.replace(/(?<=\w{5})(?:ing|ed|es|s)$/, "");
 }
 
 // Two answers as one.
