@@ -42,8 +42,9 @@ PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 LOCKS := build release test-ros test-kilted test-lowest
 UV_COMPILE = $(LOCK_ENV)/bin/uv pip compile --quiet --universal --python-version 3.10 --upgrade \
     --generate-hashes --no-annotate --custom-compile-command 'make lock'
-# Nothing that we run leaves this machine.
+# Nothing that we run leaves this machine, or this folder: rclpy stops where it cannot write its logs.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:

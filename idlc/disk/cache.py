@@ -23,7 +23,7 @@ def folder() -> Path | None:
         if not _is_ours(there):  # `sudo idlc` leaves nothing in another user's home
             return None
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        private = _is_ours(place) and not place.stat().st_mode & 0o022
+        private = _is_ours(place) and not _is_open(place)
         return place if private and os.access(place, os.W_OK) else None
     except OSError:
         return None
@@ -42,6 +42,11 @@ def _base() -> Path | None:
     except RuntimeError:
         return None
     return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+
+
+def _is_open(path: Path) -> bool:
+    """Return whether others may write, of which modes say nothing on Windows."""
+    return sys.platform != "win32" and bool(path.stat().st_mode & 0o022)
 
 
 def _is_ours(path: Path) -> bool:

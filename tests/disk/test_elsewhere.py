@@ -22,6 +22,7 @@ from idlc.cli import streams
 from idlc.cli.main import main
 from idlc.diagnostics.formats import sarif
 from idlc.disk.output import folder_lock, lock_file, transaction, whole_files, windows
+from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT
 
@@ -371,3 +372,26 @@ def test_a_type_is_called_with_other_capitals(here, capsys):
         assert kept == sorted(f"{name}.{ending}" for ending in ("idl", "json", "msg"))
         text = Path(f"prefix/share/demo/msg/{name}.msg").read_text(encoding="utf-8")
         assert text.startswith(f"int8[{number + 1}]")
+
+
+def test_no_file_is_read_or_written_in_the_encoding_of_the_country(tmp_path):
+    write(tmp_path / "demo/msg/A.msg", "float64 a  # größe [m]\n")
+    code = (
+        "import sys\nfrom idlc.cli.main import main\n"
+        "for line in sys.argv[1:]:\n"
+        "    status = main(line.split())\n"
+        "    assert status == 0, (line, status)\n"
+    )
+    lines = (
+        "gen demo -o out/demo",
+        "gen demo --ament prefix",
+        "check demo --fix",
+        "fmt demo",
+        "docs demo -o site",
+        "breaking demo --against out/demo/idlc.lock",
+        "scaffold package nodes",
+        "scaffold package --interfaces kinds A srv/B",
+        "check nodes kinds",
+    )
+    words = ("-X", "warn_default_encoding", "-W", "error::EncodingWarning", "-c", code)
+    programs.run(sys.executable, *words, *lines, cwd=tmp_path)

@@ -191,7 +191,9 @@ def test_archives_that_differ_are_noticed(tmp_path):
 def test_each_make_target_of_the_workflows_exists():
     makefile = HERE.text("Makefile")
     for path in (ROOT / ".github/workflows").glob("*.yml"):
-        for target in re.findall(r"(?m)run: make ([a-z-]+)", path.read_text(encoding="utf-8")):
+        text = path.read_text(encoding="utf-8")
+        targets = re.findall(r"run: make ([a-z-]+)|target: \[?([a-z-]+)", text)
+        for target in filter(None, (one for pair in targets for one in pair)):
             assert re.search(rf"(?m)^{target}:", makefile), (path.name, target)
 
 
