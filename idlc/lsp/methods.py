@@ -28,7 +28,7 @@ class Method(NamedTuple):
 
 
 METHODS = {
-    "textDocument/diagnostic": Method("pull", "document", protocol.AskedDocument),
+    "textDocument/diagnostic": Method("pull", "document", protocol.OfDocument),
     "workspace/diagnostic": Method("pull", "workspace", protocol.AskedWorkspace),
     "textDocument/completion": Method("completion", "complete", protocol.AtPosition),
     "textDocument/codeAction": Method("actions", "actions", protocol.AskedActions),
