@@ -32,4 +32,9 @@ def command(check: bool) -> int:
         return 0
     from idlc.lsp.server import serve
 
-    return serve(sys.stdin.buffer, sys.stdout.buffer)
+    if sys.stdin.isatty():
+        sys.stderr.write("an editor starts this, and talks to it; Ctrl-C ends it\n")
+    # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
+    # what it waits in is never closed
+    reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115
+    return serve(reader, sys.stdout.buffer)
