@@ -4,6 +4,7 @@
 #   PYTHON=python3.12   the interpreter to use
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
+#   EDITORS=no          do without Debian's neovim, emacs-nox and elpa-eglot, in which idlc lsp is tried
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
@@ -13,6 +14,7 @@
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
 BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/dev/null),yes,no)
+EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13
 ARGS ?=
@@ -31,7 +33,8 @@ DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros -m 'not ros'
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),--ignore=tests/cli/test_docs_browser.py)
-SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
+WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
+SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
@@ -43,7 +46,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench lock clean
+.PHONY: help demo test test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench lock clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -62,6 +65,9 @@ endif
 ifeq ($(BROWSER),no)
 	@echo 'without Chromium: tests/cli/test_docs_browser.py is left out'
 endif
+ifeq ($(EDITORS),no)
+	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
+endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
@@ -72,7 +78,16 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) $(ARGS)
+	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	    $(WITHOUT_EDITORS) $(ARGS)
+
+vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)
+	@mkdir -p build
+	cd editors/vscode && npm ci && npm run check && npm test && npm run build && npm run package
+
+test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code; save pictures of it
+	cd tests/editors/vscode && npm ci && npm run prepare-server
+	$(TEST_ENV)/bin/python -m pytest tests/editors/vscode_check.py $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \

@@ -18,7 +18,13 @@ FILES = {
 EXPECTED: dict[str, Any] = {
     "diagnostic": ("IDL201: unknown type `flot64`", "flot64"),
     "fix": "float64 x\n",
-    "hover": {"demo_msgs/msg/Drive", "How fast to drive.", "int32 sec", "float64 speed 0.5", "RIHS01_"},
+    "hover": {
+        "demo_msgs/msg/Drive",
+        "How fast to drive.",
+        "int32 sec",
+        "float64 speed 0.5",
+        "RIHS01_",
+    },
     "definition": "Drive.msg",
     "references": [("Drive.msg", 1), ("Fleet.msg", 1), ("Fleet.msg", 2)],
     "completion": ("std_msgs/Header", "std_msgs/Header"),

@@ -205,7 +205,9 @@ def project_files(folder: Path = ROOT) -> Iterator[Path]:
     for path in folder.iterdir():
         if path.is_file():
             yield path
-        elif not (path.name in {".git", ".venv", "build", "dist", "node_modules"} or "cache" in path.name):
+        elif not (
+            path.name in {".git", ".venv", "build", "dist", "node_modules"} or "cache" in path.name
+        ):
             yield from project_files(path)
 
 
