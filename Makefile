@@ -5,6 +5,7 @@
 #   ROS=no              do without the ROS 2 wheels (they exist for Linux on x86-64)
 #   BROWSER=no          do without Chromium (the Debian package), which measures the pages of `idlc docs`
 #                       and of the documentation site
+#   EDITORS=no          do without Debian's neovim, emacs-nox and elpa-eglot, in which idlc lsp is tried
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
@@ -14,6 +15,7 @@
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
 BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/dev/null),yes,no)
+EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
 INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
 ARGS ?=
@@ -35,7 +37,8 @@ TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website -m 'not ros'
 BROWSER_TESTS := tests/cli/test_docs_browser.py tests/website/test_website_browser.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
-SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER)
+WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
+SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
@@ -48,8 +51,8 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest fuzz soak lint example bench site lock \
-    release-check clean
+.PHONY: help demo test test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
+    lock site release-check clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
@@ -68,6 +71,9 @@ endif
 ifeq ($(BROWSER),no)
 	@echo 'without Chromium: left out are $(BROWSER_TESTS)'
 endif
+ifeq ($(EDITORS),no)
+	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
+endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
@@ -78,7 +84,16 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) $(ARGS)
+	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	    $(WITHOUT_EDITORS) $(ARGS)
+
+vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)
+	@mkdir -p build
+	cd editors/vscode && npm ci && npm run check && npm test && npm run build && npm run package
+
+test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code; save pictures of it
+	cd tests/editors/vscode && npm ci && npm run prepare-server
+	$(TEST_ENV)/bin/python -m pytest tests/editors/vscode_check.py $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \

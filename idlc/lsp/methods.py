@@ -27,7 +27,7 @@ class Method(NamedTuple):
 
 
 METHODS = {
-    "textDocument/diagnostic": Method("pull", "document", "AskedDocument"),
+    "textDocument/diagnostic": Method("pull", "document", "OfDocument"),
     "workspace/diagnostic": Method("pull", "workspace", "AskedWorkspace"),
     "textDocument/completion": Method("completion", "complete", "AtPosition"),
     "textDocument/codeAction": Method("actions", "actions", "AskedActions"),

@@ -87,13 +87,6 @@ class OfDocument(Part, frozen=True):
     text_document: DocumentId
 
 
-class AskedDocument(Part, frozen=True):
-    """textDocument/diagnostic: what was answered before, if anything was."""
-
-    text_document: DocumentId
-    previous_result_id: str | None = None
-
-
 class PreviousResult(Part, frozen=True):
     """What was answered on a document before."""
 

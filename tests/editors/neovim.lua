@@ -3,7 +3,7 @@
 -- Keys are typed, and the editor's own functions are called. All of it runs between events, in a
 -- coroutine, or the editor could not do what it is asked for.
 
-local PATIENCE = 4000 -- milliseconds that anything may take
+local PATIENCE = 20000 -- milliseconds that anything may take
 local seen = {}
 local script
 
@@ -45,7 +45,8 @@ end
 local function problems()
   local found = {}
   for _, one in ipairs(vim.diagnostic.get(0)) do
-    table.insert(found, { one.code, one.message, one.lnum, one.col, one.end_lnum, one.end_col })
+    local marked = vim.fn.getline(one.lnum + 1):sub(one.col + 1, one.end_col)
+    table.insert(found, { one.code .. ': ' .. one.message, marked })
   end
   return #found > 0 and found
 end
@@ -53,7 +54,7 @@ end
 local function places(list)
   local found = {}
   for _, one in ipairs(list) do
-    table.insert(found, { name(vim.fn.bufname(one.bufnr)), one.lnum, one.col, one.text })
+    table.insert(found, { name(vim.fn.bufname(one.bufnr)), one.lnum, one.text })
   end
   return #found > 0 and found
 end
@@ -70,7 +71,7 @@ local function listed(what, command)
   return found
 end
 
-local CAPABILITIES = {
+local look = {
   diagnostic = function()
     open('msg/Broken.msg')
     return wait('problem', problems)
@@ -78,19 +79,15 @@ local CAPABILITIES = {
   fix = function()
     open('msg/Broken.msg', 1, 'flot64')
     wait('problem', problems)
-    local titles = {}
-    vim.ui.select = function(actions, options, choose)
-      for _, one in ipairs(actions) do
-        table.insert(titles, options.format_item(one))
-      end
+    vim.ui.select = function(actions, _, choose)
       choose(actions[1], 1)
     end
     local before = text()
     vim.lsp.buf.code_action()
     wait('fix', function()
-      return text() ~= before
+      return text() ~= before and not problems()
     end)
-    return { titles = titles, text = text() }
+    return text()
   end,
   hover = function()
     open('msg/Fleet.msg', 1, 'Drive')
@@ -119,7 +116,7 @@ local CAPABILITIES = {
     wait('jump', function()
       return name(vim.fn.bufname()) == 'Header.msg'
     end)
-    return { text = text(), line = vim.fn.getline('.'), language = vim.bo.filetype }
+    return { language = vim.bo.filetype, text = text() }
   end,
   references = function()
     open('msg/Fleet.msg', 1, 'Drive')
@@ -180,6 +177,13 @@ local CAPABILITIES = {
   end,
 }
 
+local CAPABILITIES = vim.tbl_filter(function(one)
+  return look[one]
+end, {
+  'diagnostic', 'fix', 'hover', 'definition', 'built_in', 'references',
+  'completion', 'rename', 'format', 'symbol', 'inlay_hint',
+})
+
 -- Neovim 0.7 has neither `vim.lsp.enable`, which the plugin calls, nor `vim.lsp.start`.
 local function attach_old()
   local client
@@ -210,10 +214,16 @@ local function main()
       return client.initialized
     end
   end)
-  for capability, look in pairs(CAPABILITIES) do
-    local ok, found = pcall(look)
+  for _, capability in ipairs(CAPABILITIES) do
+    local ok, found = pcall(look[capability])
     seen[capability] = ok and found or { failed = found }
-    vim.cmd('silent! stopinsert | silent! pclose')
+    for _, buffer in ipairs(vim.api.nvim_list_bufs()) do
+      if vim.bo[buffer].modified then
+        vim.api.nvim_buf_call(buffer, function()
+          vim.cmd('silent edit!')
+        end)
+      end
+    end
   end
   vim.cmd('silent edit! msg/Drive.msg')
   seen.language = vim.bo.filetype

