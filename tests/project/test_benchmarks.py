@@ -77,3 +77,16 @@ def test_the_kept_run_is_of_everything(tmp_path):
     run = results.load()
     assert rows(tmp_path) <= {(one.group, one.name) for one in run.results}
     assert set(PEERS) <= set(run.versions)
+
+
+def test_readers_of_recordings_can_be_measured():
+    command = [sys.executable, "-m", "benchmarks.recordings", "--quick"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    head, _, row = done.stdout.splitlines()
+    readers = [cell.strip() for cell in head.strip("| ").split("|")]
+    assert {"idlc", "rosbags", "mcap-ros2-support"} <= {*readers}
+    name, *times = (cell.strip() for cell in row.strip("| ").split("|"))
+    assert name == "none Imu"
+    assert len(times) == len(readers)
+    assert all(float(time) > 0 for time in times)

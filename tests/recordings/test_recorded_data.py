@@ -1,5 +1,6 @@
 """The programs of docs/recorded-data.md; parts, also on a cluster that loses a worker."""
 
+import json
 import os
 import re
 import subprocess
@@ -95,3 +96,13 @@ def test_parts_are_the_whole_in_their_order(storage, tmp_path):
                 pairs = [pair for part in parts for pair in part.messages()]
                 assert pairs == list(chosen)
             assert len(parts) == 1
+
+
+def test_the_notebook_runs(tmp_path):
+    notebook = json.loads((ROOT / "examples" / "recording.ipynb").read_text(encoding="utf-8"))
+    code = [cell["source"] for cell in notebook["cells"] if cell["cell_type"] == "code"]
+    cells = ["".join(lines) for lines in code]
+    assert not any(cell.get("outputs") for cell in notebook["cells"])
+    said = run(tmp_path, "-c", "\n".join(cells))
+    assert "1000 messages, 0.0 ms late at most" in said
+    assert "turned by 1.82 rad in 1.99 s" in said
