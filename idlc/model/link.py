@@ -11,19 +11,17 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.suggest import did_you_mean, package_hint
 from idlc.model import catalog, derive, ir, names
-from idlc.model.circles import circles
 from idlc.model.distro import DEFAULT, Distro, titles
 from idlc.model.lowering import slips
 from idlc.model.lowering.types import STRINGS
 from idlc.model.pool import Pool
+from idlc.model.recursion import check_recursion
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer
 
 #: Problems after which nearest names are no longer looked for; people see fewer than these.
 SUGGESTIONS = 200
-#: Messages of a circle that are named.
-NAMED = 10
 _PRIMITIVES = (*ir.PRIMITIVES, *STRINGS)
 
 
@@ -152,7 +150,7 @@ def link(
     for interface in interfaces.values():
         pool.add(interface)
     _load_references(interfaces, pool)
-    _check_recursion(interfaces, pool)
+    check_recursion(interfaces, pool)
     for name in interfaces:
         if errors := pool[name].errors:
             report.extend(errors)
@@ -280,24 +278,4 @@ def _of_others(target: ir.TypeName) -> str | None:
     return (
         f"it is built in for {titles(others)}; if your ROS 2 has it, add `-I DIR` with its "
         "sources, or source your ROS 2"
-    )
-
-
-def _check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
-    """Note each field that closes a circle."""
-    for path, field in circles(interfaces, pool.references, pool.searched):
-        if field.type_span is not None:
-            pool[path[-1]].errors.append(_circle(path, field.type_span))
-
-
-def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
-    """Return the problem with a circle of the messages on `path`."""
-    left_out = len(path) - NAMED
-    shown = [name.name for name in path[:NAMED]]
-    shown += [f"{left_out} more"] if left_out > 0 else []
-    circle = " → ".join((*shown, path[0].name))
-    return codes.RECURSIVE_TYPE.at(
-        span,
-        f"`{path[0].name}` contains itself: {circle}",
-        hint="ROS 2 has no recursive types; refer to the other message by an id",
     )
