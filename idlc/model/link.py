@@ -11,11 +11,11 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.suggest import did_you_mean, package_hint
 from idlc.model import catalog, derive, ir, names
+from idlc.model.circles import check_recursion
 from idlc.model.distro import DEFAULT, Distro, titles
 from idlc.model.lowering import slips
 from idlc.model.lowering.types import STRINGS
 from idlc.model.pool import Pool
-from idlc.model.recursion import check_recursion
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer
