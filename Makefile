@@ -34,11 +34,12 @@ RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
-WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website -m 'not ros'
+WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website
 BROWSER_TESTS := tests/cli/test_docs_browser.py tests/website/test_website_browser.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
+NOT_ROS := $(if $(filter no,$(ROS)), and not ros)
 
 PIP_INSTALL = -m pip install --quiet --disable-pip-version-check
 # One file of versions and hashes per environment, and first the one that builds packages.
@@ -51,7 +52,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
+.PHONY: help demo test test-long test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
     lock site release-check clean
 
 help: ## show this list
@@ -74,7 +75,10 @@ endif
 ifeq ($(EDITORS),no)
 	@echo 'without Neovim and Emacs of Debian: tests/editors/test_debian.py is left out'
 endif
-	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
+	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not long$(NOT_ROS)' $(SELECTION) $(ARGS)
+
+test-long: $(TEST_ENV)/installed ## run the tests that take long: they build, install and break packages
+	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
 	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
@@ -84,7 +88,7 @@ test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed
-	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
+	$(LOWEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not long and not ros' $(WITHOUT_ROS) $(WITHOUT_BROWSER) \
 	    $(WITHOUT_EDITORS) $(ARGS)
 
 vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or newer)

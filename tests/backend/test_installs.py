@@ -12,6 +12,8 @@ from tests.backend.test_hooks import BUILD, FILES, MANIFEST, tree, write
 from tests.project.test_wheel import Environment, distributions, run
 from tests.support.programs import clean_environment, ended
 
+pytestmark = pytest.mark.long
+
 BIN = Path(sys.executable).parent
 #: idlc and hatchling of this environment, and no network.
 HERE = ["--no-build-isolation", "--no-deps"]

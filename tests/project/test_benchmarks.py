@@ -19,6 +19,7 @@ def rows(folder: Path) -> set[tuple[str, str]]:
     return {(row.group, row.name) for row in benchmarks.selected(work, [])}
 
 
+@pytest.mark.long
 def test_everything_can_be_measured(tmp_path):
     """One tiny round of all, in a process of its own, because rclpy stays where it once was."""
     path = tmp_path / "run.json"

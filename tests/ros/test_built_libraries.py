@@ -14,6 +14,8 @@ import pytest
 from tests.support import native, programs
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.long
+
 #: Where Python finds idlc and what it needs.
 SITE = str(Path(msgspec.__file__).parents[1])
 IDLC = f"{ROOT}:{SITE}"

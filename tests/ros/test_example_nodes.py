@@ -133,6 +133,7 @@ def _waits(client) -> bool:
         return False
 
 
+@pytest.mark.long
 def test_the_example_passes_its_own_tests(ros_environment):
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test"],

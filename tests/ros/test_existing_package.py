@@ -16,6 +16,8 @@ from idlc.cli.main import main
 from tests.support.paths import DOCS
 from tests.support.programs import run_with
 
+pytestmark = pytest.mark.long
+
 PAGE = DOCS / "existing-package.md"
 SETUP = """\
 from setuptools import setup

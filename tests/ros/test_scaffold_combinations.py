@@ -16,6 +16,8 @@ import pytest
 from idlc.cli.main import main
 from tests.support.nodes import nodes
 
+pytestmark = pytest.mark.long
+
 SEED = int(os.environ.get("IDLC_SEED", "4"))
 COUNT = 100
 #: Of these, every third is started in `make test`, all by IDLC_LONG.

@@ -13,6 +13,8 @@ from catkin_pkg.package import parse_package
 from tests.support.paths import EXAMPLE, ROOT
 from tests.support.programs import ended, run_with
 
+pytestmark = pytest.mark.long
+
 GENERATED = ("msg", "srv", "action", "_idlc", "idlc.lock", "py.typed")
 
 

@@ -15,6 +15,8 @@ import pytest
 from idlc.cli.main import main
 from tests.support import programs
 
+pytestmark = pytest.mark.long
+
 EVERY = 1 if os.environ.get("IDLC_LONG") else 6
 AT_ONCE = 4
 MARK = "this is the mutant"

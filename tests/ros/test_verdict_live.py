@@ -48,7 +48,9 @@ def ask_rosidl(cases: list[dict], folder: Path) -> list[dict]:
     return [json.loads(line) for line in answered.read_text(encoding="utf-8").splitlines()]
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize(
+    "part", [0, *(pytest.param(part, marks=pytest.mark.long) for part in range(1, PARTS))]
+)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_rosidl_and_idlc_agree_on_invented_files(family, part, tmp_path):
     cases = FAMILIES[family]()[part::PARTS]
