@@ -130,15 +130,10 @@ class _Filling:
             target[...] = self.value(node).reshape(target.shape)
 
     def strings(self, node: Strings, target: Any) -> None:
-        """Copy a column of strings; of arrays, the first ones of all, and so on."""
+        """Copy a column of strings."""
         starts, sizes = self.table.strings(self.elements, node)
-        read, width = self.table.source.strings, target.dtype.itemsize
-        if target.ndim == 2 and len(target) > target.shape[1]:
-            count = target.shape[1]
-            for at in range(count):
-                target[:, at] = read(starts[at::count], sizes[at::count], width)
-        else:
-            target[...] = read(starts, sizes, width).reshape(target.shape)
+        found = self.table.source.strings(starts, sizes, target.dtype.itemsize)
+        target[...] = found.reshape(target.shape)
 
     def value(self, node: Numbers | Instant) -> Any:
         """Return numbers or times, which may be in the buffer."""
