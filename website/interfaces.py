@@ -19,8 +19,9 @@ PACKAGES = """
 def write(folder: Path) -> None:
     """Write the pages of all packages of common_interfaces into `folder`."""
     share = Path(sys.prefix) / "share"
-    paths = [str(share / name) for name in PACKAGES if (share / name / "package.xml").is_file()]
+    installed = {name for name in PACKAGES if (share / name / "package.xml").is_file()}
+    words = [str(share / name) if name in installed else name for name in PACKAGES]
     with redirect_stdout(StringIO()):  # it tells of a folder that is temporary
-        failed = main(["docs", *(paths or PACKAGES), "-o", str(folder)])
+        failed = main(["docs", *words, "-o", str(folder)])
     if failed:
         raise SystemExit("idlc docs failed, see above")

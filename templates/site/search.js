@@ -5,10 +5,11 @@ const field = document.getElementById("search");
 const found = document.getElementById("found");
 const root = document.body.dataset.root;
 let entries = null;
+let asked = false;
 
 function load() {
-  if (entries !== null) return;
-  entries = [];
+  if (asked) return;
+  asked = true;
   const script = document.createElement("script");
   script.src = `${root}index.js`;
   script.addEventListener("load", () => {
@@ -44,6 +45,7 @@ function line([name, page, about]) {
 }
 
 function search() {
+  if (entries === null) return;
   const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
   const hits = entries
     .map((entry) => [words.length === 0 ? -1 : rank(entry, words), entry])

@@ -141,7 +141,6 @@ def test_the_search_finds_the_page_with_the_answer(site):
     (found,) = browser.measured(site, ["index.html"], [DESK], SEARCH % json.dumps([*QUESTIONS]))
     missed = {}
     for question, pages in QUESTIONS.items():
-        assert all((site / page.partition("#")[0]).is_file() for page in pages), question
         first = found["answers"][question][:FIRST]
         if not {*first, *(one.partition("#")[0] for one in first)} & {*pages}:
             missed[question] = first
