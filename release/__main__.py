@@ -42,9 +42,10 @@ def check(tag: str | None, keep: Path | None) -> None:
         for look in ARCHIVES:
             look(made)
             _passed(look)
-        for path in made.both if keep is not None else ():
+        if keep is not None:
             keep.mkdir(exist_ok=True)
-            shutil.copy(path, keep)
+            for path in made.both:
+                shutil.copy(path, keep)
     if HERE.repository is None:
         print("still to do before the first upload: say where the repository is (RELEASING.md)")
 

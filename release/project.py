@@ -33,7 +33,8 @@ class Project(NamedTuple):
     @property
     def version(self) -> str:
         """The version, which stands in the package itself."""
-        return re.findall(r'^__version__ = "(.*)"$', self.text("idlc/__init__.py"), re.MULTILINE)[0]
+        found: list[str] = re.findall(r'(?m)^__version__ = "(.*)"$', self.text("idlc/__init__.py"))
+        return found[0]
 
     @property
     def metadata(self) -> dict[str, object]:
@@ -92,7 +93,7 @@ class Project(NamedTuple):
 
 
 def run(*words: object, cwd: Path, **variables: str) -> str:
-    """Return what a program printed; raises `Failed` with that if it fails."""
+    """Return what a program printed; raises `FailedError` with that if it fails."""
     done = subprocess.run(
         [str(word) for word in words],
         cwd=cwd,
