@@ -41,7 +41,7 @@ def rows(work: Work) -> Iterator[Row]:
 def columns(work: Work, varied: Varied):
     kind = work.implementations[IDLC].class_of(*MESSAGES[varied.message].parts)
     count = varied.count // 10 if work.quick else varied.count
-    whole, rng = work.message(IDLC, varied.message), Random(1)
+    whole, rng = work.message(IDLC, varied.message), Random(1)  # noqa: S311 - only to vary sizes
     messages = [shortened(whole, rng) for _ in range(count)]
     buffers = kind.serialize_many(messages)
     assert kind.to_columns(buffers, ragged=True)[-1] == messages[-1].to_dict()

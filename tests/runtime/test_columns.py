@@ -4,6 +4,7 @@ import os
 import random
 import struct
 from contextlib import suppress
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -156,6 +157,25 @@ def test_large_messages(msg):
     for message in messages:
         message.data = rng.randbytes(70_000)
     check(msg.Image, buffers_of(messages, rng, ["big"]), rng)
+
+
+@pytest.mark.parametrize("name", ["Joints", "Deep", "Deeper", "Wide"])
+def test_many_messages_of_a_few_layouts(folder, error, name):
+    rng = random.Random(name)
+    cls = class_of(name)
+    kinds = messages_of(cls, rng, 3, 4)
+    numbers = [field for field in ("n", "end", "last", "moving") if hasattr(kinds[0], field)]
+    messages = [deepcopy(kinds[min(rng.randrange(6), 2)]) for _ in range(200)]
+    for message, other in zip(messages, messages_of(cls, rng, 200, 3), strict=True):
+        for field in numbers:
+            if not isinstance(getattr(message, field), list):
+                setattr(message, field, getattr(other, field))
+    raws = buffers_of(messages, rng)
+    check(cls, raws, rng)
+    for wrong in (0, 150):
+        broken = [*raws[:wrong], raws[wrong][:9], *raws[wrong + 1 :]]
+        with pytest.raises(error, match=rf"^\[{wrong}\]"):
+            cls.to_columns(batch_of(cls, broken, rng))
 
 
 def test_one_long_sequence_among_short_ones(msg):

@@ -83,7 +83,7 @@ def check(cls, buffers, rng):
         columns = cls.to_columns(batch_of(cls, buffers, rng), ragged=True)
         assert repr(columns.to_list()) == repr(wanted)
     rows = cls.to_columns(buffers)
-    if isinstance(rows, np.ndarray):
+    if isinstance(rows, np.ndarray) and "\ufffd" not in repr(wanted):  # there texts are bytes
         assert repr([plain_row(row) for row in rows]) == repr(short_texts(wanted))
     table = cls.to_arrow(iter(map(memoryview, buffers)))
     table.validate(full=True)

@@ -11,6 +11,7 @@ from ...errors import DecodeError
 from ..batches import failed
 from ..field_reader import check
 from ..typeinfo import type_name
+from .alike import alike
 from .build import plan_of
 from .gather import Flat, Pieces, Source
 from .lanes import Found, Lanes, UnreadableError
@@ -88,21 +89,24 @@ def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
     big = big_endian(messages)
     mixed = bool(big.any() and not big.all())
     source, found = messages.source, Found()
-    done = []
+    done: list[Any] = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
-        if len(rows):
-            starts = messages.starts[rows] + 4
-            lanes = Lanes(starts, messages.stops[rows], starts)
+        starts = messages.starts[rows] + 4
+        lanes = Lanes(starts, messages.stops[rows], starts)
+        rest = np.ones(len(rows), bool)
+        for chosen in alike(plan, source, order, lanes, found):
+            done.append(rows[chosen])
+            rest[chosen] = False
+        if rest.any():
             first = found.count[plan.key]
-            found.count[plan.key] += len(rows)
-            Scan(source, order, found).level(plan, lanes, first)
-            done.append(rows)
+            found.count[plan.key] += int(rest.sum())
+            Scan(source, order, found).level(plan, lanes.some(rest), first)
+            done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
     size = int((messages.stops - messages.starts).sum())
     table = Table(source, size, order, found)
-    if mixed:
-        return table, Elements(plan, len(big), np.concatenate(done), big)
-    return table, Elements(plan, len(big), None, None)
+    order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
+    return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 
 
 def big_endian(messages: Messages) -> Any:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .gather import Place, Source, rows_of
-from .lanes import Found
+from .lanes import Found, joined
 from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings
-from .texts import narrow_texts, offsets_of, wide_texts
+from .texts import narrow_texts, offsets_of, wide_texts, without_zeros
 from .values import Columns, Ragged, Texts
 
 
@@ -37,7 +37,7 @@ class Table:
         self.size = size
         self.order = order
         self.found = found
-        self.texts: dict[int, Texts] = {}
+        self.places: dict[int, tuple[Any, Any]] = {}
         self.lists: dict[int, tuple[Any, Elements]] = {}
 
     def sorted(self, elements: Elements, parts: list[Any]) -> Any:
@@ -49,20 +49,24 @@ class Table:
         result[elements.order] = found
         return result
 
-    def text(self, elements: Elements, node: Strings) -> Texts:
-        """Return a column of strings."""
+    def strings(self, elements: Elements, node: Strings) -> tuple[Any, Any]:
+        """Return where strings begin, and their sizes without terminating zeros."""
         key = node.text.key
         assert key is not None
-        if key not in self.texts:
+        if key not in self.places:
             starts = self.sorted(elements, self.found.at[key])
             sizes = self.sorted(elements, self.found.size[key])
-            if node.text.wide:
-                big = elements.big
-                made = wide_texts(self.source, starts, sizes, self.order, big)
-            else:
-                made = narrow_texts(self.source, starts, sizes)
-            self.texts[key] = made
-        return self.texts[key]
+            if not node.text.wide:
+                sizes = without_zeros(self.source, starts, sizes)
+            self.places[key] = starts, sizes
+        return self.places[key]
+
+    def texts(self, elements: Elements, node: Strings) -> Texts:
+        """Return a column of strings."""
+        starts, sizes = self.strings(elements, node)
+        if node.text.wide:
+            return wide_texts(self.source, starts, sizes, self.order, elements.big)
+        return narrow_texts(self.source, starts, sizes)
 
     def list(self, elements: Elements, step: List) -> tuple[Any, Elements]:
         """Return the offsets of a column of sequences, and what the elements are."""
@@ -169,7 +173,7 @@ class _Making:
             )
             return made.reshape(count, *made.shape[1 + depth :])
         if isinstance(node, Strings):
-            return self.table.text(self.elements, node)
+            return self.table.texts(self.elements, node)
         if isinstance(node, Instant):
             parts = (node.seconds, node.nanoseconds)
             return instants(node, *(self.column(one, count, depth) for one in parts))
@@ -197,12 +201,3 @@ class _Making:
 def instants(node: Instant, seconds: Any, nanoseconds: Any) -> Any:
     """Return times of numpy."""
     return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
-
-
-def joined(parts: list[Any]) -> Any:
-    """Return parts as one array."""
-    if len(parts) == 1:
-        return np.asarray(parts[0], np.int64)
-    return np.concatenate(
-        [np.empty(0, np.int64), *(np.asarray(p, np.int64) for p in parts)]
-    )

@@ -11,10 +11,14 @@ from .gather import Source
 from .values import Texts
 
 
-def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
-    """Return the strings at some places, mostly with a terminating zero."""
+def without_zeros(source: Source, starts: Any, sizes: Any) -> Any:
+    """Return the sizes of strings without their terminating zeros, if they have any."""
     last = np.maximum(starts + sizes, 1) - 1
-    sizes = sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
+    return sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
+
+
+def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
+    """Return the strings at some places, of so many bytes."""
     made = Texts(offsets_of(sizes), source.ranges(starts, sizes))
     return made if _is_utf8(made) else _encoded(map(_text, _parts(made)))
 

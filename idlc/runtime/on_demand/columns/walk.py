@@ -19,6 +19,7 @@ class Walk:
     """Goes over one message at a time.
 
     `end` is where it ends, values align relative to `phase`, and `view` begins at `shift`.
+    `sizes` has all sizes and counts, and where they are.
     """
 
     def __init__(self, order: str, found: Found) -> None:
@@ -27,9 +28,11 @@ class Walk:
         self.found = found
         self.end = self.phase = self.shift = 0
         self.view: Any = b""
+        self.sizes: list[tuple[int, int]] = []
 
     def enter(self, source: Source, lanes: Lanes, row: int) -> None:
         """Begin with the message of a lane."""
+        self.sizes = []
         self.end, self.phase = int(lanes.end[row]), int(lanes.phase[row])
         self.view, self.shift = source.around(int(lanes.at[row]))
 
@@ -71,6 +74,7 @@ class Walk:
         at = aligned(at, self.phase, 4)
         after = self.take(at, 4)
         value: int = self.unpack(self.view, at - self.shift)[0]
+        self.sizes.append((at, value))
         return value, after
 
     def text(self, step: Text, at: int) -> int:
@@ -97,6 +101,7 @@ class Walk:
             (size,) = unpack(view, at - 4 - shift)
             starts.append(at)
             sizes.append(size)
+            self.sizes.append((at - 4, size))
             at += size
         for index, step in enumerate(level.steps):
             if isinstance(step, Text) and step.key is not None:

@@ -39,18 +39,37 @@ class Flat:
         return np.may_share_memory(numbers, self.array)
 
     def items(self, starts: Any, dtype: str) -> Any:
-        """Return what begins at each of some positions."""
-        return self._windows(dtype)[starts]
+        """Return what begins at each of some positions: a view, if these are regular."""
+        distance = _regular(starts)
+        if distance is None:
+            return self._windows(dtype)[starts]
+        first = int(starts[0])
+        return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
+
+    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
+        """Return bytes, at most `width` from each start, as numpy has them."""
+        same = bool((sizes == sizes[:1]).all())
+        distance = _regular(starts) if same and len(sizes) and sizes[0] else None
+        if distance is not None:
+            dtype, first = f"S{sizes[0]}", int(starts[0])
+            return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
+        if width > SHORT or (starts + width > len(self.array)).any():
+            return _padded(self, starts, sizes, width)
+        rows = self._windows(f"V{width}")[starts].view(np.uint8)
+        inside = np.arange(width) < np.arange(width + 1)[:, None]
+        masks = np.where(inside, np.uint8(255), np.uint8(0)).view(f"V{width}")[:, 0]
+        rows &= masks[sizes].view(np.uint8)
+        return rows.view(f"S{width}")
 
     def blocks(self, starts: Any, size: int) -> Place:
         """Return where the bytes from each start are: if they are regular, where they were."""
         distance = _regular(starts)
-        if distance is not None and distance >= size:
+        if distance is not None:
             return Place(self.array, int(starts[0]), (len(starts),), (distance,))
         if size > LARGEST_ITEM:
             rows = self._one_by_one(starts, np.full(len(starts), size))
         else:
-            rows = self.items(starts, f"V{size}").view(np.uint8)
+            rows = self._windows(f"V{size}")[starts].view(np.uint8)
         return Place(rows, 0, (len(starts),), (size,))
 
     def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
@@ -65,13 +84,13 @@ class Flat:
             return self._one_by_one(starts, sizes)
         longest = int(sizes.max())
         if longest <= SHORT and (starts + longest <= len(self.array)).all():
-            rows = self.items(starts, f"V{longest}").view(np.uint8)
+            rows = self._windows(f"V{longest}")[starts].view(np.uint8)
             return rows.reshape(-1, longest)[np.arange(longest) < sizes[:, None]]
         counts = sizes // item
         shift = starts - (np.cumsum(counts) - counts) * item
         places = np.repeat(shift, counts)
         places += np.arange(len(places)) * item
-        return self.items(places, f"V{item}").view(np.uint8)
+        return self._windows(f"V{item}")[places].view(np.uint8)
 
     def _windows(self, dtype: str) -> Any:
         """Return an array of what begins at each byte."""
@@ -109,6 +128,10 @@ class Pieces:
         made = np.dtype(dtype)
         return self.ranges(starts, np.full(len(starts), made.itemsize)).view(made)
 
+    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
+        """Return bytes, at most `width` from each start, as numpy has them."""
+        return _padded(self, starts, sizes, width)
+
     def blocks(self, starts: Any, size: int) -> Place:
         """Return where copies of the bytes from each start are."""
         rows = self.ranges(starts, np.full(len(starts), size))
@@ -145,7 +168,13 @@ def rows_of(source: Source, starts: Any, counts: Any, item: int) -> Place | None
 
 def _regular(starts: Any) -> int | None:
     """Return the distance of positions that are all as far from each other."""
-    if len(starts) < 2:
+    if len(starts) < 2 or starts[1] - starts[0] != starts[-1] - starts[-2]:
         return None
     distance = int(starts[1] - starts[0])
-    return distance if (np.diff(starts) == distance).all() else None
+    return distance if (starts[1:] - starts[:-1] == distance).all() else None
+
+
+def _padded(source: Source, starts: Any, sizes: Any, width: int) -> Any:
+    result = np.zeros((len(sizes), width), np.uint8)
+    result[np.arange(width) < sizes[:, None]] = source.ranges(starts, sizes)
+    return result.reshape(-1).view(f"S{width}")

@@ -120,3 +120,12 @@ def repeat_fixed(
             starts = again[step.key][owner] + (index - 1) * distance
             starts[firsts] = begin[step.key]
             found.at[step.key].append(starts)
+
+
+def joined(parts: list[Any]) -> Any:
+    """Return parts as one array."""
+    if len(parts) == 1:
+        return np.asarray(parts[0], np.int64)
+    return np.concatenate(
+        [np.empty(0, np.int64), *(np.asarray(p, np.int64) for p in parts)]
+    )

@@ -10,7 +10,6 @@ import numpy as np
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
 from .read import table_of
 from .table import Elements, Table, columns_of, instants
-from .values import Texts
 
 #: Texts take as much room as the longest of their column. So many bytes are always taken, and
 #: more only up to so many for each byte of the messages.
@@ -86,7 +85,7 @@ class _Types:
             raise UnevenError(
                 f"{path} is a wstring, which no structured array can hold"
             )
-        sizes = self.table.text(elements, node).sizes
+        _, sizes = self.table.strings(elements, node)
         return np.dtype(f"S{max(1, int(sizes.max(initial=0)))}")
 
     def count(self, node: Lists, elements: Elements, path: str) -> tuple[int, Elements]:
@@ -126,10 +125,15 @@ class _Filling:
         elif isinstance(node, Lists):
             self.lists(node, target)
         elif isinstance(node, Strings):
-            texts = self.table.text(self.elements, node)
-            target[...] = fixed(texts, target.dtype).reshape(target.shape)
+            self.strings(node, target)
         else:
             target[...] = self.value(node).reshape(target.shape)
+
+    def strings(self, node: Strings, target: Any) -> None:
+        """Copy a column of strings."""
+        starts, sizes = self.table.strings(self.elements, node)
+        found = self.table.source.strings(starts, sizes, target.dtype.itemsize)
+        target[...] = found.reshape(target.shape)
 
     def value(self, node: Numbers | Instant) -> Any:
         """Return numbers or times, which may be in the buffer."""
@@ -151,13 +155,3 @@ class _Filling:
             numbers = self.table.inside(self.elements, node.step, elements, even)
             inside = _Filling(self.table, elements, numbers)
         inside.fill(node.element, target)
-
-
-def fixed(texts: Texts, dtype: Any) -> Any:
-    """Return texts as an array of a dtype that all fit into."""
-    width, sizes = dtype.itemsize, texts.sizes
-    if (sizes == width).all():
-        return texts.values.view(dtype)
-    result = np.zeros((len(sizes), width), np.uint8)
-    result[np.arange(width) < sizes[:, None]] = texts.values
-    return result.reshape(-1).view(dtype)
