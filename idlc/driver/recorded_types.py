@@ -40,6 +40,7 @@ class Around:
     def __init__(self, scope: Scope, report: Report) -> None:
         self.library = Library(scope.include, report, own=nearby.near(), distro=scope.distro)
         self._compiler = Compiler(self.library)
+        self._hashes: dict[ir.TypeName, str | None] = {}
 
     def model(self, package: str, names: Iterable[ir.TypeName]) -> Model:
         """Return the model of those of a package's interfaces that are known and sound."""
@@ -50,8 +51,11 @@ class Around:
 
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
         """Return the hash of a type, which an interface implies; `None` if it is not known."""
-        model = self.model(interface.package, [interface])
-        return model.describer.hash(str(name)) if has(model, name) else None
+        if name not in self._hashes:
+            model = self.model(interface.package, [interface])
+            known = has(model, name)
+            self._hashes[name] = model.describer.hash(str(name)) if known else None
+        return self._hashes[name]
 
 
 def has(model: Model, name: ir.TypeName) -> bool:

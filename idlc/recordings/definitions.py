@@ -11,14 +11,18 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from idlc.diagnostics.source import Source
+from idlc.disk.read import MAX_LINES
 from idlc.model import ir, names
 from idlc.recordings.container import Topic
+from idlc.syntax.grammar import LINE_ENDS
 
 IDL = "ros2idl"
 #: `unknown` is what a recorder says of a service that refers to no message.
 ENCODINGS = ("ros2msg", IDL, "unknown", "")
-#: Characters of one definition with all that it refers to; real ones stay below 1 MiB.
+#: Characters of a definition with all that it refers to, and of one in IDL, each word of which
+#: takes memory; real ones stay below a tenth of it.
 MAX_TEXT = 16 << 20
+MAX_IDL = 2 << 20
 _DELIMITER = re.compile(
     r"^={80}[ \t]*\r?\n(MSG|IDL|SRV|ACTION):[ \t]*([^\s]*)[^\n]*(?:\n|\Z)", re.MULTILINE
 )
@@ -86,17 +90,25 @@ def interface_of(name: ir.TypeName) -> ir.TypeName:
 def _definitions(topic: Topic, root: ir.TypeName) -> Iterator[tuple[ir.TypeName, str, str]]:
     """Yield name, extension and text of each definition that came with a topic."""
     schema = topic.schema
-    if schema is None or schema.encoding not in ENCODINGS or len(schema.text) > MAX_TEXT:
+    if schema is None or schema.encoding not in ENCODINGS or _is_too_large(schema.text):
         return
     is_idl = schema.encoding == IDL
     head, *parts = _DELIMITER.split(schema.text)
-    if head.strip() and schema.encoding in ENCODINGS[:2]:
+    if head.strip() and schema.encoding in ENCODINGS[:2] and _is_readable(head, is_idl):
         yield root, "idl" if is_idl else root.kind, _tidy(head, is_idl)
     for mark, written, text in zip(parts[::3], parts[1::3], parts[2::3], strict=True):
         name = type_name(written, _KINDS[mark])
-        if name is not None:
+        if name is not None and _is_readable(text, mark == "IDL"):
             own = interface_of(name)
             yield own, "idl" if mark == "IDL" else own.kind, _tidy(text, mark == "IDL")
+
+
+def _is_too_large(text: str) -> bool:
+    return len(text) > MAX_TEXT or sum(map(text.count, LINE_ENDS)) > MAX_LINES
+
+
+def _is_readable(text: str, is_idl: bool) -> bool:
+    return not is_idl or len(text) <= MAX_IDL
 
 
 def _tidy(text: str, is_idl: bool) -> str:

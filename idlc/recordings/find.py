@@ -11,6 +11,9 @@ from idlc.disk.find import KIND_FOLDERS, KINDS
 from idlc.disk.read import is_file, is_folder
 from idlc.recordings.bag import COMPRESSED, METADATA, SUFFIXES
 
+#: What cannot be read, which opening it says.
+ROS_1 = ".bag"
+
 
 def is_recording(word: str) -> bool:
     """Return whether a path means a recording: an .mcap or .db3 file, or the folder of a bag.
@@ -18,7 +21,7 @@ def is_recording(word: str) -> bool:
     A folder is that of a bag if it has a metadata.yaml, or recordings and no interfaces.
     """
     path = Path(word)
-    if path.name.endswith((*SUFFIXES, *COMPRESSED)):
+    if path.name.endswith((*SUFFIXES, *COMPRESSED, ROS_1)):
         return not is_folder(path) or _is_bag(path)
     return is_folder(path) and _is_bag(path)
 
@@ -38,8 +41,8 @@ def _is_bag(folder: Path) -> bool:
 
 
 def is_there(word: str) -> bool:
-    """Return whether a path leads to a regular file or a folder."""
-    return is_file(word) or is_folder(Path(word))
+    """Return whether a path leads to a regular file or a folder; only opening a URL shows it."""
+    return "://" in word or is_file(word) or is_folder(Path(word))
 
 
 def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:

@@ -131,6 +131,14 @@ def test_a_recording_goes_with_other_inputs(tmp_path, monkeypatch):
         assert class_of("mine/msg/Own")().wheels.header.something_else == 0
 
 
+def test_topics_are_those_of_recordings(tmp_path, capsys):
+    (tmp_path / "A.msg").write_text("int8 a\n", encoding="utf-8")
+    assert main(["gen", str(tmp_path), "-o", str(tmp_path / "out"), "--topic", "/x"]) == 2
+    assert "--topic is for recordings" in capsys.readouterr().err
+    assert main(["show", "std_msgs/msg/Header", "/x"]) == 2
+    assert "is no recording" in capsys.readouterr().err
+
+
 def test_nothing_is_written_of_a_recording_without_types(tmp_path, capsys):
     path = recorded_text.write(tmp_path / "a.mcap", "@ /x foxglove.Scene protobuf\nabc\n")
     assert main(["gen", str(path), "-o", str(tmp_path / "out")]) == 2

@@ -81,6 +81,11 @@ def command(style: str, watch: bool, **given: Any) -> int:
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
+    if wanted.topics:
+        from idlc.recordings.find import divided
+
+        if not divided(wanted.paths)[0]:
+            raise click.UsageError("--topic is for recordings, and none was given")
     if wanted.check and (watch or wanted.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
