@@ -19,6 +19,9 @@ class Source(Protocol):
     def view(self, start: int, size: int) -> memoryview:
         """Return so many bytes; raise RecordingError if the file has fewer."""
 
+    def forget(self, start: int, stop: int) -> None:
+        """Let memory go in which bytes were kept; views of them read these again."""
+
     def close(self) -> None:
         """Release the file; views that somebody holds stay valid."""
 
@@ -31,20 +34,28 @@ class MappedFile:
         try:
             with path.open("rb") as file:
                 self.size = file.seek(0, 2)
-                mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if self.size else b""
+                self._map = (
+                    mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if self.size else None
+                )
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise RecordingError(f"`{path}` cannot be read: {reason}") from None
-        self._bytes = memoryview(mapped)
+        self._bytes = memoryview(self._map or b"")
 
     def view(self, start: int, size: int) -> memoryview:
         """Return a view of the mapped file."""
         within(self, start, size)
         return self._bytes[start : start + size]
 
+    def forget(self, start: int, stop: int) -> None:
+        """Unmap pages, or the whole of a long file would count as this process's memory."""
+        first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
+        if self._map and hasattr(mmap, "MADV_DONTNEED") and first < stop:
+            self._map.madvise(mmap.MADV_DONTNEED, first, stop - first)
+
     def close(self) -> None:
         """Forget the map, which lives as long as views of it."""
-        self._bytes = memoryview(b"")
+        self._map, self._bytes = None, memoryview(b"")
         self.size = 0
 
 
@@ -108,6 +119,9 @@ class OpenedFile:
         if len(found) != size:
             raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
         return memoryview(found)
+
+    def forget(self, start: int, stop: int) -> None:
+        """Do nothing: nothing is kept."""
 
     def close(self) -> None:
         """Close the file."""

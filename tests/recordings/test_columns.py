@@ -187,14 +187,15 @@ def test_a_terminal_sees_a_bar(recording):
     assert seen.getvalue().rpartition("\r")[0].endswith(" ")
 
 
-def test_memory_is_bounded_by_chunks_and_not_by_the_recording(here):
+@pytest.mark.parametrize("compression", ["", "zstd"])
+def test_memory_is_bounded_by_chunks_and_not_by_the_recording(compression, here):
     """A recording many times as large as a group of chunks takes not much more than one."""
     frames = (
         made.Recorded("/b", "std_msgs/msg/UInt8MultiArray", n, n, bytes(4 + 8) + data)
         for n in range(200)
         for data in [(1 << 20).to_bytes(4, "little") + bytes(1 << 20)]
     )
-    recording = made.by_mcap(here / "rec.mcap", frames, "zstd")
+    recording = made.by_mcap(here / "rec.mcap", frames, compression)
     code = (
         "import resource\nfrom idlc.cli.main import main\n"
         "import pyarrow.parquet, numpy, zstandard\n"

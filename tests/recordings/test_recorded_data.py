@@ -105,4 +105,4 @@ def test_the_notebook_runs(tmp_path):
     assert not any(cell.get("outputs") for cell in notebook["cells"])
     said = run(tmp_path, "-c", "\n".join(cells))
     assert "1000 messages, 0.0 ms late at most" in said
-    assert "turned by 1.82 rad in 1.99 s" in said
+    assert "turned by 0.25 rad in 1.99 s" in said
