@@ -47,7 +47,7 @@ class Items(Part, frozen=True, omit_defaults=False):
 
 
 class Typed(NamedTuple):
-    """What was typed of a line, and where the document goes on."""
+    """What was typed of a line, and where; `undeclared` is what is known of packages so far."""
 
     document: Document
     path: Path
@@ -55,6 +55,14 @@ class Typed(NamedTuple):
     line: int
     before: str
     encoding: str
+    undeclared: dict[str, bool]
+
+    def lacks(self, package: str) -> bool:
+        """Return whether package.xml could declare a package, and does not."""
+        if package not in self.undeclared:
+            edit = self.project.workspace.dependency(self.path, package)
+            self.undeclared[package] = edit is not None
+        return self.undeclared[package]
 
     def replacing(self, length: int, text: str) -> TextEdit:
         """Return the edit that puts a text in the place of the last characters."""
@@ -72,7 +80,7 @@ def complete(world: World, asked: AtPosition) -> Items:
         return Items(False, ())
     lines = lines_of(document.text)
     line, at = in_lines(lines, asked.position, world.encoding)
-    typed = Typed(document, path, project, line, lines[line][:at], world.encoding)
+    typed = Typed(document, path, project, line, lines[line][:at], world.encoding, {})
     items = tuple(_items(typed, world))
     return Items(len(items) >= MOST, items)
 
@@ -140,7 +148,7 @@ def _type(
     typed: Typed, word: str, text: str, package: str, rank: str, world: World, looked_for: str = ""
 ) -> Item:
     """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
-    missing = typed.project.workspace.dependency(typed.path, package)
+    missing = world.supports("workspace", "applyEdit") and typed.lacks(package)
     return Item(
         text,
         _STRUCT,
