@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Iterable
 from urllib.parse import quote
 
@@ -88,7 +89,7 @@ def _location(span: Span | None, path: str) -> dict[str, object]:
 def _artifact(path: str) -> dict[str, str]:
     if path.startswith("/"):
         return {"uri": "file://" + quote(path, errors="replace")}
-    if re.match(r"[A-Za-z]:/", path):  # on a drive of Windows
+    if sys.platform == "win32" and re.match("[A-Za-z]:/", path):  # on a drive
         return {"uri": "file:///" + quote(path, safe="/:", errors="replace")}
     return {"uri": quote(path, errors="replace")}
 
