@@ -206,3 +206,11 @@ def test_memory_is_bounded_by_chunks_and_not_by_the_recording(compression, here)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert parquet.read_metadata(here / "out" / "b.parquet").num_rows == 200
     assert int(done.stdout) < 190_000  # KiB: the messages are 205,000 and more
+
+
+def test_a_shell_completes_topics(recording):
+    words = {"COMP_WORDS": "idlc columns rec.mcap /", "COMP_CWORD": "3"}
+    env = {**os.environ, **words, "_IDLC_COMPLETE": "bash_complete"}
+    command = [sys.executable, "-m", "idlc"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=env)
+    assert {line.partition(",")[2] for line in done.stdout.split()} >= {*made.MAKERS}
