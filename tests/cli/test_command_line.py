@@ -15,6 +15,7 @@ from idlc import __version__
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
 from idlc.diagnostics import codes
+from tests.support import recordings
 from tests.support.files import write
 from tests.support.paths import ROOT
 
@@ -79,6 +80,8 @@ def test_a_run_with_nothing_to_do_imports_no_compiler():
 def test_the_example_in_each_help_works_as_pasted(command):
     words = [command, "--help"] if command else ["--help"]
     text = idlc(*words).stdout
+    if " rec.mcap" in text:  # this cannot be pasted
+        recordings.by_mcap(Path("rec.mcap"), recordings.messages(6))
     example = text.partition("Example:\n\n")[2].partition("\n\n  ")[0]
     lines = [line.strip() for line in example.splitlines() if line.startswith("    ")]
     assert any(line.startswith("idlc ") for line in lines), text

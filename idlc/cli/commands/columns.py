@@ -14,7 +14,7 @@ Example:
 
 \b
   idlc columns rec.mcap /imu -o imu.parquet
-  idlc columns rec.mcap /imu --fields header.stamp,linear_acceleration --from 10 --to 1m30s -o a.csv
+  idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv
   idlc columns rec.mcap -o columns/
 """
 
