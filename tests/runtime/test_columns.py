@@ -28,6 +28,7 @@ FILES = {
     "msg/Point.msg": "float64 x\nfloat64 y\nfloat64 z\n",
     "msg/Odd.msg": "uint8 a\nuint16 b\nuint8 c\n",
     "msg/Gaps.msg": "uint8 a\nfloat64 b\nuint16 c\nint32 d\nbool e\n",
+    "msg/Byte.msg": "uint8 a\n",
     "msg/Empty.msg": "",
     "msg/Header.msg": "builtin_interfaces/Time stamp\nstring frame_id\n",
     "msg/Joints.msg": "Header header\nstring[] name\nfloat64[] position\nbool[] moving\n",
@@ -307,6 +308,14 @@ def test_columns_share_nothing_with_the_buffers(msg, count):
             memory[:] = b"\x55" * len(memory)
             assert repr(columns[:]) == before
             memory[:] = kept
+
+
+def test_columns_of_messages_within_each_other_share_nothing_either(msg):
+    memory = bytearray(40)
+    kind = type(batch_of(msg.Byte, [bytes(5)], random.Random(1)))
+    columns = msg.Byte.to_columns(kind(memory, np.arange(30), np.arange(5, 35)), ragged=True)
+    memory[:] = b"\1" * 40
+    assert columns["a"].tolist() == [0] * 30
 
 
 def test_a_batch_that_is_none(msg):
