@@ -214,3 +214,14 @@ def test_a_shell_completes_topics(recording):
     command = [sys.executable, "-m", "idlc"]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=env)
     assert {line.partition(",")[2] for line in done.stdout.split()} >= {*made.MAKERS}
+
+
+def test_a_topic_that_cannot_be_read_does_not_keep_others_from_being_written(here, capfd):
+    broken = [one._replace(data=one.data[:9]) if one.topic == "/imu" else one for one in MESSAGES]
+    recording = made.by_mcap(here / "rec.mcap", broken)
+    assert run(recording, "-o", "out") == 1
+    assert "message 0 of `/imu` is broken" in capfd.readouterr().err
+    assert {path.name for path in (here / "out").iterdir()} == {
+        "camera.image.parquet",
+        "joints.parquet",
+    }
