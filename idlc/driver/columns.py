@@ -65,13 +65,25 @@ class Job(NamedTuple):
 
 
 def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list[Written]:
-    """Write the columns of topics, each file whole or not at all; return what was written."""
+    """Write the columns of topics, each file whole or not at all; return what was written.
+
+    A topic that cannot be read does not keep others from being written.
+    """
     done: list[Written] = []
-    try:
-        with Recording(options.recording, check=options.check) as recording, _warnings(report):
-            report.notes += recording.notes
+    with _problems(options, report), Recording(options.recording, check=options.check) as recording:
+        report.notes += recording.notes
+        with _warnings(report):
             for job in _jobs(recording, options, report):
-                done.append(_written(job, options, progress))  # noqa: PERF401 # kept if one fails
+                with _problems(options, report):
+                    done.append(_written(job, options, progress))
+    return done
+
+
+@contextmanager
+def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
+    """Report what is wrong with a recording, or with what is wanted of it."""
+    try:
+        yield
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
     except UnknownFieldError as error:
@@ -80,7 +92,6 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     except RecordingError as error:
         where = options.recording
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
-    return done
 
 
 @contextmanager

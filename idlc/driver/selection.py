@@ -16,6 +16,8 @@ from idlc.recordings.messages import Messages, joined
 if TYPE_CHECKING:
     import pyarrow as pa
 
+#: How ROS 2 writes messages.
+CDR = "cdr"
 #: How errors name a message of many, and what is in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
 #: What is known of a message besides its fields.
@@ -51,6 +53,10 @@ class Selection:
         return class_of(self.topic)
 
     def _kind(self, given: Any) -> Any:
+        """Return the class to read with: what was recorded, or one of the same type."""
+        if self.topic.encoding != CDR:
+            what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
+            raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
         if given is None:
             return self.kind
         from idlc.driver.load import accepted

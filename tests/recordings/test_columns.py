@@ -206,3 +206,22 @@ def test_memory_is_bounded_by_chunks_and_not_by_the_recording(compression, here)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert parquet.read_metadata(here / "out" / "b.parquet").num_rows == 200
     assert int(done.stdout) < 190_000  # KiB: the messages are 205,000 and more
+
+
+def test_a_shell_completes_topics(recording):
+    words = {"COMP_WORDS": "idlc columns rec.mcap /", "COMP_CWORD": "3"}
+    env = {**os.environ, **words, "_IDLC_COMPLETE": "bash_complete"}
+    command = [sys.executable, "-m", "idlc"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=env)
+    assert {line.partition(",")[2] for line in done.stdout.split()} >= {*made.MAKERS}
+
+
+def test_a_topic_that_cannot_be_read_does_not_keep_others_from_being_written(here, capfd):
+    broken = [one._replace(data=one.data[:9]) if one.topic == "/imu" else one for one in MESSAGES]
+    recording = made.by_mcap(here / "rec.mcap", broken)
+    assert run(recording, "-o", "out") == 1
+    assert "message 0 of `/imu` is broken" in capfd.readouterr().err
+    assert {path.name for path in (here / "out").iterdir()} == {
+        "camera.image.parquet",
+        "joints.parquet",
+    }

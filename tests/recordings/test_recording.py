@@ -277,6 +277,21 @@ def test_what_cannot_be_known_is_refused(tmp_path):
                 recording[topic].to_arrow()
 
 
+@pytest.mark.parametrize("encoding", ["ros1", "json", ""])
+def test_messages_that_are_written_in_another_way_are_refused(encoding, tmp_path):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = made.Writer(file)
+        writer.start()
+        schema = writer.register_schema("std_msgs/String", "ros1msg", b"string data")
+        writer.add_message(writer.register_channel("/x", encoding, schema), 1, bytes(8), 1)
+        writer.finish()
+    with idlc.Recording(path) as recording:
+        for read in (recording["/x"].to_arrow, lambda: list(recording["/x"])):
+            with pytest.raises(RecordingError, match=f"are written as `{encoding}`"):
+                read()
+
+
 def test_a_broken_message_is_named(tmp_path):
     found = [*MESSAGES[:40], MESSAGES[42]._replace(data=MESSAGES[42].data[:50]), *MESSAGES[43:]]
     path = made.by_mcap(tmp_path / "a.mcap", found)

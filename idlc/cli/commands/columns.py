@@ -7,19 +7,21 @@ from typing import Any
 
 import click
 
+from idlc.cli import completion
+
 EPILOG = """\
 Example:
 
 \b
   idlc columns rec.mcap /imu -o imu.parquet
-  idlc columns rec.mcap /imu --fields header.stamp,linear_acceleration --from 10 --to 1m30s -o a.csv
+  idlc columns rec.mcap /imu --fields linear_acceleration --to 1m30s --format csv
   idlc columns rec.mcap -o columns/
 """
 
 
 @click.command("columns", epilog=EPILOG)
-@click.argument("recording", metavar="REC", type=click.Path())
-@click.argument("topics", metavar="TOPIC...", nargs=-1)
+@click.argument("wanted", metavar="REC", type=click.Path())
+@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @click.option(
     "-o",
     "--out",
@@ -54,7 +56,7 @@ Example:
 )
 @click.option("--check", is_flag=True, help="Compare the checksums of the recording.")
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-def command(recording: str, fields: str | None, **given: Any) -> int:
+def command(wanted: str, fields: str | None, **given: Any) -> int:
     """Write topics of a recording as columns, for pandas, DuckDB and others.
 
     REC is an .mcap or .db3 file, or the folder of a bag. Without TOPIC, all topics are written.
@@ -66,7 +68,7 @@ def command(recording: str, fields: str | None, **given: Any) -> int:
 
     report = Report()
     names = None if fields is None else tuple(one.strip() for one in fields.split(","))
-    options = ColumnsOptions(recording, fields=names, **given)
+    options = ColumnsOptions(wanted, fields=names, **given)
     with progress.shown(sys.stderr) as tell:
         written = columns(options, report, tell)
     for one in written:
