@@ -261,7 +261,8 @@ def test_an_interrupt_ends_it_quietly():
         assert b"Traceback" not in server.stderr.read()
 
 
-def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(workspace, monkeypatch):
+@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.driver.workspace.look"])
+def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
     from idlc.lsp.publish import diagnostics
     from idlc.lsp.session import Session
 
@@ -272,7 +273,7 @@ def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(workspace, monkeyp
     roots = [{"uri": workspace.as_uri(), "name": ""}]
     session.answer("initialize", {"capabilities": {}, "workspaceFolders": roots})
     with monkeypatch.context() as patch:
-        patch.setattr("idlc.model.link.link", fail)
+        patch.setattr(where, fail)
         ((uri, (found,)),) = diagnostics(session.workbench.world).items()
         assert uri.startswith(workspace.as_uri())
         assert found.code == "IDL901"
