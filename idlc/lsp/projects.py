@@ -55,8 +55,8 @@ class Project:
                     self._state = self.workspace.state()
             except OSError:
                 self.forget()
-            except InternalError as error:
-                self.failure = _failure(error)
+            except Exception as error:
+                self.failure = _failure(error, self.folder)
         return self._state
 
     def load(self, documents: Documents) -> None:
@@ -73,7 +73,7 @@ class Project:
         """Return whether a file is one of those that are checked."""
         try:
             self.load(documents)
-        except OSError:
+        except Exception:  # of which `state` tells
             return False
         return self.has(path)
 
@@ -95,11 +95,14 @@ def _without_garbage(*, anew: bool) -> Iterator[None]:
         gc.enable()
 
 
-def _failure(error: InternalError) -> Diagnostic:
-    cause = error.__cause__ or error
+def _failure(error: Exception, folder: Path) -> Diagnostic:
+    cause, where, subject = error, "", str(folder)
+    if isinstance(error, InternalError):
+        where, subject = f" in stage `{error.stage}`", error.subject
+        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
     return codes.INTERNAL_ERROR.of(
-        error.subject,
-        f"idlc failed in stage `{error.stage}`: {type(cause).__name__}: {cause}",
+        subject,
+        f"idlc failed{where}: {type(cause).__name__}: {cause}",
         hint="this is a bug in idlc, please report it",
     )
 

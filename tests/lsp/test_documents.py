@@ -80,6 +80,20 @@ def test_a_file_that_is_not_saved_yet_is_one_of_the_package(opened):
     assert codes(one.pull(new)) == ["IDL201"]
 
 
+def test_a_draft_without_a_file_is_checked_by_what_it_looks_like(editor, package, monkeypatch):
+    folder = package({"msg/Drive.msg": "int8 x\n"})
+    monkeypatch.chdir(folder)
+    one = editor()
+    uri = one.open("untitled:Untitled-1", "Drive drive\nDrve other\n---\n")
+    (found,) = one.wait(uri, 1)
+    assert (found.code, found.range) == ("IDL201", between(1, 0, 4))
+    params = lsp.HoverParams(lsp.TextDocumentIdentifier(uri=uri), at(0, 1))
+    assert "**demo/msg/Drive**" in one.ask(lsp.TEXT_DOCUMENT_HOVER, params).contents.value
+    one.open("untitled:Untitled-2", "not an interface", "plaintext")
+    one.close(uri)
+    assert one.pull(uri) == []
+
+
 def test_files_that_change_on_disk_are_noticed(opened):
     one, folder, open_ = opened
     wheel = open_("msg/Wheel.msg", "Fresh fresh\n")
