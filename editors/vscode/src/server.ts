@@ -1,7 +1,7 @@
 /** The server's life: found, started, stopped, started again; and what is told of it. */
 
 import * as vscode from "vscode";
-import { LanguageClient, State, TransportKind } from "vscode-languageclient/node";
+import { LanguageClient, State } from "vscode-languageclient/node";
 import { find, setting, words, type Found } from "./find";
 
 /** What is synchronized: interfaces, and the files that say what they belong to. */
@@ -67,7 +67,6 @@ export class Server {
       command: command.program,
       args: [...command.args, "lsp"],
       options: { cwd: this.folder },
-      transport: TransportKind.stdio,
     };
     this.client = new LanguageClient("idlc", "idlc", options, {
       documentSelector: DOCUMENTS,
