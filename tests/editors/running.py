@@ -23,7 +23,9 @@ def environment(folder: Path, **variables: str) -> dict[str, str]:
     return found | {"AMENT_PREFIX_PATH": ""}
 
 
-def see(package: Path, *command: object, **variables: str) -> dict[str, Any]:
+def see(
+    package: Path, *command: object, patience: int = PATIENCE, **variables: str
+) -> dict[str, Any]:
     """Return what an editor that runs a script wrote into the file that $SEEN names."""
     folder = package.parent
     seen = folder / "seen.json"
@@ -35,7 +37,7 @@ def see(package: Path, *command: object, **variables: str) -> dict[str, Any]:
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        timeout=PATIENCE,
+        timeout=patience,
         check=False,
     )
     assert seen.exists(), done.stdout.decode(errors="replace")

@@ -61,7 +61,7 @@ def normal(seen: dict[str, Any]) -> dict[str, Any]:
             found[name] = (value["words"][0], value["line"])
         elif name == "symbol":
             words = {one if isinstance(one, str) else one[-1] for one in value}
-            found[name] = {word.rpartition(" ")[2] for word in words}
+            found[name] = {word.split()[-1] for word in words}
         elif name == "inlay_hint":
             found[name] = [label for _, label in value]
     return found

@@ -16,6 +16,9 @@ Example:
 
 @click.command("lsp", epilog=EPILOG)
 @click.option("--check", is_flag=True, help="Print what the server can do, as JSON, and end.")
+@click.option(
+    "--stdio", is_flag=True, expose_value=False, help="Many editors add it; it is so anyway."
+)
 def command(check: bool) -> int:
     """Serve an editor, which starts this and talks to it over standard input and output.
 

@@ -1,0 +1,37 @@
+"""What people see most, in a real VS Code that has the built extension: `make test-vscode`.
+
+Pictures of it are in build/vscode.
+"""
+
+import os
+import shutil
+import sys
+
+from tests.editors import running, scenario
+from tests.support import browser
+from tests.support.paths import ROOT
+
+PICTURES = ROOT / "build" / "vscode"
+#: Seconds for all of it on a busy machine.
+PATIENCE = 1500
+
+
+def test_vscode(package):
+    # VS Code asks a login shell for PATH, which knows nothing of the tests
+    (package / ".venv").symlink_to(sys.prefix, target_is_directory=True)
+    shutil.rmtree(PICTURES, ignore_errors=True)
+    PICTURES.mkdir(parents=True)
+    extension = ROOT / "build" / "idlc.vsix"
+    script = running.HERE / "vscode" / "see.mjs"
+    program = os.environ.get("NODE", "node")
+    words = (program, script, package, extension, browser.command())
+    seen = running.see(package, *words, patience=PATIENCE)
+    for one in package.parent.glob("*.png"):
+        shutil.copy(one, PICTURES)
+    assert {name: one for name, one in seen.items() if "failed" in str(one)} == {}
+    assert scenario.normal(seen) == scenario.EXPECTED
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
+    assert "uint32 nanosec" in seen["show"]
+    assert seen["gen"]
+    assert seen["scaffold"]
+    assert "/there/is/no/idlc does not serve editors" in seen["missing"]
