@@ -28,18 +28,21 @@ const SETTINGS = {
   "editor.minimap.enabled": false,
   "editor.fontSize": 14,
   "window.commandCenter": false,
+  "git.enabled": false,
   "explorer.autoReveal": false, // where a definition leads is not where the next file is
 };
 const MINUTE = 1000 * (process.env.PATIENCE ?? 60);
 
-function settle(more) {
-  mkdirSync(join(data, "User"), { recursive: true });
-  writeFileSync(join(data, "User", "settings.json"), JSON.stringify({ ...SETTINGS, ...more }));
+/** Write settings; what a server would be taken from is set for a machine. */
+function settle(scope, settings) {
+  mkdirSync(join(data, scope), { recursive: true });
+  writeFileSync(join(data, scope, "settings.json"), JSON.stringify(settings));
 }
 
 const common = ["--user-data-dir", data, "--extensions-dir", join(out, "extensions")];
 common.push("--config", join(out, "config.yaml"));
-settle({});
+settle("User", SETTINGS);
+settle("Machine", {});
 execFileSync(process.execPath, [entry, ...common, "--install-extension", vsix], { stdio: "inherit" });
 
 const quiet = ["--disable-telemetry", "--disable-update-check", "--disable-getting-started-override"];
@@ -110,15 +113,17 @@ async function open(path, line = 1, column = 1) {
   });
 }
 
-/** Save all, and return the file on disk once it is another one; then put it back as it was. */
+/** Save, return the file on disk once it is another one, and take back what was done. */
 async function saved(path) {
   const before = original.get(path);
   await keyboard.press("Control+s");
   const after = await until(`change of ${path}`, () => disk(path) !== before && disk(path));
-  writeFileSync(join(folder, path), before);
-  const first = before.split("\n").find((line) => line.trim()).split(/\s+/)[0];
-  await page.locator(".view-line", { hasText: first }).first().waitFor();
-  await page.waitForTimeout(500);
+  await until("way back", async () => {
+    await keyboard.press("Control+z");
+    await keyboard.press("Control+s");
+    await page.waitForTimeout(300);
+    return disk(path) === before;
+  });
   return after;
 }
 
@@ -240,6 +245,7 @@ const LOOKS = {
     const words = await rows.locator(".label-name").allTextContents();
     await picture("completion");
     await keyboard.press("Enter");
+    await page.locator(".view-line", { hasText: "std_msgs/Header" }).first().waitFor();
     const text = await saved("msg/Fleet.msg");
     return { words, line: text.trimEnd().split("\n").at(-1) };
   },
@@ -295,6 +301,7 @@ const LOOKS = {
   },
   async gen() {
     await open("msg/Untidy.msg");
+    writeFileSync(join(folder, "msg/Broken.msg"), "float64 x\n"); // or nothing would be written
     await pick("idlc: Generate Python");
     await reply("out/demo_msgs");
     return until("result", () => existsSync(join(folder, "out/demo_msgs/msg/_drive.py")));
@@ -308,12 +315,11 @@ const LOOKS = {
     return until("result", () => existsSync(join(folder, "msg/Scan.msg")));
   },
   async missing() {
-    settle({ "idlc.path": "/there/is/no/idlc" });
+    settle("Machine", { "idlc.path": "/there/is/no/idlc" });
     const told = page.locator(".notification-list-item", { hasText: "does not serve editors" });
     await told.first().waitFor();
     await picture("missing");
     const text = await told.first().textContent();
-    settle({});
     return text;
   },
 };
