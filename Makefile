@@ -16,7 +16,7 @@ ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
 BROWSER ?= $(if $(shell command -v chromium chromium-browser google-chrome 2>/dev/null),yes,no)
 EDITORS ?= $(if $(and $(wildcard /usr/bin/nvim),$(wildcard /usr/bin/emacs)),yes,no)
 LOCKED ?= no
-INTERPRETERS ?= 3.10 3.11 3.12 3.13
+INTERPRETERS ?= 3.10 3.11 3.12 3.13 3.14
 ARGS ?=
 FUZZ ?= 5000
 SEED ?= 2
@@ -70,8 +70,8 @@ ifeq ($(EDITORS),no)
 endif
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal $(SELECTION) $(ARGS)
 
-test-kilted: $(KILTED_ENV)/installed ## run type support's tests on the wheels of ROS 2 Kilted
-	$(KILTED_ENV)/bin/python -m pytest -n 2 tests/ros/test_rclpy_*.py tests/ros/test_native_*.py $(ARGS)
+test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
+	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
 	@PYTHON=$(PYTHON) sh tests/project/every_python.sh $(INTERPRETERS)

@@ -11,6 +11,7 @@ from benchmarks import (
     classes,
     codec,
     compiling,
+    editing,
     imports,
     report,
     results,
@@ -21,7 +22,7 @@ from benchmarks.measure import Row, measure
 from benchmarks.peers import PEERS, installed
 from benchmarks.work import Work, in_memory
 
-GROUPS = (codec, batches, classes, imports, compiling, starting, topics)
+GROUPS = (codec, batches, classes, imports, compiling, starting, editing, topics)
 
 
 def arguments(words: Sequence[str] | None) -> argparse.Namespace:

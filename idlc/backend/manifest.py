@@ -11,7 +11,7 @@ from idlc.checks.package.facts import Statement
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.enclosing_package import MANIFEST, declared_name, statements
-from idlc.emit.pynames import why_not_package
+from idlc.emit.package_name import why_not_package
 
 #: What every generated package needs of others on PyPI. The packages of ROS 2 that it imports are
 #: no such names: who has ROS 2 has them, and `std-msgs` may be anybody's there.

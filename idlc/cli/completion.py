@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer packages."""
     from idlc.driver import completion
 
-    return completion.packages(word, _include(context))
+    return completion.packages(word, _include(context), context.params.get("distro"))
 
 
 def types_and_paths(
@@ -21,9 +23,9 @@ def types_and_paths(
     """Offer types and, in the shell's own way, files."""
     from idlc.driver import completion
 
-    found = completion.types(word, _include(context))
+    found = completion.types(word, _include(context), distro=context.params.get("distro"))
     # bash forgets what was offered before files
-    return [CompletionItem(word, type="file"), *map(CompletionItem, found)]
+    return [_item(word, "file"), *map(_item, found)]
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
@@ -46,8 +48,8 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
     """Offer the ids and names of codes."""
     from idlc.diagnostics.codes import CODES
 
-    ids = [CompletionItem(code.id, help=code.slug) for code in CODES.values()]
-    names = [CompletionItem(code.slug, help=code.id) for code in CODES.values()]
+    ids = [_item(code.id, about=code.slug) for code in CODES.values()]
+    names = [_item(code.slug, about=code.id) for code in CODES.values()]
     return [one for one in (*ids, *names) if one.value.startswith(word)]
 
 
@@ -56,9 +58,9 @@ def rules(context: click.Context, option: click.Parameter, word: str) -> list[Co
     from idlc.diagnostics.codes import CATEGORIES
 
     before, comma, last = word.rpartition(",")
-    groups = [CompletionItem(name) for name in ("all", *CATEGORIES) if name.startswith(last)]
+    groups = [_item(name) for name in ("all", *CATEGORIES) if name.startswith(last)]
     return [
-        CompletionItem(f"{before}{comma}{one.value}", help=one.help)
+        _item(f"{before}{comma}{one.value}", about=one.help)
         for one in (*groups, *codes(context, option, last))
     ]
 
@@ -74,3 +76,9 @@ def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
 def _include(context: click.Context) -> tuple[str, ...]:
     given: Any = context.params.get("include")
     return tuple(given or ())
+
+
+def _item(value: str, kind: str = "plain", about: str | None = None) -> CompletionItem[str]:
+    from click.shell_completion import CompletionItem  # no run but a shell's needs it
+
+    return CompletionItem(value, kind, about)

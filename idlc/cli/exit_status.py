@@ -6,7 +6,6 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
@@ -24,7 +23,7 @@ def ended(command: Callable[[], object]) -> int:
         with contextlib.suppress(AttributeError, ValueError):
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     try:
-        Path.cwd()
+        os.getcwd()  # noqa: PTH109 - a server starts without pathlib
     except OSError:
         sys.stderr.write("Error: the working folder is gone\n")
         return 2

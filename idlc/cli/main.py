@@ -27,6 +27,11 @@ def _run(words: list[str]) -> int:
         from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
+    if words == ["lsp"]:
+        from idlc.cli.exit_status import ended
+        from idlc.cli.lsp_run import run as serve
+
+        return ended(serve)
     from idlc.cli.click_runner import run
 
     return run(words)

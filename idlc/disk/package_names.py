@@ -94,7 +94,7 @@ def locks(place: Path) -> tuple[lock_file.Lock, ...]:
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
     """Return whether a package can be called so and imported; reports IDL607."""
-    from idlc.emit.pynames import why_not_package  # a check needs no emitter
+    from idlc.emit.package_name import why_not_package  # a check needs no emitter
 
     what = why_not_package(name)
     if not what:

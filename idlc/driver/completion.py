@@ -5,25 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from idlc.diagnostics.report import Report
-from idlc.disk import nearby
+from idlc.disk import nearby, pyproject
 from idlc.disk.library import Library
+from idlc.disk.scope import scope
 from idlc.model import ir
+from idlc.model.distro import BY_NAME
 
 
-def packages(word: str, include: Sequence[str]) -> list[str]:
+def packages(word: str, include: Sequence[str], distro: str | None = None) -> list[str]:
     """Return the packages whose names begin with a word."""
-    return [name for name in _library(include).packages() if name.startswith(word)]
+    return [name for name in _library(include, distro).packages() if name.startswith(word)]
 
 
 def types(
-    word: str, include: Sequence[str], kinds: Sequence[ir.Kind] = ir.KINDS, *, bare: str = "all"
+    word: str,
+    include: Sequence[str],
+    kinds: Sequence[ir.Kind] = ir.KINDS,
+    *,
+    bare: str = "all",
+    distro: str | None = None,
 ) -> list[str]:
     """Return the types that a word begins, written as it is.
 
     `package/Name` and `package/kind/Name` are both known. A name without package may be `bare`:
     that of any type for `all`, otherwise that of a type of the packages around.
     """
-    library = _library(include)
+    library = _library(include, distro)
     package, slash, rest = word.partition("/")
     if slash:
         return sorted(_within(package, rest, library, kinds))
@@ -55,5 +62,9 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
                 yield f"{package}/{full}"
 
 
-def _library(include: Sequence[str]) -> Library:
-    return Library(include, Report(), own=nearby.near())
+def _library(include: Sequence[str], distro: str | None) -> Library:
+    """Return what is there for the distribution that was typed, else for the one that is meant."""
+    report = Report()
+    known = distro if distro in BY_NAME else None
+    meant = scope(pyproject.load(report), distro=known).distro
+    return Library(include, report, own=nearby.near(), distro=meant)

@@ -28,9 +28,11 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     models = [model for model, _ in sound_models(given, scope, report) if model.own]
     if not models:
         return 0
+    from idlc.disk import template_cache
     from idlc.site.pages import site
 
     about = {one.package: _about(one) for one in given}
+    template_cache.keep()
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
     written = Report()

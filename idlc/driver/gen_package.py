@@ -51,12 +51,14 @@ def package_of(
     `vendored` are the packages that are written because of it, where that was asked for.
     """
     from idlc.checks.size import oversized
+    from idlc.disk import template_cache
     from idlc.emit.render import render_package
 
     refused = list(oversized(model))
     if refused:
         target.report.extend(refused)
         return None
+    template_cache.keep()
     with stage("render", model.package):
         modules = {file.path: file.text for file in render_package(model)}
         files = _with_surroundings(model, modules, target)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject, user_templates
+from idlc.disk import pyproject, template_cache, user_templates
 from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
@@ -56,6 +56,7 @@ def templates(settings: Settings, report: Report) -> Templates:
 @contextmanager
 def rendering(subject: str, report: Report) -> Iterator[None]:
     """Report what is wrong with a user's template within; anything else is idlc's own fault."""
+    template_cache.keep()
     with stage("scaffold", subject):
         try:
             yield

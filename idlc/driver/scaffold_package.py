@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from idlc.diagnostics.report import Report
+from idlc.disk import pyproject
 from idlc.disk.output.project import Project
+from idlc.disk.scope import scope
 from idlc.driver.scaffold import Result, Settings, rendering, templates, write
-from idlc.model import ir
+from idlc.model import catalog, ir
 from idlc.scaffold import new_package
 
 
@@ -26,7 +28,9 @@ def package(
         return None
     files: dict[str, str] = {}
     with rendering(wanted.name, report):
-        files = new_package.files(wanted, used)
+        there = catalog.packages(scope(pyproject.load(report)).distro)
+        depends = tuple(name for name in wanted.depends if name in there)  # Humble lacks one
+        files = new_package.files(wanted._replace(depends=depends), used)
     if not any(project.names(kind) for kind in ir.KINDS):
         files |= starters or {}
     # what later commands add to stays as it is

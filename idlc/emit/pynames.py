@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import builtins
 import keyword
-import sys
 from collections.abc import Iterable, Mapping
-from importlib.machinery import BuiltinImporter, FrozenImporter
 from typing import NewType, TypeAlias
 
 from idlc.model import ir
-from idlc.model.names import is_package_name, snake_case
+from idlc.model.names import snake_case
 from idlc.runtime.names import public_name, slot_name
 
 ModuleName = NewType("ModuleName", str)
@@ -44,13 +42,6 @@ METHODS = frozenset(
     {"deserialize", "deserialize_many", "from_dict", "get_fields_and_field_types", "serialize"}
     | {"serialize_many", "to_columns", "to_dict", "validate"}
 )
-
-#: Modules that a starting Python has loaded, frozen or not, before it looks anywhere else.
-_LOADED = frozenset(
-    ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
-)
-#: What generated code imports beside the standard library.
-_NEEDED = frozenset(("numpy",))
 
 #: Names that no local variable can have, or should.
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
@@ -136,16 +127,3 @@ class Locals:
     def reset(self, mark: frozenset[str]) -> None:
         """Forget the names given since `mark`."""
         self._taken = set(mark)
-
-
-def why_not_package(name: str) -> str:
-    """Return why a package cannot be called so and imported, in words that follow its name."""
-    if not is_package_name(name):
-        return "is not a package name: lower-case letters, digits and single underscores"
-    if keyword.iskeyword(name):
-        return "is a keyword of Python and cannot be imported"
-    if name in _LOADED or FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):
-        return "is a module of Python itself, which would be imported instead"
-    if name in sys.stdlib_module_names or name in _NEEDED:
-        return "is the name of a module that programs import: they would get this package instead"
-    return ""

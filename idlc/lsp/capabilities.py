@@ -5,27 +5,27 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import dependencies, positions, token_kinds
-from idlc.lsp.world import World
+from idlc.lsp import token_kinds
+
+#: What positions can be counted in, and what holds if nothing was agreed on.
+ENCODINGS = ("utf-8", "utf-16", "utf-32")
+DEFAULT_ENCODING = "utf-16"
+#: The command that declares a package in package.xml, for what is completed.
+ADD_DEPENDENCY = "idlc.addDependency"
 
 
 def encoding(client: dict[str, Any]) -> str:
     """Return the first encoding of positions that a client offers and the server knows."""
     general = client.get("general")
     offered = general.get("positionEncodings") if isinstance(general, dict) else None
-    known = [one for one in offered or () if one in positions.ENCODINGS]
-    return known[0] if known else positions.DEFAULT
+    known = [one for one in offered or () if one in ENCODINGS]
+    return known[0] if known else DEFAULT_ENCODING
 
 
-def pulls(world: World) -> bool:
-    """Return whether the client asks for problems itself; it would show pushed ones again."""
-    return world.supports("textDocument", "diagnostic")
-
-
-def answer(world: World) -> dict[str, object]:
-    """Return the answer to `initialize`."""
+def answer(client: dict[str, Any]) -> dict[str, object]:
+    """Return the answer to `initialize` for what a client can do."""
     return {
-        "capabilities": {"positionEncoding": world.encoding, **CAPABILITIES},
+        "capabilities": {"positionEncoding": encoding(client), **CAPABILITIES},
         "serverInfo": {"name": "idlc", "version": __version__},
     }
 
@@ -50,7 +50,7 @@ CAPABILITIES: dict[str, object] = {
     "foldingRangeProvider": True,
     "selectionRangeProvider": True,
     "documentLinkProvider": {},
-    "executeCommandProvider": {"commands": [dependencies.COMMAND]},
+    "executeCommandProvider": {"commands": [ADD_DEPENDENCY]},
     "hoverProvider": True,
     "definitionProvider": True,
     "typeDefinitionProvider": True,

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from idlc.lsp.capabilities import ADD_DEPENDENCY
 from idlc.lsp.world import World
-
-COMMAND = "idlc.addDependency"
 
 
 def command(uri: str, package: str, world: World) -> dict[str, object] | None:
@@ -12,4 +11,4 @@ def command(uri: str, package: str, world: World) -> dict[str, object] | None:
     if not world.supports("workspace", "applyEdit"):
         return None
     title = f"Declare {package} in package.xml"
-    return {"title": title, "command": COMMAND, "arguments": [uri, package]}
+    return {"title": title, "command": ADD_DEPENDENCY, "arguments": [uri, package]}

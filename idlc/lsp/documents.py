@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
+from urllib.parse import unquote
 
-from idlc.disk.read import Unsaved
+from idlc.disk.find import KINDS
+from idlc.disk.read import Unsaved, absolute
 from idlc.lsp import uris
 from idlc.lsp.positions import in_lines, lines_of
 from idlc.lsp.protocol import Change, DocumentItem, Range
+from idlc.model import ir
+
+#: The language id of interface files.
+LANGUAGE = "rosmsg"
 
 
 class Document:
-    """One document; `path` is `None` if it is no file's."""
+    """One document; `path` is that of its file, or where it would be saved; `None` for others."""
 
     def __init__(self, item: DocumentItem) -> None:
         self.uri = item.uri
-        self.path = uris.to_path(item.uri)
-        self.language = item.language_id
+        self.path = uris.to_path(item.uri) or _draft(item)
         self.version: int | None = item.version
         self._lines = lines_of(item.text)
 
@@ -56,6 +62,22 @@ class Document:
         if high < len(lines) - 1 and not found[-1]:
             del found[-1]
         lines[low : high + 1] = found
+
+
+def _draft(item: DocumentItem) -> Path | None:
+    """Return the path of an interface that has never been saved: here, or where its name says.
+
+    How many sections it has says of which kind it is.
+    """
+    scheme, _, name = item.uri.partition(":")
+    if scheme != "untitled" or item.language_id != LANGUAGE:
+        return None
+    if Path(name).suffix in KINDS:
+        return absolute(unquote(name))
+    marks = sum(line.rstrip() == "---" for line in item.text.splitlines())
+    kind = ir.KINDS[min(marks, len(ir.KINDS) - 1)]
+    stem = re.sub(r"[^A-Za-z0-9]", "", name.rpartition("/")[2])
+    return absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
 
 
 class Documents:

@@ -14,10 +14,6 @@ from functools import lru_cache
 from idlc.diagnostics.source import Span
 from idlc.lsp.protocol import Position, Range
 
-#: What can be agreed on, the best first.
-ENCODINGS = ("utf-32", "utf-8", "utf-16")
-#: What holds if nothing was agreed on.
-DEFAULT = "utf-16"
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)")
 
 

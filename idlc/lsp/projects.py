@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from idlc.diagnostics import codes
@@ -49,19 +50,19 @@ class Project:
         if self._state is None:
             self.failure = None
             try:
-                self.load(documents)
-                self._state = self.workspace.state()
+                with _without_garbage(anew=self._documents is None):
+                    self.load(documents)
+                    self._state = self.workspace.state()
             except OSError:
                 self.forget()
-            except InternalError as error:
-                self.failure = _failure(error)
+            except Exception as error:
+                self.failure = _failure(error, self.folder)
         return self._state
 
     def load(self, documents: Documents) -> None:
         """Read what is on disk, unless that was done; raises OSError."""
         if self._documents is None:
             self.workspace.load(documents.unsaved())
-            gc.freeze()  # to look at all of it for garbage takes longer than to check a file
             self._documents = documents
 
     def has(self, path: Path) -> bool:
@@ -72,16 +73,36 @@ class Project:
         """Return whether a file is one of those that are checked."""
         try:
             self.load(documents)
-        except OSError:
+        except Exception:  # of which `state` tells
             return False
         return self.has(path)
 
 
-def _failure(error: InternalError) -> Diagnostic:
-    cause = error.__cause__ or error
+@contextmanager
+def _without_garbage(*, anew: bool) -> Iterator[None]:
+    """Keep what a whole folder is read into from being searched for garbage, now and later.
+
+    That takes longer than to check a file, and finds nothing.
+    """
+    if not anew:
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+        gc.freeze()
+    finally:
+        gc.enable()
+
+
+def _failure(error: Exception, folder: Path) -> Diagnostic:
+    cause, where, subject = error, "", str(folder)
+    if isinstance(error, InternalError):
+        where, subject = f" in stage `{error.stage}`", error.subject
+        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
     return codes.INTERNAL_ERROR.of(
-        error.subject,
-        f"idlc failed in stage `{error.stage}`: {type(cause).__name__}: {cause}",
+        subject,
+        f"idlc failed{where}: {type(cause).__name__}: {cause}",
         hint="this is a bug in idlc, please report it",
     )
 

@@ -5,42 +5,12 @@ Names are the protocol's, with underscores in Python.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 import msgspec
-from msgspec import UNSET, Meta, Raw, UnsetType
+from msgspec import Meta
 
-#: Codes of errors.
-PARSE_ERROR = -32700
-INVALID_REQUEST = -32600
-METHOD_NOT_FOUND = -32601
-INVALID_PARAMS = -32602
-INTERNAL_ERROR = -32603
-NOT_INITIALIZED = -32002
-CANCELLED = -32800
-REQUEST_FAILED = -32803
-
-Id: TypeAlias = int | str
 Number = Annotated[int, Meta(ge=0)]
-
-
-class RequestError(Exception):
-    """A request that cannot be answered: a code of the protocol, and why in words for people."""
-
-    def __init__(self, code: int, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
-
-
-class Message(msgspec.Struct):
-    """Any message that comes in."""
-
-    id: Id | UnsetType | None = UNSET
-    method: str | UnsetType = UNSET
-    params: Raw = Raw(b"null")
-    result: Raw | UnsetType = UNSET
-    error: Any = UNSET
 
 
 class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
@@ -287,12 +257,6 @@ class DidChangeSettings(Part, frozen=True):
     """workspace/didChangeConfiguration."""
 
     settings: Any = None
-
-
-class CancelParams(Part, frozen=True):
-    """$/cancelRequest."""
-
-    id: Id
 
 
 class Markup(Part, omit_defaults=False, frozen=True):

@@ -6,23 +6,19 @@ changes in a row are followed by one check. Whatever a client sends, the server 
 
 from __future__ import annotations
 
+import json
 import queue
 import threading
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeAlias
 
-import msgspec
-
 from idlc.lsp import framing
-from idlc.lsp.protocol import (
+from idlc.lsp.errors import (
     CANCELLED,
     INTERNAL_ERROR,
     INVALID_PARAMS,
     INVALID_REQUEST,
     PARSE_ERROR,
-    CancelParams,
-    Id,
-    Message,
     RequestError,
 )
 from idlc.lsp.session import Session
@@ -32,7 +28,8 @@ MOST_IN_A_ROW = 500
 #: Seconds between looks at whether the client still lives.
 PATIENCE = 10.0
 #: What came in: a message, something that is none, or the end.
-Arrival: TypeAlias = Message | RequestError | None
+Message: TypeAlias = "dict[str, Any]"
+Arrival: TypeAlias = "Message | RequestError | None"
 Answer: TypeAlias = Callable[[Any], None]
 
 
@@ -48,7 +45,7 @@ class Server:
         self._reader = reader
         self._writer = writer
         self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
-        self._cancelled: set[Id] = set()
+        self._cancelled: set[int | str] = set()
         self._asked: list[Answer | None] = []
         self._session = Session(self._notify, self._ask)
 
@@ -68,7 +65,7 @@ class Server:
                         return 1
                     continue
                 in_a_row += 1
-                if arrival is None or getattr(arrival, "method", None) == "exit":
+                if arrival is None or _is_exit(arrival):
                     return 0 if self._session.is_shut_down else 1
                 self._take(arrival)
         except (OSError, ValueError):  # nobody reads what is written
@@ -76,23 +73,20 @@ class Server:
 
     def _read(self) -> None:
         """Put each message that comes in where the loop takes it; `None` comes last."""
-        decode = msgspec.json.Decoder(Message).decode
         while True:
             try:
                 body = framing.read(self._reader)
                 if body is None:
                     break
-                message = decode(body)
-                if message.method == "$/cancelRequest":
-                    self._cancelled.add(msgspec.json.decode(message.params, type=CancelParams).id)
+                message = _message(body)
+                if message.get("method") == "$/cancelRequest":
+                    self._cancelled.add(_cancelled(message))
                 else:
                     self._arrivals.put(message)
             except framing.TooLongError:
                 self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
-            except msgspec.ValidationError as error:
-                self._arrivals.put(RequestError(INVALID_REQUEST, str(error)))
-            except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
-                self._arrivals.put(RequestError(PARSE_ERROR, str(error)))
+            except RequestError as error:
+                self._arrivals.put(error)
             except (OSError, ValueError):  # the stream was closed
                 break
         self._arrivals.put(None)
@@ -100,36 +94,35 @@ class Server:
     def _take(self, arrival: Message | RequestError) -> None:
         if isinstance(arrival, RequestError):
             self._fail(None, arrival)
-        elif not isinstance(arrival.method, str):
+        elif "method" not in arrival:
             self._take_answer(arrival)
-        elif isinstance(arrival.id, msgspec.UnsetType):
-            self._attempt(arrival.method, lambda: self._session.take(arrival))
+        elif "id" in arrival:
+            self._answer(arrival)
         else:
-            self._answer(arrival, arrival.id)
+            name, params = arrival["method"], arrival.get("params")
+            self._attempt(name, lambda: self._session.take(name, params))
 
     def _take_answer(self, arrival: Message) -> None:
         """Take an answer to what was asked of the client; one to nothing that was is left."""
-        asked = arrival.id
+        asked = arrival.get("id")
         known = isinstance(asked, int) and 0 <= asked < len(self._asked)
         take = self._asked[asked] if known and isinstance(asked, int) else None
-        if take is not None and isinstance(arrival.result, msgspec.Raw):
-            result = msgspec.json.decode(arrival.result)
-            self._attempt("answer", lambda: take(result))
+        if take is not None and "result" in arrival:
+            self._attempt("answer", lambda: take(arrival["result"]))
 
-    def _answer(self, request: Message, id_: Id | None) -> None:
-        failure = None
-        result: object = None
+    def _answer(self, request: Message) -> None:
+        id_, name = request["id"], request["method"]
         if id_ in self._cancelled:
-            failure = RequestError(CANCELLED, "cancelled")
-        else:
-            failure, result = self._result(lambda: self._session.answer(request))
-        self._cancelled.discard(id_)
+            self._cancelled.discard(id_)
+            self._fail(id_, RequestError(CANCELLED, "cancelled"))
+            return
+        failure, result = self._result(lambda: self._session.answer(name, request.get("params")))
         if failure is None:
             self._write({"jsonrpc": "2.0", "id": id_, "result": result})
-        else:
-            if failure.code == INTERNAL_ERROR:
-                self._log(f"{request.method!s}: {failure.message}")
-            self._fail(id_, failure)
+            return
+        if failure.code == INTERNAL_ERROR:
+            self._log(f"{name}: {failure.message}")
+        self._fail(id_, failure)
 
     def _attempt(self, what: str, action: Callable[[], object]) -> None:
         """Do what needs no answer; only the log says if that fails."""
@@ -142,14 +135,15 @@ class Server:
             return None, action()
         except RequestError as error:
             return error, None
-        except msgspec.ValidationError as error:
-            return RequestError(INVALID_PARAMS, str(error)), None
         except BrokenPipeError:
             raise
         except Exception as error:
-            return RequestError(INTERNAL_ERROR, f"{type(error).__name__}: {error}"), None
+            kind = type(error).__name__
+            if kind == "ValidationError":  # msgspec's, which is not imported here
+                return RequestError(INVALID_PARAMS, str(error)), None
+            return RequestError(INTERNAL_ERROR, f"{kind}: {error}"), None
 
-    def _fail(self, id_: Id | None, error: RequestError) -> None:
+    def _fail(self, id_: int | str | None, error: RequestError) -> None:
         told = {"code": error.code, "message": error.message}
         self._write({"jsonrpc": "2.0", "id": id_, "error": told})
 
@@ -166,4 +160,32 @@ class Server:
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
 
     def _write(self, message: object) -> None:
-        framing.write(self._writer, msgspec.json.encode(message))
+        framing.write(self._writer, self._session.encode(message))
+
+
+def _message(body: bytes) -> Message:
+    """Return a message; raises RequestError if it is none."""
+    try:
+        message = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise RequestError(PARSE_ERROR, str(error)) from error
+    if not isinstance(message, dict):
+        raise RequestError(INVALID_REQUEST, "a message is an object")
+    if not isinstance(message.get("method", ""), str):
+        raise RequestError(INVALID_REQUEST, "the name of a method is a string")
+    if type(message.get("id")) not in (int, str, type(None)):
+        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+    return message
+
+
+def _cancelled(message: Message) -> int | str:
+    """Return which request is cancelled; raises RequestError."""
+    params = message.get("params")
+    id_ = params.get("id") if isinstance(params, dict) else None
+    if not isinstance(id_, (int, str)):
+        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+    return id_
+
+
+def _is_exit(arrival: Message | RequestError) -> bool:
+    return isinstance(arrival, dict) and arrival.get("method") == "exit"

@@ -11,6 +11,7 @@ import msgspec
 from idlc.diagnostics.source import Source, Span
 from idlc.driver.workspace import State, Wishes
 from idlc.lsp import positions, uris
+from idlc.lsp.capabilities import DEFAULT_ENCODING
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
 from idlc.lsp.protocol import Location, Position, Range
@@ -49,7 +50,7 @@ class World:
         self.tell = tell
         self.documents = Documents()
         self.projects = Projects(self.documents)
-        self.encoding = positions.DEFAULT
+        self.encoding = DEFAULT_ENCODING
         self.settings = Settings()
         self.client: dict[str, Any] = {}
 

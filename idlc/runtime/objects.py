@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 ATOMIC = frozenset({bool, bytes, float, int, str})
 #: Elements up to which Python compares two arrays of numbers before numpy has begun.
 SMALL = 64
+#: Elements of large arrays that are compared at once.
+PIECE = 1 << 16
 
 
 def owner_of(kind: type) -> Any:
@@ -28,8 +30,15 @@ def owner_of(kind: type) -> Any:
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     if type(mine) is array and type(other) is array:
-        if mine.typecode == other.typecode and mine.typecode not in "fd":
-            return bytearray(mine) == memoryview(other)
+        if (
+            len(mine) > SMALL
+            and mine.typecode == other.typecode
+            and mine.typecode not in "fd"
+        ):
+            # only `bytes` and `bytearray` compare memory at once
+            if len(mine) <= PIECE or len(mine) != len(other):
+                return bytearray(mine) == memoryview(other)
+            return _in_pieces(memoryview(mine), memoryview(other))
     elif type(mine).__module__ == "numpy" or type(other).__module__ == "numpy":
         if type(mine) is type(other) and len(mine) <= SMALL:
             return memoryview(mine) == memoryview(other)
@@ -37,6 +46,14 @@ def same(mine: Any, other: Any) -> bool:
 
         return np.array_equal(mine, other)
     return bool(mine == other)
+
+
+def _in_pieces(mine: memoryview, other: memoryview) -> bool:
+    """Return whether two long arrays are equal; a copy of a piece stays in a cache."""
+    return all(
+        bytearray(mine[at : at + PIECE]) == other[at : at + PIECE]
+        for at in range(0, len(mine), PIECE)
+    )
 
 
 def copied(message: Any) -> Any:

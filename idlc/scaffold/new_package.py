@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
-from idlc.emit.pynames import why_not_package
+from idlc.emit.package_name import why_not_package
 from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"
@@ -20,7 +21,10 @@ IMPLIED = ("action_msgs", "service_msgs", "unique_identifier_msgs")
 
 
 class Package(NamedTuple):
-    """What the templates of a new package show."""
+    """What the templates of a new package show.
+
+    `depends` are the packages that one of interfaces only depends on.
+    """
 
     name: str
     description: str
@@ -29,6 +33,7 @@ class Package(NamedTuple):
     license: str
     build_type: str = PYTHON
     version: str = VERSION
+    depends: tuple[str, ...] = IMPLIED
 
     @property
     def is_python(self) -> bool:
@@ -66,26 +71,24 @@ class Package(NamedTuple):
         return repr(self.description)
 
     @property
-    def depends(self) -> tuple[str, ...]:
-        """The packages that a package of interfaces only depends on."""
-        return IMPLIED
-
-    @property
     def xml_depends(self) -> tuple[str, ...]:
         """The dependencies, as lines of package.xml."""
-        lines = _CMAKE_DEPENDS if self.build_type == CMAKE else _PYTHON_DEPENDS
+        lines = _PYTHON_DEPENDS if self.is_python else _cmake_depends(self.depends)
         return tuple(f"  <{tag}>{name}</{tag}>" if tag else "" for tag, name in lines)
 
 
-_CMAKE_DEPENDS = (
-    ("buildtool_depend", "ament_cmake"),
-    ("buildtool_depend", "rosidl_default_generators"),
-    ("", ""),
-    *(("depend", name) for name in IMPLIED),
-    ("exec_depend", "rosidl_default_runtime"),
-    ("", ""),
-    ("member_of_group", "rosidl_interface_packages"),
-)
+def _cmake_depends(packages: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    return (
+        ("buildtool_depend", "ament_cmake"),
+        ("buildtool_depend", "rosidl_default_generators"),
+        ("", ""),
+        *(("depend", name) for name in packages),
+        ("exec_depend", "rosidl_default_runtime"),
+        ("", ""),
+        ("member_of_group", "rosidl_interface_packages"),
+    )
+
+
 _PYTHON_DEPENDS = (
     ("depend", "rclpy"),
     ("exec_depend", "launch"),

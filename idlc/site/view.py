@@ -101,7 +101,7 @@ def page(interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pa
         sections=[_section(title, part, prefix(interface, part), pages) for title, part in parts],
         picture=picture(own, users, derive.references(interface), pages),
         users=[_link(user, str(user), pages) for user in sorted(users)],
-        hash=model.describer.hash(str(own)),
+        hash=model.describer.hash(str(own)) if model.distro.has_hashes else "",
         source="\n".join(interface.source.text.splitlines()) if interface.source else "",
     )
 

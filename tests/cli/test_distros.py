@@ -492,3 +492,31 @@ def test_advice_looks_at_names_of_the_catalogue_alone():
     advise(link("demo", [own, other], catalog, report), found, Selection())
     assert list(report) == []
     assert {one.code for one in found} & {"IDL424", "IDL425"} == set()
+
+
+# what the other commands make of it
+
+
+def test_names_are_completed_for_the_distribution():
+    context = click.Context(check, info_name="check")
+    for distro, offered in (("humble", ["geometry_msgs/Pose2D"]), ("lyrical", [])):
+        context.params = {"distro": distro}
+        found = completion.types_and_paths(context, check.params[0], "geometry_msgs/Pose2")
+        assert [one.value for one in found if one.type == "plain"] == offered
+
+
+def test_a_new_package_depends_on_what_is_there():
+    write({"pyproject.toml": '[tool.idlc]\ndistro = "humble"\n'})
+    assert main(["scaffold", "package", "rover_msgs", "--interfaces"]) == 0
+    for name in ("package.xml", "CMakeLists.txt"):
+        text = Path("rover_msgs", name).read_text("utf-8")
+        assert "action_msgs" in text
+        assert "service_msgs" not in text
+
+
+def test_pages_have_no_hash_where_there_is_none():
+    write({"demo/msg/A.msg": "int32 a\n"})
+    for distro in ("humble", "jazzy"):
+        assert main(["docs", "demo", "-o", distro, "--distro", distro]) == 0
+        pages = "".join(page.read_text("utf-8") for page in Path(distro).rglob("*.html"))
+        assert ("RIHS01_" in pages) == (distro == "jazzy")

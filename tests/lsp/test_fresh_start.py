@@ -8,10 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from idlc.lsp.positions import Places
-from idlc.lsp.protocol import Message
 from idlc.lsp.publish import diagnostics
 from idlc.lsp.session import Session
-from tests.support.lsp_messages import encoded
 
 #: Pieces of text that are put together and cut up, so that names clash, appear and vanish.
 PIECES = [
@@ -76,16 +74,9 @@ class Client:
         self.encoding = encoding
         self.texts = {}
         self.session = Session(lambda *_: None, lambda *_: None)
-        self.session.answer(
-            Message(
-                id=1,
-                method="initialize",
-                params=encoded(
-                    capabilities={"general": {"positionEncodings": [encoding]}},
-                    workspaceFolders=[self.folder(one) for one in folders],
-                ),
-            )
-        )
+        client = {"general": {"positionEncodings": [encoding]}}
+        roots = [self.folder(one) for one in folders]
+        self.session.answer("initialize", {"capabilities": client, "workspaceFolders": roots})
 
     def folder(self, name):
         return {"uri": (self.top / name).as_uri(), "name": name}
@@ -94,7 +85,7 @@ class Client:
         return (self.top / name).as_uri()
 
     def tell(self, method, **params):
-        self.session.take(Message(method=method, params=encoded(**params)))
+        self.session.take(method, params)
 
     def open(self, name, text):
         self.texts[name] = text
@@ -116,7 +107,7 @@ class Client:
 
     def problems(self):
         """Return the problems by document, in no particular order."""
-        found = diagnostics(self.session.world)
+        found = diagnostics(self.session.workbench.world)
         return {uri: sorted(map(repr, some)) for uri, some in found.items()}
 
 
@@ -208,7 +199,7 @@ def test_any_edits_end_where_a_fresh_start_begins(steps, encoding, folders):
         fresh = Client(top, client.folders, encoding)
         for name, text in client.texts.items():
             fresh.open(name, text)
-        texts = {one.uri: one.text for one in client.session.world.documents}
+        texts = {one.uri: one.text for one in client.session.workbench.world.documents}
         assert texts == {client.uri(name): text for name, text in client.texts.items()}
         assert client.problems() == fresh.problems()
     finally:

@@ -14,7 +14,8 @@ from idlc.cli.main import main
 from idlc.diagnostics.source import Source
 from idlc.disk.read import is_folder
 from idlc.lsp import framing, uris
-from idlc.lsp.positions import ENCODINGS, Places
+from idlc.lsp.capabilities import ENCODINGS
+from idlc.lsp.positions import Places
 from idlc.lsp.protocol import Position
 from idlc.lsp.server import serve
 from tests.support import golden_text

@@ -95,7 +95,7 @@ def test_what_is_no_message_is_answered_or_passed_over():
         beginning(),
         *END,
     )
-    assert errors(found) == [-32700, -32600, -32600, -32600, -32700, -32600, -32700]
+    assert errors(found) == [-32700, -32600, -32600, -32600, -32700, -32700, -32700]
     assert found[-1]["id"] == "last"
 
 
@@ -259,3 +259,26 @@ def test_an_interrupt_ends_it_quietly():
         server.send_signal(signal.SIGINT)
         server.wait(PATIENCE)
         assert b"Traceback" not in server.stderr.read()
+
+
+@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.driver.workspace.look"])
+def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
+    from idlc.lsp.publish import diagnostics
+    from idlc.lsp.session import Session
+
+    def fail(*_):
+        raise ZeroDivisionError("as the test asked for")
+
+    session = Session(lambda *_: None, lambda *_: None)
+    roots = [{"uri": workspace.as_uri(), "name": ""}]
+    session.answer("initialize", {"capabilities": {}, "workspaceFolders": roots})
+    with monkeypatch.context() as patch:
+        patch.setattr(where, fail)
+        ((uri, (found,)),) = diagnostics(session.workbench.world).items()
+        assert uri.startswith(workspace.as_uri())
+        assert found.code == "IDL901"
+        assert "ZeroDivisionError: as the test asked for" in found.message
+    uri, message = opened(workspace, "flot64 x\n")
+    session.take(message["method"], message["params"])
+    (found,) = diagnostics(session.workbench.world)[uri]
+    assert found.code == "IDL201"

@@ -12,6 +12,7 @@ INSTALLED = [
     path
     for kind in ("msg", "srv", "action")
     for path in sorted(Path(sys.prefix).glob(f"share/*/{kind}/*.json"))
+    if path.with_suffix(f".{kind}").exists()  # some of Kilted are written in .idl
 ]
 
 

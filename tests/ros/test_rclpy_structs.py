@@ -1,4 +1,4 @@
-"""The introspection road, which middlewares like Cyclone DDS take: real C structures.
+"""The introspection type support, which middlewares like Cyclone DDS take: real C structures.
 
 No wheel has such a middleware, so a test-only one reads and writes the memory: it walks over the
 members as Cyclone DDS does, from a thread that never gets Python's lock. For types of the wheels,

@@ -126,7 +126,7 @@ def package(tmp_path_factory) -> Path:
     [
         ["ruff", "check", "--no-cache", "."],
         ["ruff", "format", "--check", "--no-cache", "."],
-        ["mypy", "--strict"],
+        pytest.param(["mypy", "--strict"], marks=pytest.mark.jazzy),
         ["pytest", "-q", "test/test_style.py"],
     ],
     ids=["ruff check", "ruff format", "mypy", "ament"],

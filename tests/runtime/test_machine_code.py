@@ -32,32 +32,32 @@ def machine(request):
 
 
 @pytest.fixture(params=["structs", "fastrtps"])
-def road(request):
+def kind(request):
     return request.param
 
 
-def test_the_code_is_what_its_text_says(road, machine, tmp_path):
-    module = MODULES[road, machine]
+def test_the_code_is_what_its_text_says(kind, machine, tmp_path):
+    module = MODULES[kind, machine]
     _, code, symbols = assemble(machine, module.TEXT, tmp_path)
     assert {name: symbols[name] for name in module.ENTRIES} == module.ENTRIES
     words = re.findall(r"^(\w+): \.quad 0$", module.TEXT, re.MULTILINE)
     assert code == module.CODE + bytes(8 * len(words))
 
 
-def test_all_machines_have_the_same_functions_and_words(road):
+def test_all_machines_have_the_same_functions_and_words(kind):
     found = [
         (list(module.ENTRIES), re.findall(r"^(\w+): \.quad 0$", module.TEXT, re.MULTILINE))
         for key, module in MODULES.items()
-        if key[0] == road
+        if key[0] == kind
     ]
     assert found[0] == found[1]
 
 
-def test_the_code_does_what_it_should(road, machine, tmp_path):
-    module = MODULES[road, machine]
+def test_the_code_does_what_it_should(kind, machine, tmp_path):
+    module = MODULES[kind, machine]
     program, code = tmp_path / "program", tmp_path / "code"
     static = ["-static"] if is_foreign(machine) else []
-    source = HERE / f"machine_code_{road}.c"
+    source = HERE / f"machine_code_{kind}.c"
     run(tool("gcc", machine), *static, "-Wall", "-Werror", source, "-o", program)
     code.write_bytes(module.CODE)
     run(*emulator(machine), program, code, *module.ENTRIES.values())

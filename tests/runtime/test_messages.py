@@ -192,6 +192,18 @@ def test_equality_looks_at_every_element():
         hash(robot())
 
 
+@pytest.mark.parametrize("size", [1, 64, 65, 1 << 16, (1 << 16) + 1, 200_000])
+@pytest.mark.parametrize("at", [0, -1])
+def test_equality_of_arrays_of_every_size(size, at):
+    data = bytearray(size)
+    mine, other = robot(image=data), robot(image=data)
+    assert mine == other
+    data[at] = 1
+    assert mine != robot(image=data)
+    assert mine != robot(image=data[:-1])
+    assert robot(image=data) == robot(image=data)
+
+
 @pytest.mark.parametrize(
     ("kind", "field", "size"), [("Robot", "pose", 3), ("Many", "numbers", 100)]
 )

@@ -15,6 +15,7 @@ export class Server {
   /** Which idlc serves, once it was found. */
   found: Found | undefined;
   private client: LanguageClient | undefined;
+  private ending = false;
   private last: Promise<void> = Promise.resolve();
   private readonly status: vscode.LanguageStatusItem;
 
@@ -28,6 +29,7 @@ export class Server {
 
   /** Start the server, or stop it and start it again. */
   restart(): Promise<void> {
+    this.ending = true;
     return this.next(async () => {
       await this.end();
       await this.begin();
@@ -35,6 +37,7 @@ export class Server {
   }
 
   stop(): Promise<void> {
+    this.ending = true;
     return this.next(() => this.end());
   }
 
@@ -71,6 +74,16 @@ export class Server {
     this.client = new LanguageClient("idlc", "idlc", options, {
       documentSelector: DOCUMENTS,
       outputChannel: this.log,
+      middleware: {
+        workspace: {
+          // a server that is about to be stopped needs no news of settings
+          didChangeConfiguration: async (sections, next) => {
+            if (!this.ending) {
+              await next(sections);
+            }
+          },
+        },
+      },
     });
     this.client.onDidChangeState(({ newState }) => {
       if (newState === State.Running) {
@@ -80,6 +93,7 @@ export class Server {
         this.show("idlc stopped", vscode.LanguageStatusSeverity.Error, "idlc.restart", "Restart");
       }
     });
+    this.ending = false;
     await this.client.start();
   }
 

@@ -16,6 +16,9 @@ Example:
 
 @click.command("lsp", epilog=EPILOG)
 @click.option("--check", is_flag=True, help="Print what the server can do, as JSON, and end.")
+@click.option(
+    "--stdio", is_flag=True, expose_value=False, help="Many editors add it; it is so anyway."
+)
 def command(check: bool) -> int:
     """Serve an editor, which starts this and talks to it over standard input and output.
 
@@ -26,15 +29,9 @@ def command(check: bool) -> int:
         import json
 
         from idlc.lsp.capabilities import answer
-        from idlc.lsp.world import World
 
-        sys.stdout.write(json.dumps(answer(World()), indent=2) + "\n")
+        sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
         return 0
-    from idlc.lsp.server import serve
+    from idlc.cli.lsp_run import run
 
-    if sys.stdin.isatty():
-        sys.stderr.write("an editor starts this, and talks to it; Ctrl-C ends it\n")
-    # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
-    # what it waits in is never closed
-    reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115
-    return serve(reader, sys.stdout.buffer)
+    return run()

@@ -76,5 +76,15 @@ def _idlc_is_newer(path: Path) -> bool:
 
 @lru_cache(maxsize=1)
 def _newest_maker() -> int:
-    found = (entry for folder in _MAKERS if is_folder(folder) for entry in os.scandir(folder))
-    return max(entry.stat().st_mtime_ns for entry in found if entry.is_file())
+    return max(map(_newest, filter(is_folder, _MAKERS)))
+
+
+def _newest(folder: str | Path) -> int:
+    """Return when a file in a folder, or in those in it, was changed last."""
+    newest = 0
+    for entry in os.scandir(folder):
+        if entry.is_file():
+            newest = max(newest, entry.stat().st_mtime_ns)
+        elif not entry.name.startswith((".", "__")):  # caches
+            newest = max(newest, _newest(entry.path))
+    return newest

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from idlc.lsp import dependencies
+from idlc.lsp.capabilities import ADD_DEPENDENCY
 from idlc.lsp.edits import workspace_edit
-from idlc.lsp.protocol import INVALID_PARAMS, Command, RequestError
+from idlc.lsp.errors import INVALID_PARAMS, RequestError
+from idlc.lsp.protocol import Command
 from idlc.lsp.world import World
 
 
 def execute(world: World, asked: Command) -> None:
     """Carry a command out."""
-    if asked.command != dependencies.COMMAND:
+    if asked.command != ADD_DEPENDENCY:
         raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}`")
     match asked.arguments:
         case [str(uri), str(package)]:

@@ -48,7 +48,7 @@ class Items(Part, frozen=True, omit_defaults=False):
 
 
 class Typed(NamedTuple):
-    """What was typed of a line, and where the document goes on."""
+    """What was typed of a line, and where; `undeclared` is what is known of packages so far."""
 
     document: Document
     path: Path
@@ -56,6 +56,14 @@ class Typed(NamedTuple):
     line: int
     before: str
     encoding: str
+    undeclared: dict[str, bool]
+
+    def lacks(self, package: str) -> bool:
+        """Return whether package.xml could declare a package, and does not."""
+        if package not in self.undeclared:
+            edit = self.project.workspace.dependency(self.path, package)
+            self.undeclared[package] = edit is not None
+        return self.undeclared[package]
 
     def after(self, start: int) -> str:
         """Return what was typed after a place in the line."""
@@ -78,7 +86,7 @@ def complete(world: World, asked: AtPosition) -> Items:
         return Items(False, ())
     lines = lines_of(document.text)
     line, at = in_lines(lines, asked.position, world.encoding)
-    typed = Typed(document, path, project, line, lines[line][:at], world.encoding)
+    typed = Typed(document, path, project, line, lines[line][:at], world.encoding, {})
     items = tuple(_items(typed, world))
     return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, typed)))
 
@@ -153,7 +161,7 @@ def _type(
     typed: Typed, word: str, text: str, package: str, rank: str, world: World, looked_for: str = ""
 ) -> Item:
     """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
-    missing = typed.project.workspace.dependency(typed.path, package)
+    missing = world.supports("workspace", "applyEdit") and typed.lacks(package)
     return Item(
         text,
         _STRUCT,

@@ -17,17 +17,9 @@ from idlc.disk.read import is_file
 from idlc.driver.workspace import State
 from idlc.lsp import uris
 from idlc.lsp.elements import Element, spot
+from idlc.lsp.errors import REQUEST_FAILED, RequestError
 from idlc.lsp.features.navigation import mentions, users
-from idlc.lsp.protocol import (
-    REQUEST_FAILED,
-    AskedFileRenames,
-    AskedRename,
-    AtPosition,
-    Part,
-    Range,
-    RequestError,
-    TextEdit,
-)
+from idlc.lsp.protocol import AskedFileRenames, AskedRename, AtPosition, Part, Range, TextEdit
 from idlc.lsp.world import Known, World
 from idlc.model import ir, names
 

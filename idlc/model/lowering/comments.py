@@ -38,6 +38,8 @@ def condense(lines: Sequence[str]) -> Comment:
     filled = [at for at, line in enumerate(kept) if line]
     kept = kept[filled[0] : filled[-1] + 1] if filled else []
     kept = [line for at, line in enumerate(kept) if line or kept[at - 1]]
+    if len(kept) == 1:
+        return Comment((kept[0].lstrip(" \t"),), unit)
     return Comment(tuple(textwrap.dedent("\n".join(kept)).split("\n")) if kept else (), unit)
 
 

@@ -34,7 +34,7 @@ _MEMORY = (
 
 
 @cache
-def _road() -> ModuleType:
+def _implementation() -> ModuleType:
     """Return the module that fits the middleware of this process."""
     try:
         utilities = import_module("rclpy.utilities")
@@ -52,10 +52,10 @@ def _road() -> ModuleType:
             "with colcon"
         )
     if middleware in _OPAQUE:
-        from . import fastrtps as road
+        from . import fastrtps as implementation
     else:
-        from . import structs as road  # type: ignore[no-redef]
-    return road
+        from . import structs as implementation  # type: ignore[no-redef]
+    return implementation
 
 
 def _name(cls: Any) -> str:
@@ -85,7 +85,7 @@ def _message(cls: Any) -> c.MessageSupport:
             f"ROS reads the memory of {name} itself, and what it was built with is not "
             "here: install that package with your ROS 2, in the version that idlc compiled"
         )
-    return _road().message(cls, name)  # type: ignore[no-any-return]
+    return _implementation().message(cls, name)  # type: ignore[no-any-return]
 
 
 @cache
@@ -120,7 +120,7 @@ def import_service(cls: Any) -> None:
         _give(cls, {_SUPPORT: built.service()})
         return
     event = services.event(cls, happened) if happened else services.Event()
-    support = services.service(_name(cls), request, response, event, _road())
+    support = services.service(_name(cls), request, response, event, _implementation())
     _give(cls, {_SUPPORT: c.capsule(support)})
 
 

@@ -252,7 +252,7 @@ def c_function(name: str) -> int:
 
 
 class MessageSupport(NamedTuple):
-    """What a road makes for a message class: its type support, and the functions of its memory.
+    """The type support of a message class, and the functions of its memory.
 
     All are addresses.
     """

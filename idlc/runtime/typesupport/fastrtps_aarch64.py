@@ -6,23 +6,23 @@
 TEXT = """
 serialize:  // (memory, cdr) -> bool
   hint #34
-  stp x29, x30, [sp, #-48]!
+  stp x29, x30, [sp, #-64]!
   stp x19, x20, [sp, #16]
   stp x21, x22, [sp, #32]
   mov x29, sp
   ldr x19, spans
   ldr x19, [x0, x19]  // size of all; address and size of each
-  mov w0, #0
-  cbz x19, 3f
+  cbz x19, 4f
   ldr x2, content
   add x19, x19, x2
+  ldr x22, [x19], #8  // bytes that are left
+5: mov w0, #0
   ldr x20, position
   add x20, x20, x1
   ldr x21, [x20]  // where to write
   ldr x2, end
   ldr x2, [x1, x2]
   sub x2, x2, x21
-  ldr x22, [x19], #8  // bytes that are left
   cmp x2, x22
   b.lo 3f
 1: cbz x22, 2f
@@ -37,8 +37,21 @@ serialize:  // (memory, cdr) -> bool
   mov w0, #1
 3: ldp x19, x20, [sp, #16]
   ldp x21, x22, [sp, #32]
-  ldp x29, x30, [sp], #48
+  ldp x29, x30, [sp], #64
   ret
+4: ldr x2, body
+  ldr x2, [x0, x2]
+  mov w0, #0
+  cbz x2, 3b
+  ldr x3, length
+  ldr x22, [x2, x3]
+  sub x22, x22, #4  // without the header
+  ldr x3, content
+  add x2, x2, x3
+  add x2, x2, #4
+  add x19, sp, #48
+  stp x2, x22, [x19]  // one part
+  b 5b
 
 .balign 8
 deserialize:  // (cdr, memory) -> bool
@@ -77,11 +90,18 @@ deserialize:  // (cdr, memory) -> bool
 serialized_size:  // (memory) -> size
   hint #34
   ldr x1, spans
+  ldr x1, [x0, x1]
+  cbz x1, 1f
+  ldr x0, content
+  ldr x0, [x1, x0]
+  ret
+1: ldr x1, body
   ldr x0, [x0, x1]
-  cbz x0, 1f
-  ldr x1, content
+  cbz x0, 2f
+  ldr x1, length
   ldr x0, [x0, x1]
-1: ret
+  sub x0, x0, #4
+2: ret
 
 .balign 8
 maximum_size:  // (bounds) -> 0, and there is no maximum
@@ -110,6 +130,13 @@ resolve:  // (handle, identifier) -> handle
   ret
 
 .balign 8
+create:  // () -> memory
+  hint #34
+  ldr x0, memory
+  ldr x16, make
+  br x16
+
+.balign 8
 copy: .quad 0
 new_bytes: .quad 0
 forget: .quad 0
@@ -119,35 +146,44 @@ end: .quad 0
 spans: .quad 0
 received: .quad 0
 content: .quad 0
+body: .quad 0
+length: .quad 0
 answers: .quad 0
+memory: .quad 0
+make: .quad 0
 """
 
 CODE = bytes.fromhex(
     # serialize
-    "5f2403d5fd7bbda9f35301a9f55b02a9fd030091730c0058136873f800008052"
-    "d30200b4620c00587302028b340b00589402018b950240f9020b0058226862f8"
-    "420015cb768640f85f0016eb63010054160100b4e00315aa610ac1a8b502028b"
-    "d60202cb7008005800023fd6f9ffff17950200f920008052f35341a9f55b42a9"
-    "fd7bc3a8c0035fd6"
+    "5f2403d5fd7bbca9f35301a9f55b02a9fd030091730f0058136873f8730300b4"
+    "820f00587302028b768640f800008052140e00589402018b950240f9e20d0058"
+    "226862f8420015cb5f0016eb63010054160100b4e00315aa610ac1a8b502028b"
+    "d60202cb700b005800023fd6f9ffff17950200f920008052f35341a9f55b42a9"
+    "fd7bc4a8c0035fd6820c0058026862f80000805222ffffb4430c0058566863f8"
+    "d61200d1630b00584200038b42100091f3c30091625a00a9ddffff171f2003d5"
     # deserialize
-    "5f2403d5fd7bbea9f30b00f9fd030091f30301aaa2070058026862f8421000d1"
-    "81070058016861f8210002cbe00302aa1006005800023fd6400100b422070058"
-    "7302028b610240f9600200f9e00301aa5005005800023fd62000805204000014"
-    "1005005800023fd600008052f30b40f9fd7bc2a8c0035fd6"
+    "5f2403d5fd7bbea9f30b00f9fd030091f30301aae2080058026862f8421000d1"
+    "c1080058016861f8210002cbe00302aa5007005800023fd6400100b462080058"
+    "7302028b610240f9600200f9e00301aa9006005800023fd62000805204000014"
+    "5006005800023fd600008052f30b40f9fd7bc2a8c0035fd6"
     # serialized_size
-    "5f2403d5e1040058006861f8600000b401050058006861f8c0035fd61f2003d5"
+    "5f2403d521060058016861f8810000b440060058206860f8c0035fd621060058"
+    "006861f8800000b401060058006861f8001000d1c0035fd6"
     # maximum_size
     "5f2403d51f000039000080d2c0035fd6"
     # resolve
-    "5f2403d522040058430040f9630100b4e40301aa6514403886144038bf00066b"
+    "5f2403d522050058430040f9630100b4e40301aa6514403886144038bf00066b"
     "8100005485ffff35400440f9c0035fd642400091f5ffff17000080d2c0035fd6"
+    # create
+    "5f2403d5600300589003005800021fd6"
 )
 
 #: Where each function begins.
 ENTRIES = {
     "serialize": 0x0,
-    "deserialize": 0x88,
-    "serialized_size": 0x100,
-    "maximum_size": 0x120,
-    "resolve": 0x130,
+    "deserialize": 0xC0,
+    "serialized_size": 0x138,
+    "maximum_size": 0x170,
+    "resolve": 0x180,
+    "create": 0x1C0,
 }

@@ -1,7 +1,7 @@
 """Type support of services and actions, and the events of service introspection.
 
-Both are made of the type support of their messages, so nothing here depends on the
-road.
+Both are made of the type support of their messages, so nothing here depends on
+which kind that is.
 """
 
 from __future__ import annotations
@@ -121,10 +121,10 @@ def event(cls: Any, handle: int) -> Event:
 
 
 def service(
-    name: str, request: int, response: int, event: Event, road: ModuleType
+    name: str, request: int, response: int, event: Event, kind: ModuleType
 ) -> int:
     """Return the address of a service's type support, made of its messages' handles."""
-    identifier, data = road.service(name, request, response, event.handle)
+    identifier, data = kind.service(name, request, response, event.handle)
     return c.pointer(
         c.ServiceTypeSupport(
             identifier,

@@ -1,4 +1,4 @@
-"""The introspection road: rmw_cyclonedds_cpp and others that walk over C structures.
+"""The introspection kind: rmw_cyclonedds_cpp and others that walk over C structures.
 
 Message memory is what rosidl's is: the C structure, and what it refers to, all from
 rosidl's allocator. So it does not matter whose type support a middleware works with where

@@ -1,4 +1,4 @@
-"""The opaque road: rmw_fastrtps_cpp and others that use its type support.
+"""The opaque kind: rmw_fastrtps_cpp and others that use its type support.
 
 The middleware never looks into message memory here, so it is a `Memory` that holds the
 encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from ctypes import PYFUNCTYPE, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
-from struct import Struct, pack
+from struct import pack
 from typing import Any
 
 from ..cdr import HEADERS, NATIVE
@@ -32,35 +32,28 @@ IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 _HEADER = 4
 #: An array with this many bytes is not copied on its way to the middleware.
 _LARGE = 16384
-_SPAN = Struct("=3Q").pack
 
 
 class Memory:
     """Message memory: `message @ memory` encodes into it, `+memory` is the message."""
 
-    __slots__ = ("body", "message", "received", "size", "spans")
+    __slots__ = ("body", "message", "received", "spans")
 
-    #: The encoded message without header: `bytes`, or a list with the parts of a large
-    #: one, which are not copied.
+    #: The encoded message with header; the parts of a large one, which are not copied.
     body: Any
-    size: int
-    #: For machine code: size, then address and size of each part, as words.
+    #: For machine code, where there are parts: the size of all without header, then
+    #: address and size of each, as words.
     spans: bytes
     #: The message that `body` was made from.
     message: Any
     #: What was received, with header; no attribute in a memory that is sent.
     received: bytes
 
-    def keep(self, parts: list[Any]) -> int:
-        """Take the parts of a message, and return their size without header."""
-        parts[0] = parts[0][_HEADER:]
-        self.body = body = b"".join(parts)
-        size = len(body)
-        self.spans = _SPAN(size, id(body) + c.BYTES_OFFSET, size)
-        return size
-
     def keep_apart(self, parts: list[Any]) -> int:
-        """Do the same without a copy; arrays cannot change their length until it is sent."""
+        """Take the parts of a message, and return their size without header.
+
+        Arrays cannot change their length until it is sent.
+        """
         parts[0] = parts[0][_HEADER:]
         self.body = views = [memoryview(part).cast("B") for part in parts]
         start = _view_start() >> 3
@@ -72,22 +65,25 @@ class Memory:
         return size
 
 
-def _memory_type(name: str, cls: Any, apart: bool) -> type[Memory]:
+def _memory_type(name: str, cls: Any, *, apart: bool = True) -> type[Memory]:
     """Return the memory of a message class; `apart`: large ones may stay in parts."""
     codec = cls._codec_(NATIVE)
     encode, bulk = codec.encode, codec.bulk and apart
+    join = b"".join
     true = c.TRUE
     large = False
 
     def store(memory: Any, message: Any) -> object:
         nonlocal large
         try:
-            size = encode(message, memory.keep_apart if large else memory.keep)
             # what follows on a topic is as large as what came before
-            large = bulk and size >= _LARGE
+            if large:
+                large = encode(message, memory.keep_apart) >= _LARGE
+            else:
+                memory.body = body = encode(message, join)
+                large = bulk and len(body) >= _LARGE
         except Exception as error:
             raise encode_error(message, sys.byteorder, error) from error
-        memory.size = size
         memory.message = message
         return true
 
@@ -115,8 +111,8 @@ def _view_start() -> int:
 def _words() -> dict[str, int]:
     """Return what the machine code reads, the same for all types."""
     position, end = fast_cdr()
-    memory, spans, received = Memory(), b"spans", b"received"
-    memory.spans, memory.received = spans, received
+    memory, spans, received, body = Memory(), b"spans", b"received", bytes(54321)
+    memory.spans, memory.received, memory.body = spans, received, body
     _view_start()
     return {
         "copy": c.address(ctypes.CDLL(None).memcpy),
@@ -128,19 +124,26 @@ def _words() -> dict[str, int]:
         "spans": _offset(memory, id(spans)),
         "received": _offset(memory, id(received)),
         "content": c.BYTES_OFFSET,
+        "body": _offset(memory, id(body)),
+        "length": _offset(body, len(body)),
     }
 
 
-def _native(answers: dict[bytes, int]) -> dict[str, int]:
-    """Return the addresses of the functions that Fast DDS calls; raises RefusedError."""
-    words = [
+def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
+    """Return the addresses of the functions that Fast DDS calls; raises RefusedError.
+
+    rclpy calls one, too: `create`, which would take a quarter of a microsecond by ctypes.
+    """
+    table = [
         word
         for identifier, handle in answers.items()
         for word in (id(c.keep(identifier)) + c.BYTES_OFFSET, handle)
     ]
-    table = c.keep((c_size_t * (len(words) + 1))(*words))
-    answered = ctypes.addressof(table)
-    return native.functions("fastrtps", {**_words(), "answers": answered})
+    answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
+    words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
+    return native.functions(
+        "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
+    )
 
 
 def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
@@ -205,10 +208,13 @@ def message(cls: Any, name: str) -> c.MessageSupport:
         IDENTIFIER.encode(): ctypes.addressof(support),
         introspection.IDENTIFIER.encode(): introspection.handle(name, functional=False),
     }
+    memory = _memory_type(name, cls)
     try:
-        functions, apart = _native(answers), True
+        functions = _native(answers, memory)
     except native.RefusedError:
-        functions, apart = python.functions(answers), False
+        memory = python.memory_type(_memory_type(name, cls, apart=False))
+        functions = python.functions(answers)
+        functions["create"] = c.address(PYFUNCTYPE(py_object)(memory))
     support.data = c.pointer(
         _Callbacks(
             f"{package}::{kind}".encode(),
@@ -223,7 +229,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     support.about = about(name)
     return c.MessageSupport(
         ctypes.addressof(support),
-        c.address(PYFUNCTYPE(py_object)(_memory_type(name, cls, apart))),
+        functions["create"],
         c.c_function("Py_DecRef"),
         c.c_function("PyNumber_MatrixMultiply"),
         c.c_function("PyNumber_Positive"),

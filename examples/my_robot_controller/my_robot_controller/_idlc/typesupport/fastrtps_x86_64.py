@@ -11,23 +11,23 @@ serialize:  # (memory, cdr) -> bool
   push rbp
   push r12
   push r13
-  sub rsp, 8
+  sub rsp, 24
   xor eax, eax
   mov rbx, [rip+spans]
   mov rbx, [rdi+rbx]  # size of all; address and size of each
   test rbx, rbx
-  je 3f
+  je 4f
   add rbx, [rip+content]
-  mov rbp, [rip+position]
+  mov r13, [rbx]  # bytes that are left
+  add rbx, 8
+5: mov rbp, [rip+position]
   add rbp, rsi
   mov r12, [rbp]  # where to write
   mov rdx, [rip+end]
   mov rdx, [rsi+rdx]
   sub rdx, r12
-  mov r13, [rbx]  # bytes that are left
   cmp rdx, r13
   jb 3f
-  add rbx, 8
 1: test r13, r13
   je 2f
   mov rdi, r12
@@ -40,12 +40,25 @@ serialize:  # (memory, cdr) -> bool
   jmp 1b
 2: mov [rbp], r12
   mov eax, 1
-3: add rsp, 8
+3: add rsp, 24
   pop r13
   pop r12
   pop rbp
   pop rbx
   ret
+4: mov rdx, [rip+body]
+  mov rdx, [rdi+rdx]
+  test rdx, rdx
+  je 3b
+  mov rbx, [rip+length]
+  mov r13, [rdx+rbx]
+  sub r13, 4  # without the header
+  add rdx, [rip+content]
+  add rdx, 4
+  mov [rsp], rdx  # one part
+  mov [rsp+8], r13
+  mov rbx, rsp
+  jmp 5b
 
 .balign 8
 deserialize:  # (cdr, memory) -> bool
@@ -83,7 +96,15 @@ serialized_size:  # (memory) -> size
   je 1f
   add rax, [rip+content]
   mov rax, [rax]
-1: ret
+  ret
+1: mov rax, [rip+body]
+  mov rax, [rdi+rax]
+  test rax, rax
+  je 2f
+  mov rdx, [rip+length]
+  mov rax, [rax+rdx]
+  sub rax, 4
+2: ret
 
 .balign 8
 maximum_size:  # (bounds) -> 0, and there is no maximum
@@ -114,6 +135,12 @@ resolve:  # (handle, identifier) -> handle
 4: ret
 
 .balign 8
+create:  # () -> memory
+  endbr64
+  mov rdi, [rip+memory]
+  jmp [rip+make]
+
+.balign 8
 copy: .quad 0
 new_bytes: .quad 0
 forget: .quad 0
@@ -123,34 +150,43 @@ end: .quad 0
 spans: .quad 0
 received: .quad 0
 content: .quad 0
+body: .quad 0
+length: .quad 0
 answers: .quad 0
+memory: .quad 0
+make: .quad 0
 """
 
 CODE = bytes.fromhex(
     # serialize
-    "f30f1efa5355415441554883ec0831c0488b1d61010000488b1c1f4885db7459"
-    "48031d61010000488b2d3a0100004801f54c8b6500488b1534010000488b1416"
-    "4c29e24c8b2b4c39ea722e4883c3084d85ed741c4c89e7488b33488b53084901"
-    "d44929d5ff15de0000004883c310ebdf4c896500b8010000004883c408415d41"
-    "5c5d5bc30f1f4000"
+    "f30f1efa5355415441554883ec1831c0488b1dd1010000488b1c1f4885db7464"
+    "48031dd10100004c8b2b4883c308488b2da30100004801f54c8b6500488b159d"
+    "010000488b14164c29e24c39ea722a4d85ed741c4c89e7488b33488b53084901"
+    "d44929d5ff154e0100004883c310ebdf4c896500b8010000004883c418415d41"
+    "5c5d5bc3488b1575010000488b14174885d274e5488b1d6d0100004c8b2c1a49"
+    "83ed044803154e0100004883c204488914244c896c24084889e3e96fffffff90"
     # deserialize
-    "f30f1efa534889f3488b05d1000000488b04074883e804488b35ca000000488b"
-    "34374829c64889c7ff159a0000004885c0741a48031dbe000000488b3b488903"
-    "ff158a000000b8010000005bc3ff158500000031c05bc390"
+    "f30f1efa534889f3488b0509010000488b04074883e804488b3502010000488b"
+    "34374829c64889c7ff15d20000004885c0741a48031df6000000488b3b488903"
+    "ff15c2000000b8010000005bc3ff15bd00000031c05bc390"
     # serialized_size
-    "f30f1efa488b058d000000488b04074885c0740a4803058d000000488b00c390"
+    "f30f1efa488b05c5000000488b04074885c0740b480305c5000000488b00c348"
+    "8b05c2000000488b04074885c0740f488b15ba000000488b04104883e804c390"
     # maximum_size
     "f30f1efac6070031c0c3660f1f440000"
     # resolve
-    "f30f1efa488b1575000000488b024885c074214889f1448a00443a01751048ff"
+    "f30f1efa488b159d000000488b024885c074214889f1448a00443a01751048ff"
     "c048ffc14584c075ed488b4208c34883c210ebd7c30f1f00"
+    # create
+    "f30f1efa488b3d6d000000ff256f0000000f1f8000000000"
 )
 
 #: Where each function begins.
 ENTRIES = {
     "serialize": 0x0,
-    "deserialize": 0x88,
-    "serialized_size": 0xE0,
-    "maximum_size": 0x100,
-    "resolve": 0x110,
+    "deserialize": 0xC0,
+    "serialized_size": 0x118,
+    "maximum_size": 0x158,
+    "resolve": 0x168,
+    "create": 0x1A0,
 }

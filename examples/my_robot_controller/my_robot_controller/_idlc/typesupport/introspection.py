@@ -1,8 +1,8 @@
 """Introspection members: field names, types and C offsets, as a middleware walks them.
 
-Both roads need them. Fast DDS describes types to its peers from them and never looks at
-the memory; introspection-based middlewares read and write the memory that they
-describe, with the functions that stand beside it.
+Both kinds of type support need them. Fast DDS describes types to its peers from them
+and never looks at the memory; introspection-based middlewares read and write the memory
+that they describe, with the functions that stand beside it.
 """
 
 from __future__ import annotations

@@ -24,16 +24,16 @@ class RefusedError(Exception):
     """There can be no machine code here: why."""
 
 
-def functions(road: str, words: dict[str, int]) -> dict[str, int]:
-    """Return the addresses of a road's functions by name, which live as long as the process.
+def functions(kind: str, words: dict[str, int]) -> dict[str, int]:
+    """Return the addresses of functions by name; they live as long as the process.
 
-    `words` is what their code reads, in the order in which it follows the code. Raises
-    RefusedError.
+    `kind` is that of the type support, `fastrtps` or `structs`. `words` is what their code
+    reads, in the order in which it follows the code. Raises RefusedError.
     """
     machine = os.uname().machine
     if machine not in _MACHINES:
         raise RefusedError(f"there is none for {machine}")
-    module = import_module(f"{__package__}.{road}_{machine}")
+    module = import_module(f"{__package__}.{kind}_{machine}")
     start = _executable(module.CODE + pack(f"={len(words)}Q", *words.values()))
     return {name: start + offset for name, offset in module.ENTRIES.items()}
 
