@@ -26,9 +26,10 @@ from idlc.model import ir
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from idlc.checks.package.facts import Facts
     from idlc.checks.select import Selection
     from idlc.diagnostics.report import Diagnostic, Edit
-    from idlc.diagnostics.source import Source
+    from idlc.diagnostics.source import Source, Span
     from idlc.disk.library import Library
     from idlc.model.link import Model
 
@@ -199,10 +200,20 @@ class Workspace:
         """Return the edit of package.xml by which a file may use a package; `None` if it may."""
         from idlc.checks.package.manifest import dependency
 
+        found = self._around(path)
+        return dependency(found, package) if found else None
+
+    def declaration(self, path: Path, package: str) -> Span | None:
+        """Return where package.xml of a file's package declares another."""
+        from idlc.checks.package.manifest import declaration
+
+        found = self._around(path)
+        return declaration(found, package) if found else None
+
+    def _around(self, path: Path) -> Facts | None:
         given = self._packages[self._places[path][0]]
         with working_in(self.folder):
-            found = next(iter(self._checkers.values())).around(given)
-        return dependency(found, package) if found else None
+            return next(iter(self._checkers.values())).around(given)
 
     def earlier(self, against: str) -> Mapping[str, Model]:
         """Return the packages' models as they are in a git revision or folder.

@@ -137,6 +137,19 @@ def test_references_are_those_of_every_file(opened):
     ]
 
 
+def test_package_xml_refers_to_the_packages_of_types(editor, package):
+    manifest = "<package>\n  <name>demo</name>\n  <depend>std_msgs</depend>\n</package>\n"
+    folder = package({"package.xml": manifest, "msg/A.msg": "std_msgs/Header header\n"})
+    one = editor(folder)
+    uri = one.open(folder / "msg/A.msg")
+    context = lsp.ReferenceContext(include_declaration=False)
+    found = ask(one, lsp.TEXT_DOCUMENT_REFERENCES, lsp.ReferenceParams, uri, 0, 3, context=context)
+    assert [(each.uri.rpartition("/")[2], each.range) for each in found] == [
+        ("A.msg", between(0, 0, 15)),
+        ("package.xml", between(2, 2, 10)),
+    ]
+
+
 def test_symbols_of_a_file_are_its_definitions(opened):
     one, uri, folder = opened
     params = lsp.DocumentSymbolParams(text_document=document(uri))

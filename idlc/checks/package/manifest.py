@@ -56,6 +56,12 @@ def dependency(facts: Facts, package: str) -> Edit | None:
     return _addition(facts, f"<depend>{package}</depend>")
 
 
+def declaration(facts: Facts, package: str) -> Span | None:
+    """Return where a package is declared, `None` if it is not."""
+    found = facts.declared(*_NEEDED, "test_depend").get(package)
+    return found.span if found else None
+
+
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """A package of interfaces alone declares no interfaces that it does not use."""
     if facts.modules or facts.native or not facts.whole:

@@ -87,6 +87,10 @@ def references(world: World, asked: AskedReferences) -> list[Location]:
     first = top(found.name, found.known.state, world)
     declared = [first] if first and asked.context.include_declaration else []
     used = [world.location(span, state) for state, span in users(found.name, world)]
+    state, path = found.known.state, found.known.state.path_of(found.known.source)
+    project = world.projects.of(path)
+    span = project.workspace.declaration(path, found.name.package) if project else None
+    used += [world.location(span, state)] if span else []
     return list(dict.fromkeys((*declared, *used)))
 
 
