@@ -33,6 +33,7 @@ SITE_ENV := $(if $(filter no,$(ROS)),.venv/site-$(TAG),$(TEST_ENV))
 RELEASE_ENV := .venv/release-$(KIND)
 LOCK_ENV := .venv/lock-$(TAG)
 DEMO_OUT := build/demo
+VSCODE := build/vscode
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website
 BROWSER_TESTS := tests/cli/test_docs_browser.py tests/website/test_website_browser.py
@@ -96,7 +97,9 @@ vscode: ## build the extension for VS Code, build/idlc.vsix (needs Node 20 or ne
 	cd editors/vscode && npm ci && npm run check && npm test && npm run build && npm run package
 
 test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code; save pictures of it
-	cd tests/editors/vscode && npm ci && npm run prepare-server
+	@mkdir -p $(VSCODE)
+	cp tests/editors/vscode/* tests/editors/vscode/.npmrc $(VSCODE)
+	cd $(VSCODE) && npm ci && npm run prepare-server
 	$(TEST_ENV)/bin/python -m pytest tests/editors/vscode_check.py $(ARGS)
 
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more

@@ -117,11 +117,8 @@ class Model:
             for _, target in self._pool.references(name) if self._pool else ():
                 users.setdefault(target, []).append(name)
         bad: set[ir.TypeName] = set()
-        waiting = [
-            name
-            for name, one in self.interfaces.items()
-            if one.source is not None and one.source.path in broken
-        ]
+        known = self.interfaces.values()
+        waiting = [one.name for one in known if one.source and one.source.path in broken]
         while waiting:
             name = waiting.pop()
             if name not in bad:

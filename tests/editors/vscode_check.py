@@ -1,6 +1,6 @@
 """What people see most, in a real VS Code that has the built extension: `make test-vscode`.
 
-Pictures of it are in build/vscode.
+That installs VS Code in build/vscode, where pictures of it are afterwards.
 """
 
 import os
@@ -11,7 +11,7 @@ from tests.editors import running, scenario
 from tests.support import browser
 from tests.support.paths import ROOT
 
-PICTURES = ROOT / "build" / "vscode"
+FOLDER = ROOT / "build" / "vscode"
 #: Seconds for all of it on a busy machine.
 PATIENCE = 1500
 
@@ -19,19 +19,20 @@ PATIENCE = 1500
 def test_vscode(package):
     # VS Code asks a login shell for PATH, which knows nothing of the tests
     (package / ".venv").symlink_to(sys.prefix, target_is_directory=True)
-    shutil.rmtree(PICTURES, ignore_errors=True)
-    PICTURES.mkdir(parents=True)
+    for one in FOLDER.glob("*.png"):
+        one.unlink()
     extension = ROOT / "build" / "idlc.vsix"
-    script = running.HERE / "vscode" / "see.mjs"
+    script = FOLDER / "see.mjs"
     program = os.environ.get("NODE", "node")
     words = (program, script, package, extension, browser.command())
     seen = running.see(package, *words, patience=PATIENCE)
     for one in package.parent.glob("*.png"):
-        shutil.copy(one, PICTURES)
+        shutil.copy(one, FOLDER)
     assert {name: one for name, one in seen.items() if "failed" in str(one)} == {}
     assert scenario.normal(seen) == scenario.EXPECTED
     assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
     assert "uint32 nanosec" in seen["show"]
     assert seen["gen"]
     assert seen["scaffold"]
+    assert seen["errors"] == 0
     assert "/there/is/no/idlc does not serve editors" in seen["missing"]

@@ -288,7 +288,10 @@ const LOOKS = {
       const hints = text.filter(([, hint]) => hint);
       return hints.length > 2 && hints;
     });
+    await keyboard.press("Control+Shift+m");
+    await page.locator(".markers-panel .monaco-list-row").nth(1).waitFor();
     await picture("hints");
+    await keyboard.press("Control+j");
     return found;
   },
   async show() {
@@ -318,9 +321,9 @@ const LOOKS = {
     settle("Machine", { "idlc.path": "/there/is/no/idlc" });
     const told = page.locator(".notification-list-item", { hasText: "does not serve editors" });
     await told.first().waitFor();
+    await page.waitForTimeout(500); // for it to come to rest
     await picture("missing");
-    const text = await told.first().textContent();
-    return text;
+    return told.first().textContent();
   },
 };
 
@@ -345,6 +348,7 @@ try {
       await keyboard.press("Escape");
     }
   }
+  seen.errors = await page.locator(".notification-list-item .codicon-error").count();
 } finally {
   writeFileSync(process.env.SEEN, JSON.stringify(seen));
   await browser.close();
