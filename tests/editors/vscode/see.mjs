@@ -79,7 +79,10 @@ async function pick(text) {
   await input.fill(`>${text}`);
   await page.locator(".quick-input-widget .monaco-list-row.focused").waitFor();
   await keyboard.press("Enter");
-  await input.waitFor({ state: "hidden" });
+  // a command may ask something, in the same place
+  await until("end of the commands", async () => {
+    return !(await input.isVisible()) || !(await input.inputValue()).startsWith(">");
+  });
 }
 
 /** Answer a question: choose from a list, or type a text. */
