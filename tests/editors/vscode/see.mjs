@@ -49,7 +49,7 @@ const quiet = ["--disable-telemetry", "--disable-update-check", "--disable-getti
 const server = spawn(
   process.execPath,
   [entry, ...common, ...quiet, "--auth", "none", "--bind-addr", "127.0.0.1:0"],
-  { stdio: ["ignore", "pipe", "inherit"] },
+  { stdio: ["ignore", "pipe", "inherit"], detached: true }, // it has children, which end with it
 );
 const port = await new Promise((resolve, reject) => {
   let told = "";
@@ -355,5 +355,5 @@ try {
 } finally {
   writeFileSync(process.env.SEEN, JSON.stringify(seen));
   await browser.close();
-  server.kill();
+  process.kill(-server.pid);
 }
