@@ -115,11 +115,13 @@ def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnost
     return checked, judged(found, models, options.selection)
 
 
-def checkers(packages: Sequence[inputs.Inputs], scope: Scope) -> dict[str, Checker]:
-    """Return what checks packages, for each distribution by its name."""
+def checkers(
+    packages: Sequence[inputs.Inputs], scope: Scope, *, again: bool = False
+) -> dict[str, Checker]:
+    """Return what checks packages, for each distribution by its name; `again`: more than once."""
     distros = scope.distros or (scope.distro,)
     return {
-        one.name: Checker(packages, msgspec.structs.replace(scope, distros=(one,)))
+        one.name: Checker(packages, msgspec.structs.replace(scope, distros=(one,)), again=again)
         for one in distros
     }
 
@@ -130,12 +132,15 @@ class Checker:
     Everything else on disk is as it was when it was first looked at.
     """
 
-    def __init__(self, packages: Sequence[inputs.Inputs], scope: Scope) -> None:
+    def __init__(
+        self, packages: Sequence[inputs.Inputs], scope: Scope, *, again: bool = False
+    ) -> None:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
         self._lowered: pool.Memory = {}
-        self._checked: registry.Memory = {}
-        self._advised: registry.Memory = {}
+        # what each interface depends on is only worth remembering if there is a next time
+        self._checked: registry.Memory | None = {} if again else None
+        self._advised: registry.Memory | None = {} if again else None
         self._facts: dict[str, Facts | None] = {}
 
     def check(

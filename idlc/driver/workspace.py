@@ -130,7 +130,7 @@ class Workspace:
                 paths = self._paths or settings.paths or (".",)
                 there = look(paths, report, found.exclude, unsaved)
                 self._packages = inputs.packages(there.files, self._scope, report, there.packages)
-            self._checkers = checkers(self._packages, self._scope)
+            self._checkers = checkers(self._packages, self._scope, again=True)
         self._places = {
             absolute(self.folder / one.file.path): (number, at)
             for number, given in enumerate(self._packages)

@@ -15,7 +15,7 @@ from idlc.diagnostics.source import Span
 from idlc.model import ir, names
 from idlc.model.lowering import idl_values, slips
 from idlc.model.lowering.fault import Fault
-from idlc.model.lowering.types import STRINGS, positive
+from idlc.model.lowering.types import STRINGS, as_parsed, positive
 from idlc.syntax import idl_tree
 from idlc.syntax.tree import OPTIONAL, Piece
 
@@ -131,7 +131,7 @@ class _Lowering:
         if isinstance(bound, Fault):
             self._fault(bound)
             return _Type(ir.Unknown(), piece)
-        return _Type(ir.Sequence(element, bound), piece)
+        return _Type(as_parsed(ir.Sequence(element, bound)), piece)
 
     def _element(self, element: idl_tree.Element) -> _Type:
         piece = element.name

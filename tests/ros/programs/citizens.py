@@ -20,7 +20,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from structs_side import Memory
 
 PATIENCE = 60.0
-HIDING = Hiding(1, 2, [3.5], "4", [5, 6, 7], True, [Part(1, 2)], Part(6), 8, 9)
+HIDING = Hiding(1, 2, [3.5], "4", [5, 6, 7], True, [False], [Part(1, 2)], Part(6), 8, 9)
 TRUE = True_(None_(1), [None_(2)], [None_(3), None_(4)])
 
 
