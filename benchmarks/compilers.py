@@ -22,7 +22,7 @@ ROSIDL_FILES = 30
 def gen(package: Path, out: Path) -> None:
     from idlc.diagnostics.report import Report
     from idlc.disk.scope import Scope
-    from idlc.driver.gen import GenOptions, gen
+    from idlc.driver.generate.gen import GenOptions, gen
 
     paths, include = (str(package),), (str(package.parent),)
     options = GenOptions(paths, str(out / package.name), Scope(package.name, include))

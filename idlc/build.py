@@ -16,8 +16,8 @@ from idlc.disk.inputs import packages
 from idlc.disk.output.project import Project
 from idlc.disk.scope import scope
 from idlc.disk.setup_command import distribution_class
-from idlc.driver.gen import GenOptions, gen
-from idlc.driver.libraries import Libraries, libraries_of
+from idlc.driver.generate.gen import GenOptions, gen
+from idlc.driver.generate.libraries import Libraries, libraries_of
 from idlc.driver.stages import models_of
 from idlc.model.link import Model
 from idlc.scaffold import new_interface

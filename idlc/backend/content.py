@@ -18,9 +18,9 @@ from idlc.disk.find import look, nothing_in
 from idlc.disk.inputs import Inputs, packages
 from idlc.disk.read import is_folder, read_bytes
 from idlc.disk.scope import Scope, scope
-from idlc.driver.gen import GenOptions, gen
-from idlc.driver.libraries import libraries_of
-from idlc.driver.share import INTERFACES, shared
+from idlc.driver.generate.gen import GenOptions, gen
+from idlc.driver.generate.libraries import libraries_of
+from idlc.driver.generate.share import INTERFACES, shared
 from idlc.driver.stages import models_of
 
 

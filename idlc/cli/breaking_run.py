@@ -16,13 +16,13 @@ from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report, first_few
 from idlc.disk import command_settings, pyproject
 from idlc.disk.scope import scope
-from idlc.driver.breaking import GIT, BreakingOptions, Verdict, breaking
-from idlc.driver.breaking_distro import is_distro
 from idlc.driver.check import Checked
+from idlc.driver.compare.breaking import GIT, BreakingOptions, Verdict, breaking
+from idlc.driver.compare.distribution import is_distro
 
 if TYPE_CHECKING:
-    from idlc.driver.breaking_recorded import RecordedVerdict
-    from idlc.driver.graph import GraphVerdict
+    from idlc.driver.compare.graph import GraphVerdict
+    from idlc.driver.recordings.breaking import RecordedVerdict
 
 GRAPH = "graph"
 PATIENCE = 5.0
@@ -87,12 +87,12 @@ def _compared(
     wanted: BreakingOptions, recordings: tuple[str, ...], typed: BreakingWishes, report: Report
 ) -> Verdict | GraphVerdict | RecordedVerdict | None:
     if recordings:
-        from idlc.driver.breaking_recorded import compare_with_recordings
+        from idlc.driver.recordings.breaking import compare_with_recordings
 
         return compare_with_recordings(wanted, recordings, report)
     if wanted.against != GRAPH:
         return breaking(wanted, report)
-    from idlc.driver.graph import compare_with_graph
+    from idlc.driver.compare.graph import compare_with_graph
 
     patience = typed.timeout or PATIENCE
     return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))

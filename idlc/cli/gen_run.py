@@ -10,8 +10,8 @@ from idlc.diagnostics.formats.terminal import counted, summary
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
 from idlc.disk.pyproject import Config
-from idlc.driver.gen import GenOptions, gen
-from idlc.driver.gen_result import Generated
+from idlc.driver.generate.gen import GenOptions, gen
+from idlc.driver.generate.result import Generated
 
 
 def completed(wanted: GenOptions, settings: Config) -> GenOptions:

@@ -11,7 +11,7 @@ from idlc.cli import output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import display_width, one_line
 from idlc.disk.scope import Scope
-from idlc.driver.show_recording import TopicFacts, definitions, topics
+from idlc.driver.recordings.show import TopicFacts, definitions, topics
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8

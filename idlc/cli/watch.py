@@ -8,7 +8,7 @@ import time
 from idlc.cli.gen_run import once
 from idlc.diagnostics.visible import one_line
 from idlc.disk.watch import snapshot, stamps
-from idlc.driver.gen import GenOptions
+from idlc.driver.generate.gen import GenOptions
 from idlc.recordings.find import files
 
 INTERVAL = 0.25

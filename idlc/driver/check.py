@@ -72,7 +72,7 @@ def _with_recordings(
     recordings: Sequence[str], others: Sequence[str], options: CheckOptions, report: Report
 ) -> Checked:
     """Report what is wrong with recordings, and with other paths if there are any."""
-    from idlc.driver.recorded_models import check_recordings
+    from idlc.driver.recordings.models import check_recordings
 
     found = Report()
     check_recordings(recordings, options.scope, found)

@@ -53,7 +53,7 @@ def types(
 
 def topics(word: str, paths: Sequence[str]) -> list[str]:
     """Return the topics of recordings that a beginning fits."""
-    from idlc.driver.recorded import read
+    from idlc.driver.recordings.versions import read
     from idlc.recordings.find import divided
 
     found = (read(path, Report()) for path in divided(paths)[0])

@@ -11,7 +11,7 @@ from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import find
 from idlc.disk.output.site import write
 from idlc.disk.scope import Scope
-from idlc.driver.gen import is_name, named_packages
+from idlc.driver.generate.gen import is_name, named_packages
 from idlc.driver.stages import sound_models, stage
 
 if TYPE_CHECKING:

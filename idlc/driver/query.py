@@ -76,7 +76,7 @@ def wanted_models(
             report.extend(found)
     recordings, paths = divided(paths)
     if recordings:
-        from idlc.driver.recorded_models import recorded_models
+        from idlc.driver.recordings.models import recorded_models
 
         yield from recorded_models(recordings, scope, report)
     if paths:

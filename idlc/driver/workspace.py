@@ -221,7 +221,7 @@ class Workspace:
         They are compiled once after each load; empty if they cannot be.
         """
         if against not in self._earlier:
-            from idlc.driver.breaking import BreakingOptions, earlier
+            from idlc.driver.compare.breaking import BreakingOptions, earlier
 
             report = Report()
             paths = tuple(one.home.as_posix() for one in self._packages)

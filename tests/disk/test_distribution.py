@@ -3,7 +3,7 @@
 import pytest
 
 from idlc.disk.distribution import DEFAULT, distribution
-from idlc.driver.libraries import target_of
+from idlc.driver.generate.libraries import target_of
 from idlc.native.layouts import LAYOUTS
 
 RELEASES = {

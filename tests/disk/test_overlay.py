@@ -152,7 +152,7 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
         monkeypatch.setattr("idlc.disk.environment.machine", lambda: "riscv64")
     else:
         strange = Distribution("", "rosidl 9.9 in /opt/ros/zazzy")
-        monkeypatch.setattr("idlc.driver.overlay.distribution", lambda _: strange)
+        monkeypatch.setattr("idlc.driver.generate.overlay.distribution", lambda _: strange)
     status, said = idlc("gen", "arm", "--ament", "out")
     assert status == 0
     assert "`arm` is not entered in the index of ROS 2" in said

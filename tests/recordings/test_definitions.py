@@ -10,8 +10,8 @@ from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.scope import Scope
-from idlc.driver.recorded import contradictions, versions
-from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.versions import contradictions, versions
 from idlc.export.file_text import file_text
 from idlc.export.idl import idl
 from idlc.export.schemas import mcap

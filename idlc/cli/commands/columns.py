@@ -64,7 +64,7 @@ def command(wanted: str, fields: str | None, **given: Any) -> int:
     """
     from idlc.cli import output, progress
     from idlc.diagnostics.report import Report
-    from idlc.driver.columns import ColumnsOptions, columns
+    from idlc.driver.recordings.columns import ColumnsOptions, columns
 
     report = Report()
     names = None if fields is None else tuple(one.strip() for one in fields.split(","))

@@ -69,7 +69,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     from idlc.diagnostics.report import Report
     from idlc.disk import pyproject
     from idlc.disk.scope import scope
-    from idlc.driver.gen import GenOptions
+    from idlc.driver.generate.gen import GenOptions
 
     report = Report()
     settings = pyproject.load(report)

@@ -38,8 +38,8 @@ def command(
     actions are separated by ---.
     """
     from idlc.diagnostics.report import Report
-    from idlc.driver.scaffold import Settings
-    from idlc.driver.scaffold_interface import interface
+    from idlc.driver.scaffold.changes import Settings
+    from idlc.driver.scaffold.interface import interface
     from idlc.model.ir import KINDS
     from idlc.scaffold import new_interface
 

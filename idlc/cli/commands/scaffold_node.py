@@ -100,8 +100,9 @@ def command(name: str, **given: Any) -> int:
     to package.xml and the node to the launch file, unless it does one thing and ends.
     """
     from idlc.diagnostics.report import Report
-    from idlc.driver import scaffold_node, scaffold_types
-    from idlc.driver.scaffold import Settings
+    from idlc.driver.scaffold import node as scaffold_node
+    from idlc.driver.scaffold import types as scaffold_types
+    from idlc.driver.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
     settings = Settings(**{key: given[key] for key in shared})

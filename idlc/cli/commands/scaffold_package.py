@@ -57,8 +57,8 @@ def command(
     from idlc.cli.program import program
     from idlc.diagnostics.report import Report
     from idlc.disk.revision import setting
-    from idlc.driver.scaffold import Settings
-    from idlc.driver.scaffold_package import package
+    from idlc.driver.scaffold.changes import Settings
+    from idlc.driver.scaffold.package import package
     from idlc.scaffold.new_interface import starter
     from idlc.scaffold.new_package import Package, check_name
 

@@ -38,8 +38,8 @@ def command(wanted: tuple[str, ...], listing: bool, **given: Any) -> int:
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.driver import scaffold_templates
-    from idlc.driver.scaffold import Settings
+    from idlc.driver.scaffold import templates as scaffold_templates
+    from idlc.driver.scaffold.changes import Settings
     from idlc.scaffold.templates import names, suggestion
 
     if listing and wanted:

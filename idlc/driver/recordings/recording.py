@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from idlc.driver.parts import Part, divided
-from idlc.driver.selection import Selection
+from idlc.driver.recordings.parts import Part, divided
+from idlc.driver.recordings.selection import Selection
 from idlc.recordings.container import Container, Topic, open_recording
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.messages import ALWAYS, Messages, Window

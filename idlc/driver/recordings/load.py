@@ -81,7 +81,7 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     The classes can be pickled, where the same cache is seen; type checkers do not know them, so
     programs are better off with `idlc gen`.
     """
-    from idlc.driver.loading import asked_models
+    from idlc.driver.recordings.loading import asked_models
 
     report = Report()
     models, asked = asked_models(str(what), tuple(include), distro, report)
@@ -99,7 +99,7 @@ def class_of(topic: Topic) -> Any:
     if schema:
         key = _key([topic.type, schema.encoding, schema.text])
     if not (key and cache.has(key)):
-        from idlc.driver.loading import topic_models
+        from idlc.driver.recordings.loading import topic_models
 
         models, is_recorded = topic_models(topic)
         # what was borrowed from around here may be another thing tomorrow
@@ -125,7 +125,7 @@ def accepted(kind: Any, topic: Topic) -> Any:
     if given.name != topic.type:
         raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {given.name}")
     if given.hash != topic.hash:
-        from idlc.driver.loading import recorded_hash
+        from idlc.driver.recordings.loading import recorded_hash
 
         found = recorded_hash(topic)
         if given.hash != found:

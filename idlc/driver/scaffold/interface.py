@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.output.project import Project
-from idlc.driver.scaffold import (
+from idlc.driver.scaffold.changes import (
     Result,
     Settings,
     accepted,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from idlc.diagnostics.report import Report
 from idlc.disk import pyproject, user_templates
 from idlc.disk.output.project import Project
-from idlc.driver.scaffold import Result, Settings, write
+from idlc.driver.scaffold.changes import Result, Settings, write
 from idlc.scaffold.templates import ENDING, copy, folders, names
 
 #: Where copies go unless that is set.

@@ -13,7 +13,7 @@ from idlc.diagnostics.source import Source
 from idlc.disk import nearby
 from idlc.disk.library import Library
 from idlc.disk.scope import Scope
-from idlc.driver.recorded import Version
+from idlc.driver.recordings.versions import Version
 from idlc.driver.stages import Compiler
 from idlc.model import derive, ir
 from idlc.model.describe import Describer

@@ -48,7 +48,7 @@ class Selection:
     @cached_property
     def kind(self) -> Any:
         """The class of the messages, compiled from what was recorded."""
-        from idlc.driver.load import class_of
+        from idlc.driver.recordings.load import class_of
 
         return class_of(self.topic)
 
@@ -59,7 +59,7 @@ class Selection:
             raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
         if given is None:
             return self.kind
-        from idlc.driver.load import accepted
+        from idlc.driver.recordings.load import accepted
 
         return accepted(given, self.topic)
 

@@ -28,7 +28,7 @@ from idlc.disk.output import lock_file
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out, is_revision
 from idlc.disk.scope import Scope
-from idlc.driver.breaking_distro import compare_with_distro, is_distro
+from idlc.driver.compare.distribution import compare_with_distro, is_distro
 from idlc.driver.stages import models_of, stage
 from idlc.model.link import Model
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from idlc.driver.selection import Selection
+from idlc.driver.recordings.selection import Selection
 from idlc.recordings.container import Container, Db3File, McapFile, Topic, open_pieces
 from idlc.recordings.db3 import Rows
 from idlc.recordings.mcap_records import INDEX_OFFSET, Chunk

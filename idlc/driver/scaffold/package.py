@@ -8,7 +8,7 @@ from idlc.diagnostics.report import Report
 from idlc.disk import pyproject
 from idlc.disk.output.project import Project
 from idlc.disk.scope import scope
-from idlc.driver.scaffold import Result, Settings, rendering, templates, write
+from idlc.driver.scaffold.changes import Result, Settings, rendering, templates, write
 from idlc.model import catalog, ir
 from idlc.scaffold import new_package
 

@@ -11,9 +11,9 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
-from idlc.driver.breaking import BreakingOptions, not_allowed, sound_ones
-from idlc.driver.recorded import topics_of, versions
-from idlc.driver.recorded_types import NAMED, Around, RecordedTypes
+from idlc.driver.compare.breaking import BreakingOptions, not_allowed, sound_ones
+from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.versions import topics_of, versions
 from idlc.driver.stages import stage
 from idlc.model import ir
 from idlc.model.link import Model

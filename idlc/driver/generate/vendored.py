@@ -9,7 +9,7 @@ from idlc.diagnostics.report import Report, Severity
 from idlc.disk import inputs
 from idlc.disk.output.folder import Target
 from idlc.disk.package_names import accept_name
-from idlc.driver.gen_package import Package, as_inputs, package_of
+from idlc.driver.generate.package import Package, as_inputs, package_of
 from idlc.driver.stages import Compiler
 from idlc.model import derive
 

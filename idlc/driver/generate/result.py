@@ -9,7 +9,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
-from idlc.driver.gen_package import Package, as_inputs
+from idlc.driver.generate.package import Package, as_inputs
 from idlc.model.distro import Distro
 
 

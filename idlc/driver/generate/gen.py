@@ -13,8 +13,8 @@ from idlc.disk.output.folder import Target
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
-from idlc.driver.gen_result import Generated, generated, up_to_date, with_needs
-from idlc.driver.gen_vendored import planned
+from idlc.driver.generate.result import Generated, generated, up_to_date, with_needs
+from idlc.driver.generate.vendored import planned
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import ir
 from idlc.recordings.find import divided
@@ -55,7 +55,7 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: Mapping[ir.TypeName, Source] = {}
     if recordings and not report.had_errors:
-        from idlc.driver.gen_recorded import recorded_packages
+        from idlc.driver.recordings.gen import recorded_packages
 
         recorded, texts = recorded_packages(recordings, options, report)
         named += recorded
@@ -68,7 +68,7 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     with found[0].alone(beside=options.vendor_deps or len(found) > 1):
         done = _made(dict(zip(found, given, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
-            from idlc.driver.overlay import enter
+            from idlc.driver.generate.overlay import enter
 
             enter(found[0])
         return done

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.disk.scope import Scope
-from idlc.driver.recorded import read, topics_of, versions
-from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.versions import read, topics_of, versions
 from idlc.driver.show import shown
 from idlc.driver.stages import stage
 from idlc.recordings.definitions import Recorded

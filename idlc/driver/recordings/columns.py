@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.driver.load import OtherDefinitionWarning
-from idlc.driver.recording import RecordedTopic, Recording, UnknownTopicError
+from idlc.driver.recordings.load import OtherDefinitionWarning
+from idlc.driver.recordings.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
 

@@ -6,7 +6,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.suggest import did_you_mean
 from idlc.disk.library import Library
-from idlc.driver.scaffold import Settings, find_package, library_around
+from idlc.driver.scaffold.changes import Settings, find_package, library_around
 from idlc.model import ir
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.roles.role import Endpoint, Role

@@ -27,7 +27,7 @@ from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
 from idlc.disk.scope import Scope
-from idlc.driver.breaking import BreakingOptions, not_allowed
+from idlc.driver.compare.breaking import BreakingOptions, not_allowed
 from idlc.driver.stages import Compiler, models_of, stage
 from idlc.model import ir
 from idlc.model.described import NotBelievedError

@@ -9,8 +9,8 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report
 from idlc.diagnostics.source import Span
 from idlc.disk.scope import Scope
-from idlc.driver.recorded import Version, contradictions, read, versions
-from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.versions import Version, contradictions, read, versions
 from idlc.driver.stages import derived_names
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from idlc.disk.pyproject import Config
 from idlc.disk.requested import wanted
 from idlc.disk.scope import Scope, scope
 from idlc.driver import named_types
-from idlc.driver.recorded import read, versions
-from idlc.driver.recorded_types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.versions import read, versions
 from idlc.driver.stages import Compiler, library_for, sources_of
 from idlc.recordings.definitions import recorded
 from idlc.recordings.errors import RecordingError
@@ -62,7 +62,7 @@ def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list
     recording = read(path, report)
     found = versions(recording.topics) if recording else []
     if len(found) != 1:
-        from idlc.driver.recorded_models import check_versions
+        from idlc.driver.recordings.models import check_versions
 
         check_versions(found, report)
         return {}, []

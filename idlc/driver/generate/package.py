@@ -93,7 +93,7 @@ def _with_surroundings(
     """Return the files to write: modules, and in a prefix all that ROS 2 looks for there."""
     if not target.modules:  # a package folder
         return {**modules}
-    from idlc.driver.overlay import overlaid
+    from idlc.driver.generate.overlay import overlaid
 
     return overlaid(model, modules, target)
 

@@ -6,7 +6,7 @@ from idlc.diagnostics.report import Report
 from idlc.disk.distribution import distribution
 from idlc.disk.environment import python_folders
 from idlc.disk.output.project import Project
-from idlc.driver.scaffold import (
+from idlc.driver.scaffold.changes import (
     Result,
     Settings,
     accepted,
@@ -17,7 +17,7 @@ from idlc.driver.scaffold import (
     templates,
     write,
 )
-from idlc.driver.scaffold_types import type_name
+from idlc.driver.scaffold.types import type_name
 from idlc.driver.stages import compile_package
 from idlc.model import ir
 from idlc.model.distro import BY_NAME, DEFAULT

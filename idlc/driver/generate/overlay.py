@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from idlc.disk.distribution import distribution
 from idlc.disk.output.folder import Target
 from idlc.disk.output.overlay import Overlay
-from idlc.driver.libraries import libraries_of
-from idlc.driver.share import dependencies, shared
+from idlc.driver.generate.libraries import libraries_of
+from idlc.driver.generate.share import dependencies, shared
 
 if TYPE_CHECKING:
     from idlc.model.link import Model

@@ -14,10 +14,10 @@ from idlc.disk import environment, inputs
 from idlc.disk.library import Library
 from idlc.disk.read import absolute
 from idlc.disk.requested import borrowed
-from idlc.driver.gen import GenOptions
-from idlc.driver.recorded import topics_of, versions
-from idlc.driver.recorded_models import check_versions, contradicted
-from idlc.driver.recorded_types import NAMED, Around, RecordedTypes
+from idlc.driver.generate.gen import GenOptions
+from idlc.driver.recordings.models import check_versions, contradicted
+from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.versions import topics_of, versions
 from idlc.model import ir
 
 

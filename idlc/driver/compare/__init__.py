@@ -1,0 +1,1 @@
+"""`idlc breaking`: versions, distributions, the nodes of a graph."""

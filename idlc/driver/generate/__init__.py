@@ -1,0 +1,1 @@
+"""`idlc gen`: from interfaces to packages on disk."""

@@ -1,0 +1,1 @@
+"""Recordings: as a source of interfaces, and their messages as columns."""

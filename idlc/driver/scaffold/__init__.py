@@ -1,0 +1,1 @@
+"""`idlc scaffold`: new packages, interfaces and nodes."""
