@@ -25,6 +25,11 @@ class Extent(NamedTuple):
     def __str__(self) -> str:
         return f"{self.size}" if self.exact else f"≥{self.size}"
 
+    @property
+    def in_bytes(self) -> str:
+        """The number in words, such as `1 byte`."""
+        return f"{self} byte" if self == Extent(1) else f"{self} bytes"
+
 
 class Placed(NamedTuple):
     """A field with its offset and its size, without the padding before it."""

@@ -64,6 +64,7 @@ def test_hover_says_what_a_field_is(opened):
     text, _ = hover(opened, 3, 7)
     assert "range: `0` to `255`" in text
     assert "default: `2`" in text
+    assert "on the wire: 1 byte at offset" in text
     text, _ = hover(opened, 5, 17)
     assert "length: at most 10 characters" in text
     assert "elements: at most 3" in text

@@ -37,6 +37,6 @@ def hints(world: World, asked: OfRange) -> list[Hint]:
         here = placed[name].get(id(one.meaning))
         if here is not None:
             text = f"@{here.offset}, {here.size} B"
-            tip = f"{here.size} bytes at offset {here.offset} of the message, header not counted"
+            tip = f"{here.size.in_bytes} at offset {here.offset} of the message, header not counted"
             found.append(Hint(world.range(one.name).end, text, tip, True))
     return found

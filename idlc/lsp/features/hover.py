@@ -85,7 +85,7 @@ def _range(type_: ir.FieldType) -> list[str]:
 
 
 def _bytes(placed: Placed) -> str:
-    return f"on the wire: {placed.size} bytes at offset {placed.offset}"
+    return f"on the wire: {placed.size.in_bytes} at offset {placed.offset}"
 
 
 def placed_fields(
@@ -115,7 +115,7 @@ def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
     names = section_names(interface) or ("",)
     for name, section in zip(names, derive.sections(interface), strict=True):
         of = f" of the {name.lower()}" if name else ""
-        yield f"on the wire{of}: {layout(section, model.messages)[1]} bytes"
+        yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
 
 
 def code(lines: list[str]) -> str:
