@@ -23,6 +23,7 @@ HEAD = "module demo {\n  module msg {\n"
 TAIL = "  };\n};\n"
 
 
+@pytest.mark.ros
 def test_every_installed_interface_means_the_same():
     assert len(INSTALLED) > 150
     for path in INSTALLED:

@@ -29,7 +29,7 @@ KINDS = ["mcap", "without compression", "bag of mcap", "bag of db3"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_classes_read_what_was_recorded(kind, recorded, tmp_path, capsys):
+def test_the_classes_read_what_was_recorded(kind, recorded, tmp_path):
     found, paths = recorded
     out = tmp_path / "out"
     assert main(["gen", str(paths[kind]), "-o", str(out)]) == 0
@@ -41,6 +41,11 @@ def test_the_classes_read_what_was_recorded(kind, recorded, tmp_path, capsys):
             expected = STORE.deserialize_cdr(one.data, one.type)
             assert message.header.stamp.sec == expected.header.stamp.sec
             assert message.header.frame_id == expected.header.frame_id
+
+
+@pytest.mark.ros
+def test_a_note_says_what_hides_an_installed_package(recorded, tmp_path, capsys):
+    assert main(["gen", str(recorded[1]["mcap"]), "-o", str(tmp_path / "out")]) == 0
     said = capsys.readouterr().err
     assert said.startswith("note: ")
     assert "`sensor_msgs`" in said  # the wheel has more of them than the recording
