@@ -10,6 +10,7 @@ from pathlib import Path
 from shutil import rmtree
 
 from idlc.disk.cache import folder as caches
+from idlc.disk.output.up_to_date import last_change
 from idlc.templating import RenderedFile
 
 
@@ -63,6 +64,4 @@ def keep(name: str, files: Iterable[RenderedFile]) -> None:
 def newest() -> int:
     """Return when idlc itself was changed last: its version does not change with each edit."""
     package = Path(__file__).parents[1]
-    templates = (package / "templates", package.parent / "templates")
-    files = [*package.rglob("*.py"), *(file for one in templates for file in one.rglob("*.jinja"))]
-    return max(file.stat().st_mtime_ns for file in files)
+    return last_change((package, package.parent / "templates"))

@@ -76,11 +76,15 @@ def _idlc_is_newer(path: Path) -> bool:
 
 @lru_cache(maxsize=1)
 def _newest_maker() -> int:
-    return max(map(_newest, filter(is_folder, _MAKERS)))
+    return last_change(_MAKERS)
+
+
+def last_change(folders: Iterable[Path]) -> int:
+    """Return when a file in these folders, or in those in them, was changed last."""
+    return max(map(_newest, filter(is_folder, folders)))
 
 
 def _newest(folder: str | Path) -> int:
-    """Return when a file in a folder, or in those in it, was changed last."""
     newest = 0
     for entry in os.scandir(folder):
         if entry.is_file():
