@@ -132,7 +132,7 @@ def _words() -> dict[str, int]:
 def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
     """Return the addresses of the functions that Fast DDS calls; raises RefusedError.
 
-    rclpy calls one, too: `create`, which would take a quarter of a microsecond by ctypes.
+    rclpy calls one, too: `create`, which so needs no callback of ctypes.
     """
     table = [
         word
