@@ -64,6 +64,7 @@ def tools(tmp_path_factory):
     return python
 
 
+@pytest.mark.long
 def test_the_rehearsal_passes_on_what_is_published(published, tools, tmp_path):
     tag = f"v{HERE.version}"
     words = ("-m", "release", "check", "--tag", tag, "--keep", tmp_path / "dist")
@@ -207,6 +208,7 @@ def test_each_make_target_of_the_workflows_exists():
             assert re.search(rf"(?m)^{target}:", makefile), (path.name, target)
 
 
+@pytest.mark.long
 def test_installing_as_the_document_says(copied, tmp_path):
     """Both ways, pasted into a clone; what idlc imports is left out here, and so is the index."""
     text = (DOCS / "install.md").read_text(encoding="utf-8")

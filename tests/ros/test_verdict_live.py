@@ -25,7 +25,7 @@ FAMILIES = {
     "oddities": lambda: Oddities(SEED).cases(FILES * 3 // 10),
 }
 #: Each is made in parts, so that several processes can share the work; the files are the same.
-PARTS = 5
+PARTS = 10
 
 
 def known_texts() -> dict[str, list[str]]:
