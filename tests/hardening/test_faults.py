@@ -175,11 +175,9 @@ def test_without_permission(mode, machine, versions):
     try:
         found = machine.run(**other)
     finally:
-        for path in folders:
-            path.chmod(0o755)
-        for path in files:
+        for path in (*folders, *files):
             if path.exists():
-                path.chmod(0o644)
+                path.chmod(0o755 if path in folders else 0o644)
     if mode == "read-only files":  # what counts is the folder: idlc never writes into a file
         assert found["status"] == 0, found["said"]
         assert_new(machine, versions)
