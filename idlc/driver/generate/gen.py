@@ -17,6 +17,7 @@ from idlc.driver.generate.result import Generated, generated, up_to_date, with_n
 from idlc.driver.generate.vendored import planned
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import ir
+from idlc.model.distro import Distro
 from idlc.recordings.find import divided
 from idlc.syntax.tree import OPTIONAL
 
@@ -124,14 +125,14 @@ def _made(
     report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(wanted.values()), options.scope, report, texts)
-    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), options)):
+    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), library.distro)):
         current = [
             up_to_date(target, given.digests, library, options.vendor_deps)
             for target, given in wanted.items()
         ]
         if all(current):
             done = [one for each in current for one in each]
-            return with_needs(done, wanted, options.scope.distro, report)
+            return with_needs(done, wanted, library.distro, report)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -148,11 +149,11 @@ def _made(
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     targets = wanted if packages else ()
-    return with_needs(map(generated, packages), targets, options.scope.distro, report)
+    return with_needs(map(generated, packages), targets, library.distro, report)
 
 
-def _may_be_refused(given: Iterable[inputs.Inputs], options: GenOptions) -> bool:
+def _may_be_refused(given: Iterable[inputs.Inputs], distro: Distro) -> bool:
     """Return whether files that one distribution accepted may be an error for this one."""
-    if options.scope.distro.reads_optional:
+    if distro.reads_optional:
         return False
     return any(OPTIONAL.encode() in file.data for one in given for file in one.files)
