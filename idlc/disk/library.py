@@ -92,7 +92,7 @@ class Prefix:
 
 
 def _has_interfaces(root: Path) -> bool:
-    return any(is_folder(root / kind) for kind in KIND_FOLDERS)
+    return any(os.path.isdir(f"{root}/{kind}") for kind in KIND_FOLDERS)  # noqa: PTH112 - for each look
 
 
 class Library:
