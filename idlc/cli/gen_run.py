@@ -9,7 +9,7 @@ from idlc.cli import output, reports
 from idlc.diagnostics.formats.terminal import counted, summary
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
-from idlc.disk.pyproject import Config
+from idlc.disk.settings.pyproject import Config
 from idlc.driver.generate.gen import GenOptions, gen
 from idlc.driver.generate.result import Generated
 

@@ -15,9 +15,9 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
-from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, InterfaceFile, look
+from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.read import absolute
 
 

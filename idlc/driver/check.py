@@ -9,9 +9,9 @@ import msgspec
 
 from idlc.checks.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.disk import inputs
 from idlc.disk.find import KINDS, look, nothing_in
-from idlc.disk.package_facts import facts
+from idlc.disk.packages import inputs
+from idlc.disk.packages.facts import facts
 from idlc.disk.read import absolute
 from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage

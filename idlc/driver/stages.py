@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
 from idlc.disk.library import Library
+from idlc.disk.packages import inputs
 from idlc.disk.scope import Scope
 from idlc.model import derive, ir
 

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from idlc.diagnostics.report import Report, Severity
-from idlc.disk import command_settings, environment, inputs, pyproject
-from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.find import look, root_of
-from idlc.disk.package_names import locks, places
+from idlc.disk.machine import environment
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import MANIFEST, manifest
+from idlc.disk.packages.names import locks, places
 from idlc.disk.read import MAX_SIZE, NOTHING_OPEN, Unsaved, absolute
 from idlc.disk.scope import scope
+from idlc.disk.settings import commands as command_settings
+from idlc.disk.settings import pyproject
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
 from idlc.model import ir

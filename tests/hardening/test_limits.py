@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-import idlc.disk.inputs
+import idlc.disk.packages.inputs
 import idlc.model.lowering.file
 import idlc.model.pool
 from idlc.checks.size import MAX_DEPTH

@@ -67,8 +67,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
     """
     from idlc.cli import gen_run, output
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver.generate.gen import GenOptions
 
     report = Report()

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
-from idlc.disk.requested import borrowed, completed, targets, wanted
+from idlc.disk.packages import inputs
+from idlc.disk.packages.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.generate.result import Generated, generated, up_to_date, with_needs

@@ -9,8 +9,8 @@ from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.packages import compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
+from idlc.disk.packages import inputs
 from idlc.driver.compare.breaking import BreakingOptions, not_allowed, sound_ones
 from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
 from idlc.driver.recordings.versions import topics_of, versions

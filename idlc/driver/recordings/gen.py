@@ -10,10 +10,11 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import environment, inputs
 from idlc.disk.library import Library
+from idlc.disk.machine import environment
+from idlc.disk.packages import inputs
+from idlc.disk.packages.requested import borrowed
 from idlc.disk.read import absolute
-from idlc.disk.requested import borrowed
 from idlc.driver.generate.gen import GenOptions
 from idlc.driver.recordings.models import check_versions, contradicted
 from idlc.driver.recordings.types import NAMED, Around, RecordedTypes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc import __version__
 from idlc.diagnostics.report import Report
-from idlc.disk import loaded_cache as cache
+from idlc.disk.cache import loaded as cache
 from idlc.emit.pynames import class_
 from idlc.model import ir
 from idlc.recordings.errors import RecordingError

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report, Severity
 from idlc.disk.find import is_path
-from idlc.disk.pyproject import Config
-from idlc.disk.requested import wanted
+from idlc.disk.packages.requested import wanted
 from idlc.disk.scope import Scope, scope
+from idlc.disk.settings.pyproject import Config
 from idlc.driver import named_types
 from idlc.driver.recordings.types import Around, RecordedTypes
 from idlc.driver.recordings.versions import read, versions

@@ -10,8 +10,8 @@ from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import nearby
 from idlc.disk.library import Library
+from idlc.disk.packages import nearby
 from idlc.disk.scope import Scope
 from idlc.driver.recordings.versions import Version
 from idlc.driver.stages import Compiler
