@@ -10,9 +10,9 @@ from urllib.parse import unquote
 
 from idlc.disk.find import KINDS
 from idlc.disk.read import Unsaved, absolute
-from idlc.lsp import uris
-from idlc.lsp.positions import in_lines, lines_of
-from idlc.lsp.protocol import Change, DocumentItem, Range
+from idlc.lsp.protocol import uris
+from idlc.lsp.protocol.parts import Change, DocumentItem, Range
+from idlc.lsp.protocol.positions import in_lines, lines_of
 from idlc.model import ir
 
 #: The language id of interface files.

@@ -20,7 +20,9 @@ class Method(NamedTuple):
         """Return what the function answers; raises ValidationError for wrong parameters."""
         import msgspec
 
-        asked = msgspec.convert(params, getattr(import_module("idlc.lsp.protocol"), self.params))
+        asked = msgspec.convert(
+            params, getattr(import_module("idlc.lsp.protocol.parts"), self.params)
+        )
         module = import_module(f"idlc.lsp.features.{self.module}")
         answer: object = getattr(module, self.function)(world, asked)
         return answer

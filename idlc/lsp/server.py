@@ -12,8 +12,8 @@ import threading
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeAlias
 
-from idlc.lsp import framing
-from idlc.lsp.errors import (
+from idlc.lsp.protocol import framing
+from idlc.lsp.protocol.errors import (
     CANCELLED,
     INTERNAL_ERROR,
     INVALID_PARAMS,

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from idlc.lsp import capabilities
-from idlc.lsp.errors import (
+from idlc.lsp.methods import METHODS
+from idlc.lsp.protocol import capabilities
+from idlc.lsp.protocol.errors import (
     INVALID_PARAMS,
     INVALID_REQUEST,
     METHOD_NOT_FOUND,
     NOT_INITIALIZED,
     RequestError,
 )
-from idlc.lsp.methods import METHODS
 
 if TYPE_CHECKING:
     from idlc.lsp.workbench import Workbench

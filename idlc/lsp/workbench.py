@@ -7,10 +7,10 @@ from typing import Any
 
 import msgspec
 
-from idlc.lsp import capabilities, uris
 from idlc.lsp.documents import Document
-from idlc.lsp.errors import INVALID_REQUEST, RequestError
-from idlc.lsp.protocol import (
+from idlc.lsp.protocol import capabilities, uris
+from idlc.lsp.protocol.errors import INVALID_REQUEST, RequestError
+from idlc.lsp.protocol.parts import (
     DidChange,
     DidChangeFiles,
     DidChangeFolders,

@@ -10,11 +10,11 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 from idlc.driver.workspace import State, Wishes
-from idlc.lsp import positions, uris
-from idlc.lsp.capabilities import DEFAULT_ENCODING
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
-from idlc.lsp.protocol import Location, Position, Range
+from idlc.lsp.protocol import positions, uris
+from idlc.lsp.protocol.capabilities import DEFAULT_ENCODING
+from idlc.lsp.protocol.parts import Location, Position, Range
 from idlc.model import ir
 
 

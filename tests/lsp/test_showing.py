@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.lsp.token_kinds import TYPES
+from idlc.lsp.protocol.token_kinds import TYPES
 from tests.support.editor import at, between
 
 STOP = """\

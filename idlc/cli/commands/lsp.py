@@ -28,7 +28,7 @@ def command(check: bool) -> int:
     if check:
         import json
 
-        from idlc.lsp.capabilities import answer
+        from idlc.lsp.protocol.capabilities import answer
 
         sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
         return 0

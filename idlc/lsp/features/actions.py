@@ -14,7 +14,7 @@ from idlc.diagnostics.source import Span
 from idlc.driver.check import tidied
 from idlc.driver.workspace import State
 from idlc.lsp.edits import differences, of_documents, workspace_edit
-from idlc.lsp.protocol import AskedActions, Part, Range
+from idlc.lsp.protocol.parts import AskedActions, Part, Range
 from idlc.lsp.publish import Shown, problems, shown
 from idlc.lsp.world import World
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from idlc.lsp.capabilities import ADD_DEPENDENCY
 from idlc.lsp.edits import workspace_edit
-from idlc.lsp.errors import INVALID_PARAMS, RequestError
-from idlc.lsp.protocol import Command
+from idlc.lsp.protocol.capabilities import ADD_DEPENDENCY
+from idlc.lsp.protocol.errors import INVALID_PARAMS, RequestError
+from idlc.lsp.protocol.parts import Command
 from idlc.lsp.world import World
 
 

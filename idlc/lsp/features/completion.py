@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.report import Severity
-from idlc.lsp import dependencies, suggestions
 from idlc.lsp.documents import Document
-from idlc.lsp.positions import in_lines, lines_of, units
+from idlc.lsp.features import dependencies, suggestions
 from idlc.lsp.projects import Project
-from idlc.lsp.protocol import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.protocol.parts import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.protocol.positions import in_lines, lines_of, units
 from idlc.lsp.world import World
 from idlc.model import ir
 from idlc.model.lowering.types import STRINGS

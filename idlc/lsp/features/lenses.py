@@ -5,7 +5,7 @@ from __future__ import annotations
 from idlc.breaking.change import LEVELS
 from idlc.breaking.packages import compare
 from idlc.lsp.features.navigation import users
-from idlc.lsp.protocol import Action, Lens, OfDocument, Position, Range
+from idlc.lsp.protocol.parts import Action, Lens, OfDocument, Position, Range
 from idlc.lsp.world import Known, World
 
 _TOP = Range(Position(0, 0), Position(0, 0))

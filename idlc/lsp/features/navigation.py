@@ -9,7 +9,7 @@ from typing import NamedTuple
 from idlc.diagnostics.source import Span
 from idlc.driver.workspace import State
 from idlc.lsp.elements import Element, elements, spot
-from idlc.lsp.protocol import AskedReferences, AtPosition, Location, Part, Range
+from idlc.lsp.protocol.parts import AskedReferences, AtPosition, Location, Part, Range
 from idlc.lsp.world import Known, World
 from idlc.model import derive, ir
 

@@ -8,7 +8,7 @@ from idlc.diagnostics.source import Span
 from idlc.lsp.elements import elements
 from idlc.lsp.features.navigation import top
 from idlc.lsp.features.symbols import sections
-from idlc.lsp.protocol import AtPositions, OfDocument, Part, Range
+from idlc.lsp.protocol.parts import AtPositions, OfDocument, Part, Range
 from idlc.lsp.world import Known, World
 from idlc.syntax.parse import parse
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import token_kinds
+from idlc.lsp.protocol import token_kinds
 
 #: What positions can be counted in, and what holds if nothing was agreed on.
 ENCODINGS = ("utf-8", "utf-16", "utf-32")
