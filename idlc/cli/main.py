@@ -27,7 +27,7 @@ def _run(words: list[str]) -> int:
         from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
-    if words == ["lsp"]:
+    if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
         from idlc.cli.exit_status import ended
         from idlc.cli.lsp_run import run as serve
 
@@ -35,3 +35,8 @@ def _run(words: list[str]) -> int:
     from idlc.cli.click_runner import run
 
     return run(words)
+
+
+def _is_added_by_clients(word: str) -> bool:
+    """Return whether many editors add a word to a server's command; it changes nothing."""
+    return word == "--stdio" or word.startswith("--clientProcessId=")

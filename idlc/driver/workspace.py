@@ -188,6 +188,12 @@ class Workspace:
         file = self._packages[number].files[at].file
         return ir.TypeName(self._packages[number].package, file.kind, file.name)
 
+    def inputs(self, path: Path) -> tuple[str, Mapping[str, str], str]:
+        """Return the package of a file, its files' digests, and the file's name among them."""
+        number, at = self._places[path]
+        given = self._packages[number]
+        return given.package, given.digests, given.files[at].file.key
+
     def packages(self) -> Iterable[str]:
         """Return the packages that are known here and have messages."""
         return (one for one in self._library.packages() if self.names(one))

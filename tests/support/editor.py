@@ -32,6 +32,12 @@ class Editor:
         self._thread.start()
         self._client = BaseLanguageClient("tests", "1")
         self._listen()
+        # lsprotocol takes an action that has a command for nothing but that command
+        converter = self._client.protocol._converter
+        converter.register_structure_hook(
+            lsp.Command | lsp.CodeAction,
+            lambda given, _: converter.structure(given, lsp.CodeAction),
+        )
         command = (sys.executable, "-m", "idlc", "lsp")
         environment = {**os.environ, "AMENT_PREFIX_PATH": ""}
         self._wait(self._client.start_io(*command, env=environment))

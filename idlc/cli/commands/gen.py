@@ -69,7 +69,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     from idlc.diagnostics.report import Report
     from idlc.disk import pyproject
     from idlc.disk.scope import scope
-    from idlc.driver.generate.gen import GenOptions
+    from idlc.driver.generate.gen import GenOptions, with_settings
 
     report = Report()
     settings = pyproject.load(report)
@@ -77,7 +77,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
         gen_run.refuse(report, style)
         return output.status(report)
     words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
-    wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
+    wanted = with_settings(GenOptions(**given, scope=scope(settings, *words)), settings)
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")

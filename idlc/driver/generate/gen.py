@@ -10,6 +10,7 @@ from idlc.diagnostics.source import Source
 from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
+from idlc.disk.pyproject import Config
 from idlc.disk.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
@@ -35,6 +36,15 @@ class GenOptions(NamedTuple):
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
+
+
+def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
+    """Return what was typed, with what pyproject.toml says where nothing was."""
+    return wanted._replace(
+        paths=wanted.paths or settings.paths,
+        out=wanted.out or ("" if wanted.ament else settings.out or ""),
+        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+    )
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
