@@ -81,6 +81,19 @@ def _commit(name: str, path: str) -> bytes | None:
     return _git(_folder(path), ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"])
 
 
+def commit(name: str, path: str) -> str | None:
+    """Return which commit a name means in the repository that holds `path`, if it means one."""
+    found = _commit(name, path)
+    return _text(found) if found else None
+
+
+def places(path: str) -> tuple[Path, ...]:
+    """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
+    words = ["rev-parse", "--path-format=absolute", "--git-dir", "--git-common-dir"]
+    found = _git(_folder(path), words)
+    return tuple(dict.fromkeys(Path(line) for line in _text(found).splitlines())) if found else ()
+
+
 def _folder(path: str) -> Path:
     folder = absolute(path)
     return folder if folder.is_dir() else folder.parent

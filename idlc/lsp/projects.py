@@ -29,6 +29,11 @@ class Project:
         #: What went wrong within idlc itself.
         self.failure: Diagnostic | None = None
 
+    @property
+    def is_loaded(self) -> bool:
+        """Whether what is on disk was read."""
+        return self._documents is not None
+
     def forget(self) -> None:
         """Let everything be read again when it is needed."""
         self._documents = self._state = None

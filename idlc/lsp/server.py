@@ -63,6 +63,7 @@ class Server:
                 except queue.Empty:
                     if self._session.client_is_gone():
                         return 1
+                    self._attempt("repository", self._session.idle)
                     continue
                 in_a_row += 1
                 if arrival is None or _is_exit(arrival):

@@ -90,6 +90,11 @@ class Session:
 
         return msgspec.json.encode(message)
 
+    def idle(self) -> None:
+        """Do what can be done while the client says nothing."""
+        if "workbench" in self.__dict__ and not self.is_shut_down:
+            self.workbench.idle()
+
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
         if "workbench" in self.__dict__ and not self.is_shut_down:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,9 @@ from idlc.lsp.protocol.capabilities import DEFAULT_ENCODING
 from idlc.lsp.protocol.parts import Location, Position, Range
 from idlc.model import ir
 
+#: What a client calls that it can watch folders which are not below the workspace's.
+RELATIVE = "relativePatternSupport"
+
 
 class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
     """What an editor's settings say, below `idlc`: options of `idlc check`, and of features.
@@ -26,6 +29,7 @@ class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
 
     inlay_hints: bool = True
     code_lens: bool = True
+    default_lens: bool = True
     against: str = ""
 
 
@@ -53,6 +57,8 @@ class World:
         self.encoding = DEFAULT_ENCODING
         self.settings = Settings()
         self.client: dict[str, Any] = {}
+        #: Folders that lenses compare with a revision, with those in which git notes what it is.
+        self.repositories: dict[Path, tuple[Path, ...]] = {}
 
     def supports(self, *path: str) -> bool:
         """Return whether the client says that it can do something."""
@@ -60,6 +66,39 @@ class World:
         for name in path:
             found = found.get(name) if isinstance(found, dict) else None
         return found not in (None, False)
+
+    def follow_git(self, folder: Path, repository: Callable[[], Iterable[Path]]) -> None:
+        """Have the client tell when something else is checked out for a folder, if it can."""
+        if folder in self.repositories:
+            return
+        places = self.repositories[folder] = tuple(repository())
+        if not (places and self.supports("workspace", "didChangeWatchedFiles", RELATIVE)):
+            return
+        watchers = [
+            {"globPattern": {"baseUri": uris.from_path(place), "pattern": pattern}}
+            for place in places
+            for pattern in ("{HEAD,packed-refs}", "refs/**")
+        ]
+        method = "workspace/didChangeWatchedFiles"
+        options = {"watchers": watchers}
+        one = {"id": uris.from_path(folder), "method": method, "registerOptions": options}
+        self.ask("client/registerCapability", {"registrations": [one]})
+
+    def is_gits(self, path: Path) -> bool:
+        """Return whether a file is one in which git notes what is checked out."""
+        places = (place for some in self.repositories.values() for place in some)
+        return any(path.is_relative_to(place) for place in places)
+
+    def lenses_moved(self) -> None:
+        """Have lenses asked for again if what they compare with is another commit now."""
+        against = self.settings.against
+        moved = [
+            one.workspace.earlier(against).has_moved()
+            for one in self.projects
+            if one.folder in self.repositories and one.is_loaded
+        ]
+        if any(moved) and self.supports("workspace", "codeLens", "refreshSupport"):
+            self.ask("workspace/codeLens/refresh", None)
 
     def settle(self, given: object) -> str:
         """Take the client's settings; return what is wrong with them, empty if nothing is."""

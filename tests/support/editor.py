@@ -118,6 +118,19 @@ class Editor:
             taken.append(params.edit)
             return lsp.ApplyWorkspaceEditResult(applied=True)
 
+    def answer_all(self) -> list[tuple[str, Any]]:
+        """Return where everything that the server asks for from now on is noted."""
+        asked: list[tuple[str, Any]] = []
+
+        def note(method: str) -> None:
+            @self._client.feature(method)
+            def _(*params: Any) -> None:
+                asked.append((method, *params[:1]) if params else (method, None))
+
+        note(lsp.CLIENT_REGISTER_CAPABILITY)
+        note(lsp.WORKSPACE_CODE_LENS_REFRESH)
+        return asked
+
     def close(self, uri: str) -> None:
         """Close a document."""
         self.tell(

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from idlc import __version__
 from idlc.diagnostics.report import Report
@@ -16,6 +15,9 @@ from idlc.disk.scope import scope
 from idlc.disk.working_folder import working_in
 from idlc.driver.generate.gen import GenOptions, gen, with_settings
 from idlc.driver.generate.result import Generated
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 class Run(NamedTuple):
