@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from idlc.diagnostics.source import Source, Span
+from idlc.disk.built_in_files import file_of, inside
 from idlc.driver.workspace import State, Wishes
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
@@ -19,6 +20,8 @@ from idlc.model import ir
 
 #: What a client calls that it can watch folders which are not below the workspace's.
 RELATIVE = "relativePatternSupport"
+#: What it calls that it can show documents which are no files.
+CONTENT = "textDocumentContent"
 
 
 class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
@@ -140,13 +143,18 @@ class World:
         return positions.range_of(span, self.encoding)
 
     def location(self, span: Span, state: State) -> Location:
-        """Return the location of a span; what is built in is a document of its own."""
+        """Return the location of a span; what is built in is a document of its own.
+
+        For clients that cannot show such a document, it is a file of the user's cache.
+        """
         source = span.source
-        if source.path.startswith("<"):
-            return Location(built_in(source), self.range(span))
+        if is_built_in(source):
+            path = None if self.supports("workspace", CONTENT) else file_of(source)
+            uri = uris.from_path(path) if path else f"idlc:/{inside(source)}"
+            return Location(uri, self.range(span))
         return Location(self.uri(state.path_of(source)), self.range(span))
 
 
-def built_in(source: Source) -> str:
-    """Return the URI of an interface of the catalogue, such as `idlc:/jazzy/std_msgs/msg/…`."""
-    return "idlc:/" + source.path.replace("<", "", 1).replace(">", "", 1)
+def is_built_in(source: Source) -> bool:
+    """Return whether a text is of the catalogue."""
+    return source.path.startswith("<")

@@ -78,6 +78,11 @@
       (let ((xref-prompt-for-identifier nil))
         (call-interactively #'xref-find-definitions))
       (file-name-nondirectory (buffer-file-name)))
+(look "built_in"
+      (open "msg/Drive.msg" "Header")
+      (let ((xref-prompt-for-identifier nil))
+        (call-interactively #'xref-find-definitions))
+      (text))
 (look "references"
       (open "msg/Fleet.msg" "Drive")
       (vconcat (mapcar #'place (xref-backend-references 'eglot (xref-backend-identifier-at-point 'eglot)))))

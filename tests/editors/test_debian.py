@@ -23,6 +23,8 @@ def test_neovim_of_debian(package):
     seen = running.neovim("/usr/bin/nvim", package)
     assert scenario.normal(seen) == expected(seen)
     assert seen["syntax"] == "rosmsgPrimitive"
+    # what is built into the server is a file for an editor without the plugin's documents
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
 
 
 def test_emacs(package, tmp_path):
@@ -35,3 +37,4 @@ def test_emacs(package, tmp_path):
     )
     assert scenario.normal(seen) == expected(seen)
     assert seen["language"] == "rosmsg-mode"
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]

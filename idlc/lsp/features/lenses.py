@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from idlc.breaking.change import LEVELS
 from idlc.breaking.packages import compare
 from idlc.diagnostics.report import first_few
-from idlc.lsp.features.navigation import users
 from idlc.lsp.protocol.parts import Action, Lens, OfDocument, Position, Range
+from idlc.lsp.users import users
 from idlc.lsp.world import Known, World
 from idlc.model import derive, ir
 from idlc.model.spelling import spell_value
