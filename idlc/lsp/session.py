@@ -95,6 +95,12 @@ class Session:
         if "workbench" in self.__dict__ and not self.is_shut_down:
             self.workbench.idle()
 
+    def prepare(self) -> None:
+        """Import what answers, so that the first time takes no longer than others."""
+        if "workbench" in self.__dict__ and any(True for _ in self.workbench.world.documents):
+            for method in METHODS.values():
+                method.prepare()
+
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
         if "workbench" in self.__dict__ and not self.is_shut_down:

@@ -6,7 +6,7 @@ Only the line and the lists of what there is are looked at, so that it comes whi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
@@ -88,14 +88,15 @@ def complete(world: World, asked: AtPosition) -> Items:
     line, at = in_lines(lines, asked.position, world.encoding)
     typed = Typed(document, path, project, line, lines[line][:at], world.encoding, {})
     items = tuple(_items(typed, world))
-    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, typed)))
+    starts = {one.text_edit.range.start.character for one in items}
+    words = {start: typed.after(start).lower() for start in starts}
+    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, words)))
 
 
-def _fits(item: Item, typed: Typed) -> bool:
+def _fits(item: Item, words: Mapping[int, str]) -> bool:
     """Return whether what an item replaces has its letters in that order; not all editors look."""
-    start = item.text_edit.range.start.character
     letters = iter((item.filter_text or item.label).lower())
-    return all(one in letters for one in typed.after(start).lower())
+    return all(one in letters for one in words[item.text_edit.range.start.character])
 
 
 def _items(typed: Typed, world: World) -> Iterator[Item]:
