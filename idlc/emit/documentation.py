@@ -31,13 +31,18 @@ class Docstring(msgspec.Struct, frozen=True):
         return not self.sections and "\n" not in self.text
 
 
-def message(structure: ir.Message, purpose: str, entries: tuple[str, ...]) -> Docstring:
-    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries."""
+def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file: str) -> Docstring:
+    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries.
+
+    `file` is the one that defines it, within its package.
+    """
     lines = [literals.prose(line) for line in structure.comment] or [purpose]
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
     lines += _hidden(structure)
-    constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
+    defined = [place for one in _definitions(structure) if (place := _place(one, file))]
+    lines += ["", f"Defined in {defined[0]}"] if defined else []
+    constants = tuple(entry(c.name, words(c)) for c in structure.constants if c.comment or c.unit)
     sections = (Section("Attributes", entries), Section("Constants", constants))
     found = tuple(section for section in sections if section.entries)
     return Docstring(literals.docstring(lines, one_line=not found), found)
@@ -95,18 +100,38 @@ def _hidden(structure: ir.Message) -> list[str]:
     return ["", *literals.wrapped(text, 4)]
 
 
-def field(described: ir.Field) -> str:
-    """Return a field's entry, on as many lines as it takes."""
-    return _entry(pynames.field(described.name), described)
-
-
-def _constant(constant: ir.Constant) -> str:
-    return _entry(constant.name, constant)
-
-
-def _entry(name: str, described: ir.Field | ir.Constant) -> str:
+def words(described: ir.Field | ir.Constant) -> str:
     """Return the type, unit and comment of a field or constant."""
     unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
-    words = " ".join(literals.prose(line).strip() for line in described.comment).strip()
-    text = f"{name}: {spell(described.type)}{unit}" + (f". {words}" if words else "")
-    return "\n".join(literals.wrapped(text, 8, hanging=4))
+    said = " ".join(literals.prose(line).strip() for line in described.comment).strip()
+    return f"{spell(described.type)}{unit}" + (f". {said}" if said else "")
+
+
+def entry(name: str, said: str) -> str:
+    """Return the entry of a field or constant in a list, on as many lines as it takes."""
+    return "\n".join(literals.wrapped(f"{name}: {said}", 8, hanging=4))
+
+
+def attribute(described: ir.Field | ir.Constant, said: str, file: str) -> str:
+    """Return the statement that editors show of a field or constant: its words, and its line.
+
+    It is empty for what ROS 2 adds, of which there is no more to say than the annotation does.
+    """
+    place = _place(described, file)
+    if not place:
+        return ""
+    lines = literals.wrapped(f"{said} ({place})", 6)
+    text = literals.docstring(lines, one_line=True)
+    return f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""'
+
+
+def _definitions(structure: ir.Message) -> list[ir.Field | ir.Constant]:
+    """Return what a structure defines, in the order of its file."""
+    found: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
+    return sorted(found, key=lambda one: one.name_span.start if one.name_span else 0)
+
+
+def _place(described: ir.Field | ir.Constant, file: str) -> str:
+    """Return the file and line that define something; empty for what no file does."""
+    span = described.name_span
+    return f"{file}:{span.source.position(span.start)[0]}" if span else ""

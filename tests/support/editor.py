@@ -22,7 +22,13 @@ PATIENCE = 60
 class Editor:
     """A client with a server of its own."""
 
-    def __init__(self, *folders: Path, capabilities: Any = None, options: Any = None) -> None:
+    def __init__(
+        self,
+        *folders: Path,
+        capabilities: Any = None,
+        options: Any = None,
+        command: tuple[str, ...] = (sys.executable, "-m", "idlc", "lsp"),
+    ) -> None:
         self.problems: dict[str, list[lsp.Diagnostic]] = {}
         self.versions: dict[str, int | None] = {}
         self.told: list[str] = []
@@ -38,7 +44,6 @@ class Editor:
             lsp.Command | lsp.CodeAction,
             lambda given, _: converter.structure(given, lsp.CodeAction),
         )
-        command = (sys.executable, "-m", "idlc", "lsp")
         environment = {**os.environ, "AMENT_PREFIX_PATH": ""}
         self._wait(self._client.start_io(*command, env=environment))
         self.process = self._client._server

@@ -12,6 +12,8 @@ from .. import _idlc
 class RobotCommand(_idlc.Message):
     """A robot command: how fast to drive and turn until the next one arrives.
 
+    Defined in msg/RobotCommand.msg:3
+
     Attributes:
         command_type: string. What to do: STOP, MOVE or TURN
         linear_velocity_x: float32 [m/s]. Forward speed, negative to reverse
@@ -36,13 +38,22 @@ class RobotCommand(_idlc.Message):
     )
 
     STOP = "stop"
+    """string (msg/RobotCommand.msg:3)"""
     MOVE = "move"
+    """string (msg/RobotCommand.msg:4)"""
     TURN = "turn"
+    """string (msg/RobotCommand.msg:5)"""
 
     command_type: str
+    """string. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg:7)"""
     linear_velocity_x: float
+    """float32 [m/s]. Forward speed, negative to reverse (msg/RobotCommand.msg:8)"""
     angular_velocity_z: float
+    """float32 [rad/s]. Turn rate, counter-clockwise seen from above
+    (msg/RobotCommand.msg:9)
+    """
     frame_id: str
+    """string. The frame that the velocities are given in (msg/RobotCommand.msg:10)"""
 
     def __init__(
         self,

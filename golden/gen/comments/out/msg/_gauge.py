@@ -19,6 +19,8 @@ class Gauge(_idlc.Message):
 
       Indented, for who reads it.
 
+    Defined in msg/Gauge.msg:7
+
     Attributes:
         rate: float32 [Hz]. How often it is read
         level: uint8. 0 is empty
@@ -55,7 +57,9 @@ class Gauge(_idlc.Message):
     )
 
     EMPTY = 0
+    """uint8 [l]. nothing (msg/Gauge.msg:9)"""
     FULL = 255
+    """uint8 (msg/Gauge.msg:10)"""
     RATE__DEFAULT = 10.0
     LABEL__DEFAULT = 'it\'s "full"'
     NOTES__DEFAULT = _idlc.FreshList("a", "it's")
@@ -63,12 +67,21 @@ class Gauge(_idlc.Message):
     FLAGS__DEFAULT = b"\x07"
 
     rate: float
+    """float32 [Hz]. How often it is read (msg/Gauge.msg:7)"""
     level: int
+    """uint8. 0 is empty (msg/Gauge.msg:8)"""
     label: str
+    """string<=20. what stands on it (msg/Gauge.msg:11)"""
     notes: list[str]
+    """string[<=3]. at most three, in a comment that goes on for so long that the
+    line has to be broken somewhere (msg/Gauge.msg:12)
+    """
     samples: _idlc.Int16Sequence = _idlc.Int16Sequence()
+    """int16[] (msg/Gauge.msg:13)"""
     covariance: _arrays.Float64Array = _arrays.Float64Array(9)
+    """float64[9] [m^2]. row by row (msg/Gauge.msg:14)"""
     flags: bytes
+    """byte (msg/Gauge.msg:15)"""
 
     def __init__(
         self,

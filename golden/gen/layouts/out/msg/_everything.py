@@ -23,6 +23,8 @@ with _idlc.importing():
 class Everything(_idlc.Message):
     """layouts_msgs/msg/Everything.
 
+    Defined in msg/Everything.msg:1
+
     Attributes:
         flag: bool
         inner: layouts_msgs/Inner
@@ -82,21 +84,37 @@ class Everything(_idlc.Message):
     )
 
     flag: bool
+    """bool (msg/Everything.msg:1)"""
     inner: Inner
+    """layouts_msgs/Inner (msg/Everything.msg:2)"""
     inners: list[Inner]
+    """layouts_msgs/Inner[] (msg/Everything.msg:3)"""
     rows: list[Row]
+    """layouts_msgs/Row[<=4] (msg/Everything.msg:4)"""
     pair: list[Row]
+    """layouts_msgs/Row[2] (msg/Everything.msg:5)"""
     nothing: Nothing
+    """layouts_msgs/Nothing (msg/Everything.msg:6)"""
     nothings: list[Nothing]
+    """layouts_msgs/Nothing[] (msg/Everything.msg:7)"""
     doubles: _idlc.Float64Sequence = _idlc.Float64Sequence()
+    """float64[] (msg/Everything.msg:8)"""
     shorts: _idlc.Int16Sequence = _idlc.Int16Sequence()
+    """int16[<=3] (msg/Everything.msg:9)"""
     flags: list[bool]
+    """bool[] (msg/Everything.msg:10)"""
     octets: list[bytes]
+    """byte[2] (msg/Everything.msg:11)"""
     texts: list[str]
+    """string[] (msg/Everything.msg:12)"""
     wides: list[str]
+    """wstring[2] (msg/Everything.msg:13)"""
     stamps: list[Time]
+    """builtin_interfaces/Time[] (msg/Everything.msg:14)"""
     weights: _arrays.Float32Array = _arrays.Float32Array(4)
+    """float32[4] (msg/Everything.msg:15)"""
     last: int
+    """int64 (msg/Everything.msg:16)"""
 
     def __init__(
         self,

@@ -12,6 +12,8 @@ from .. import _idlc
 class Inner(_idlc.Message):
     """layouts_msgs/msg/Inner.
 
+    Defined in msg/Inner.msg:1
+
     Attributes:
         a: uint8
         b: float64
@@ -30,9 +32,13 @@ class Inner(_idlc.Message):
     )
 
     a: int
+    """uint8 (msg/Inner.msg:1)"""
     b: float
+    """float64 (msg/Inner.msg:2)"""
     c: str
+    """string (msg/Inner.msg:3)"""
     d: str
+    """wstring (msg/Inner.msg:4)"""
 
     def __init__(
         self,

@@ -14,6 +14,8 @@ from ._titled import Titled
 class Texts(_idlc.Message):
     """layouts_msgs/msg/Texts.
 
+    Defined in msg/Texts.msg:1
+
     Attributes:
         pairs: layouts_msgs/Pair[]
         few: layouts_msgs/Pair[<=2]
@@ -32,9 +34,13 @@ class Texts(_idlc.Message):
     )
 
     pairs: list[Pair]
+    """layouts_msgs/Pair[] (msg/Texts.msg:1)"""
     few: list[Pair]
+    """layouts_msgs/Pair[<=2] (msg/Texts.msg:2)"""
     titled: list[Titled]
+    """layouts_msgs/Titled[] (msg/Texts.msg:3)"""
     last: str
+    """string (msg/Texts.msg:4)"""
 
     def __init__(
         self,

@@ -13,6 +13,8 @@ from ._pair import Pair
 class Titled(_idlc.Message):
     """layouts_msgs/msg/Titled.
 
+    Defined in msg/Titled.msg:1
+
     Attributes:
         level: uint8
         title: string
@@ -31,9 +33,13 @@ class Titled(_idlc.Message):
     )
 
     level: int
+    """uint8 (msg/Titled.msg:1)"""
     title: str
+    """string (msg/Titled.msg:2)"""
     pairs: list[Pair]
+    """layouts_msgs/Pair[] (msg/Titled.msg:3)"""
     number: float
+    """float64 (msg/Titled.msg:4)"""
 
     def __init__(
         self,

@@ -21,6 +21,8 @@ class Hiding(_idlc.Message):
     from_dict, to_dict): `super(Hiding, message)` still has them, and `super(Hiding,
     Hiding)` those of the class.
 
+    Defined in msg/Hiding.msg:2
+
     Attributes:
         validate: names_msgs/Point
         serialize: uint8
@@ -43,10 +45,15 @@ class Hiding(_idlc.Message):
     SERIALIZE__DEFAULT = 1
 
     validate: Point  # type: ignore[assignment]
+    """names_msgs/Point (msg/Hiding.msg:2)"""
     serialize: int  # type: ignore[assignment]
+    """uint8 (msg/Hiding.msg:3)"""
     deserialize: _idlc.Float32Sequence = _idlc.Float32Sequence()  # type: ignore[assignment]
+    """float32[] (msg/Hiding.msg:4)"""
     from_dict: _arrays.Int32Array = _arrays.Int32Array(3)  # type: ignore[assignment]
+    """int32[3] (msg/Hiding.msg:5)"""
     to_dict: list[str]  # type: ignore[assignment]
+    """string[] (msg/Hiding.msg:6)"""
 
     def __init__(
         self,

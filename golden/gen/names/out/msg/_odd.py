@@ -20,6 +20,8 @@ class Odd(_idlc.Message):
     Fields hide the methods of the same name (serialize): `super(Odd, message)`
     still has them, and `super(Odd, Odd)` those of the class.
 
+    Defined in msg/Odd.msg:1
+
     Attributes:
         class_: int32
         serialize: int32
@@ -84,21 +86,37 @@ class Odd(_idlc.Message):
     ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
 
     class_: _builtins.int
+    """int32 (msg/Odd.msg:1)"""
     serialize: _builtins.int  # type: ignore[assignment]
+    """int32 (msg/Odd.msg:2)"""
     self: _builtins.int
+    """int32 (msg/Odd.msg:3)"""
     fields_and_field_types: _builtins.int
+    """int32 (msg/Odd.msg:4)"""
     int: _builtins.int
+    """int32 (msg/Odd.msg:5)"""
     list: _builtins.str
+    """string (msg/Odd.msg:6)"""
     bytes: _builtins.bytes
+    """byte (msg/Odd.msg:7)"""
     bool: _builtins.bool
+    """bool (msg/Odd.msg:8)"""
     float: _builtins.float
+    """float32 (msg/Odd.msg:9)"""
     str: _builtins.list[_builtins.str]
+    """string[] (msg/Odd.msg:10)"""
     message: _builtins.int
+    """int32 (msg/Odd.msg:11)"""
     data: _builtins.int
+    """int32 (msg/Odd.msg:12)"""
     at: _builtins.int
+    """int32 (msg/Odd.msg:13)"""
     item: _builtins.list[Point]
+    """names_msgs/Point[] (msg/Odd.msg:14)"""
     array: Point
+    """names_msgs/Point (msg/Odd.msg:15)"""
     order: _arrays.Int32Array = _arrays.Int32Array(3)
+    """int32[3] (msg/Odd.msg:16)"""
 
     def __init__(
         _self,

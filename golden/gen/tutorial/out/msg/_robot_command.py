@@ -14,6 +14,8 @@ class RobotCommand(_idlc.Message):
 
     Sent by the operator, obeyed by the controller node.
 
+    Defined in msg/RobotCommand.msg:5
+
     Attributes:
         command_type: string. What to do: STOP, MOVE or TURN
         linear_velocity_x: float32 [m/s]. Forward speed, negative to reverse
@@ -38,13 +40,22 @@ class RobotCommand(_idlc.Message):
     )
 
     STOP = "stop"
+    """string (msg/RobotCommand.msg:5)"""
     MOVE = "move"
+    """string (msg/RobotCommand.msg:6)"""
     TURN = "turn"
+    """string (msg/RobotCommand.msg:7)"""
 
     command_type: str
+    """string. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg:9)"""
     linear_velocity_x: float
+    """float32 [m/s]. Forward speed, negative to reverse (msg/RobotCommand.msg:10)"""
     angular_velocity_z: float
+    """float32 [rad/s]. Turn rate, counter-clockwise seen from above
+    (msg/RobotCommand.msg:11)
+    """
     frame_id: str
+    """string. The frame that the velocities are given in (msg/RobotCommand.msg:12)"""
 
     def __init__(
         self,
