@@ -305,7 +305,11 @@ const LOOKS = {
       const texts = (await shown.allTextContents()).join(" | ");
       return ["RIHS01_", "2 uses", "defaults: speed 0.5"].every((one) => texts.includes(one)) && texts;
     });
+    await keyboard.press("Control+Shift+m");
+    await page.locator(".markers-panel .monaco-list-row").nth(1).waitFor();
+    await shown.first().waitFor();
     await picture("lens");
+    await keyboard.press("Control+j");
     return found;
   },
   async update() {
