@@ -40,9 +40,10 @@ def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file:
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
     lines += _hidden(structure)
-    defined = [place for one in _definitions(structure) if (place := _place(one, file))]
-    lines += ["", f"Defined in {defined[0]}"] if defined else []
-    constants = tuple(entry(c.name, words(c)) for c in structure.constants if c.comment or c.unit)
+    spans = [one.name_span for one in structure.fields]
+    written = any(spans + [one.name_span for one in structure.constants])
+    lines += ["", f"Defined in {file}"] if written else []
+    constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
     sections = (Section("Attributes", entries), Section("Constants", constants))
     found = tuple(section for section in sections if section.entries)
     return Docstring(literals.docstring(lines, one_line=not found), found)
@@ -100,38 +101,31 @@ def _hidden(structure: ir.Message) -> list[str]:
     return ["", *literals.wrapped(text, 4)]
 
 
+def _constant(constant: ir.Constant) -> str:
+    return entry(constant.name, constant, words(constant))
+
+
 def words(described: ir.Field | ir.Constant) -> str:
-    """Return the type, unit and comment of a field or constant."""
+    """Return the unit and comment of a field or constant, to stand after its type or name."""
     unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
     said = " ".join(literals.prose(line).strip() for line in described.comment).strip()
-    return f"{spell(described.type)}{unit}" + (f". {said}" if said else "")
+    return unit + (f". {said}" if said else "")
 
 
-def entry(name: str, said: str) -> str:
+def entry(name: str, described: ir.Field | ir.Constant, said: str) -> str:
     """Return the entry of a field or constant in a list, on as many lines as it takes."""
-    return "\n".join(literals.wrapped(f"{name}: {said}", 8, hanging=4))
+    text = f"{name}: {spell(described.type)}{said}"
+    return "\n".join(literals.wrapped(text, 8, hanging=4))
 
 
 def attribute(described: ir.Field | ir.Constant, said: str, file: str) -> str:
     """Return the statement that editors show of a field or constant: its words, and its line.
 
-    It is empty for what ROS 2 adds, of which there is no more to say than the annotation does.
+    That is named by what it begins with, not by its number, which other lines would change. The
+    statement is empty for what ROS 2 adds, of which there is no more to say than its annotation.
     """
-    place = _place(described, file)
-    if not place:
+    if described.name_span is None:
         return ""
-    lines = literals.wrapped(f"{said} ({place})", 6)
+    lines = literals.wrapped(f"{spell(described.type)} {described.name}{said} ({file})", 6)
     text = literals.docstring(lines, one_line=True)
     return f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""'
-
-
-def _definitions(structure: ir.Message) -> list[ir.Field | ir.Constant]:
-    """Return what a structure defines, in the order of its file."""
-    found: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
-    return sorted(found, key=lambda one: one.name_span.start if one.name_span else 0)
-
-
-def _place(described: ir.Field | ir.Constant, file: str) -> str:
-    """Return the file and line that define something; empty for what no file does."""
-    span = described.name_span
-    return f"{file}:{span.source.position(span.start)[0]}" if span else ""

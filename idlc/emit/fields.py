@@ -116,7 +116,7 @@ def view(field: ir.Field, references: References, naming: Naming, file: str) -> 
         name=name,
         wire_name=field.name,
         idl=idl_text(field.type),
-        description=documentation.entry(name, words),
+        description=documentation.entry(name, field, words),
         docstring=documentation.attribute(field, words, file),
         annotation=shape.annotation + _ignored(name),
         parameter=shape.parameter,

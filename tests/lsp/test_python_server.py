@@ -55,13 +55,13 @@ def shown(editor, package, tmp_path_factory):
 @pytest.mark.parametrize(
     ("word", "expected"),
     [
-        ("speed", ["float64 [m/s]. forwards", "msg/Drive.msg:4"]),
-        ("radius", ["float32 [m]", "msg/Wheel.msg:1"]),
-        ("MODE_FAST", ["uint8. as fast as can be", "msg/Drive.msg:3"]),
-        ("Drive", ["How fast to drive.", "Defined in msg/Drive.msg:3"]),
+        ("speed", ["float64 speed [m/s]. forwards (msg/Drive.msg)"]),
+        ("radius", ["float32 radius [m] (msg/Wheel.msg)"]),
+        ("MODE_FAST", ["uint8 MODE_FAST. as fast as can be (msg/Drive.msg)"]),
+        ("Drive", ["How fast to drive.", "Defined in msg/Drive.msg"]),
     ],
 )
-def test_hover_has_comment_unit_and_line(shown, word, expected):
+def test_hover_has_comment_unit_and_the_line(shown, word, expected):
     ask, _ = shown
     text = ask(lsp.TEXT_DOCUMENT_HOVER, lsp.HoverParams, word).contents.value.replace("\\", "")
     for one in expected:

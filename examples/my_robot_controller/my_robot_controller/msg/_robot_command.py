@@ -12,7 +12,7 @@ from .. import _idlc
 class RobotCommand(_idlc.Message):
     """A robot command: how fast to drive and turn until the next one arrives.
 
-    Defined in msg/RobotCommand.msg:3
+    Defined in msg/RobotCommand.msg
 
     Attributes:
         command_type: string. What to do: STOP, MOVE or TURN
@@ -38,22 +38,26 @@ class RobotCommand(_idlc.Message):
     )
 
     STOP = "stop"
-    """string (msg/RobotCommand.msg:3)"""
+    """string STOP (msg/RobotCommand.msg)"""
     MOVE = "move"
-    """string (msg/RobotCommand.msg:4)"""
+    """string MOVE (msg/RobotCommand.msg)"""
     TURN = "turn"
-    """string (msg/RobotCommand.msg:5)"""
+    """string TURN (msg/RobotCommand.msg)"""
 
     command_type: str
-    """string. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg:7)"""
+    """string command_type. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg)"""
     linear_velocity_x: float
-    """float32 [m/s]. Forward speed, negative to reverse (msg/RobotCommand.msg:8)"""
+    """float32 linear_velocity_x [m/s]. Forward speed, negative to reverse
+    (msg/RobotCommand.msg)
+    """
     angular_velocity_z: float
-    """float32 [rad/s]. Turn rate, counter-clockwise seen from above
-    (msg/RobotCommand.msg:9)
+    """float32 angular_velocity_z [rad/s]. Turn rate, counter-clockwise seen from
+    above (msg/RobotCommand.msg)
     """
     frame_id: str
-    """string. The frame that the velocities are given in (msg/RobotCommand.msg:10)"""
+    """string frame_id. The frame that the velocities are given in
+    (msg/RobotCommand.msg)
+    """
 
     def __init__(
         self,

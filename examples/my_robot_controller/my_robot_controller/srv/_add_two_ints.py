@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class AddTwoInts_Request(_idlc.Message):
     """The request of the service my_robot_controller/srv/AddTwoInts.
 
-    Defined in srv/AddTwoInts.srv:1
+    Defined in srv/AddTwoInts.srv
 
     Attributes:
         a: int64
@@ -30,9 +30,9 @@ class AddTwoInts_Request(_idlc.Message):
     )
 
     a: int
-    """int64 (srv/AddTwoInts.srv:1)"""
+    """int64 a (srv/AddTwoInts.srv)"""
     b: int
-    """int64 (srv/AddTwoInts.srv:2)"""
+    """int64 b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class AddTwoInts_Request(_idlc.Message):
 class AddTwoInts_Response(_idlc.Message):
     """The response of the service my_robot_controller/srv/AddTwoInts.
 
-    Defined in srv/AddTwoInts.srv:4
+    Defined in srv/AddTwoInts.srv
 
     Attributes:
         sum: int64. a + b
@@ -71,7 +71,7 @@ class AddTwoInts_Response(_idlc.Message):
     )
 
     sum: int
-    """int64. a + b (srv/AddTwoInts.srv:4)"""
+    """int64 sum. a + b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class Fill_Goal(_idlc.Message):
     """Fills a gauge.
 
-    Defined in action/Fill.action:2
+    Defined in action/Fill.action
 
     Attributes:
         level: float32 [l]. to here
@@ -28,7 +28,7 @@ class Fill_Goal(_idlc.Message):
     )
 
     level: float
-    """float32 [l]. to here (action/Fill.action:2)"""
+    """float32 level [l]. to here (action/Fill.action)"""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Fill_Goal(_idlc.Message):
 class Fill_Result(_idlc.Message):
     """The result of the action comments_msgs/action/Fill.
 
-    Defined in action/Fill.action:4
+    Defined in action/Fill.action
 
     Attributes:
         reached: float32 [l]
@@ -65,7 +65,7 @@ class Fill_Result(_idlc.Message):
     )
 
     reached: float
-    """float32 [l] (action/Fill.action:4)"""
+    """float32 reached [l] (action/Fill.action)"""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class Fill_Result(_idlc.Message):
 class Fill_Feedback(_idlc.Message):
     """The feedback of the action comments_msgs/action/Fill.
 
-    Defined in action/Fill.action:6
+    Defined in action/Fill.action
 
     Attributes:
         level: float32
@@ -102,7 +102,7 @@ class Fill_Feedback(_idlc.Message):
     )
 
     level: float
-    """float32 (action/Fill.action:6)"""
+    """float32 level (action/Fill.action)"""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class Reset_Request(_idlc.Message):
     """Sets a gauge back.
 
-    Defined in srv/Reset.srv:2
+    Defined in srv/Reset.srv
 
     Attributes:
         reason: string. why
@@ -28,7 +28,7 @@ class Reset_Request(_idlc.Message):
     )
 
     reason: str
-    """string. why (srv/Reset.srv:2)"""
+    """string reason. why (srv/Reset.srv)"""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Reset_Request(_idlc.Message):
 class Reset_Response(_idlc.Message):
     """Whether it worked.
 
-    Defined in srv/Reset.srv:5
+    Defined in srv/Reset.srv
 
     Attributes:
         ok: bool
@@ -65,7 +65,7 @@ class Reset_Response(_idlc.Message):
     )
 
     ok: bool
-    """bool (srv/Reset.srv:5)"""
+    """bool ok (srv/Reset.srv)"""
 
     def __init__(
         self,

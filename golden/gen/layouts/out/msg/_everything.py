@@ -23,7 +23,7 @@ with _idlc.importing():
 class Everything(_idlc.Message):
     """layouts_msgs/msg/Everything.
 
-    Defined in msg/Everything.msg:1
+    Defined in msg/Everything.msg
 
     Attributes:
         flag: bool
@@ -84,37 +84,37 @@ class Everything(_idlc.Message):
     )
 
     flag: bool
-    """bool (msg/Everything.msg:1)"""
+    """bool flag (msg/Everything.msg)"""
     inner: Inner
-    """layouts_msgs/Inner (msg/Everything.msg:2)"""
+    """layouts_msgs/Inner inner (msg/Everything.msg)"""
     inners: list[Inner]
-    """layouts_msgs/Inner[] (msg/Everything.msg:3)"""
+    """layouts_msgs/Inner[] inners (msg/Everything.msg)"""
     rows: list[Row]
-    """layouts_msgs/Row[<=4] (msg/Everything.msg:4)"""
+    """layouts_msgs/Row[<=4] rows (msg/Everything.msg)"""
     pair: list[Row]
-    """layouts_msgs/Row[2] (msg/Everything.msg:5)"""
+    """layouts_msgs/Row[2] pair (msg/Everything.msg)"""
     nothing: Nothing
-    """layouts_msgs/Nothing (msg/Everything.msg:6)"""
+    """layouts_msgs/Nothing nothing (msg/Everything.msg)"""
     nothings: list[Nothing]
-    """layouts_msgs/Nothing[] (msg/Everything.msg:7)"""
+    """layouts_msgs/Nothing[] nothings (msg/Everything.msg)"""
     doubles: _idlc.Float64Sequence = _idlc.Float64Sequence()
-    """float64[] (msg/Everything.msg:8)"""
+    """float64[] doubles (msg/Everything.msg)"""
     shorts: _idlc.Int16Sequence = _idlc.Int16Sequence()
-    """int16[<=3] (msg/Everything.msg:9)"""
+    """int16[<=3] shorts (msg/Everything.msg)"""
     flags: list[bool]
-    """bool[] (msg/Everything.msg:10)"""
+    """bool[] flags (msg/Everything.msg)"""
     octets: list[bytes]
-    """byte[2] (msg/Everything.msg:11)"""
+    """byte[2] octets (msg/Everything.msg)"""
     texts: list[str]
-    """string[] (msg/Everything.msg:12)"""
+    """string[] texts (msg/Everything.msg)"""
     wides: list[str]
-    """wstring[2] (msg/Everything.msg:13)"""
+    """wstring[2] wides (msg/Everything.msg)"""
     stamps: list[Time]
-    """builtin_interfaces/Time[] (msg/Everything.msg:14)"""
+    """builtin_interfaces/Time[] stamps (msg/Everything.msg)"""
     weights: _arrays.Float32Array = _arrays.Float32Array(4)
-    """float32[4] (msg/Everything.msg:15)"""
+    """float32[4] weights (msg/Everything.msg)"""
     last: int
-    """int64 (msg/Everything.msg:16)"""
+    """int64 last (msg/Everything.msg)"""
 
     def __init__(
         self,

@@ -12,7 +12,7 @@ from .. import _idlc
 class Inner(_idlc.Message):
     """layouts_msgs/msg/Inner.
 
-    Defined in msg/Inner.msg:1
+    Defined in msg/Inner.msg
 
     Attributes:
         a: uint8
@@ -32,13 +32,13 @@ class Inner(_idlc.Message):
     )
 
     a: int
-    """uint8 (msg/Inner.msg:1)"""
+    """uint8 a (msg/Inner.msg)"""
     b: float
-    """float64 (msg/Inner.msg:2)"""
+    """float64 b (msg/Inner.msg)"""
     c: str
-    """string (msg/Inner.msg:3)"""
+    """string c (msg/Inner.msg)"""
     d: str
-    """wstring (msg/Inner.msg:4)"""
+    """wstring d (msg/Inner.msg)"""
 
     def __init__(
         self,

@@ -12,7 +12,7 @@ from .. import _idlc
 class Pair(_idlc.Message):
     """layouts_msgs/msg/Pair.
 
-    Defined in msg/Pair.msg:1
+    Defined in msg/Pair.msg
 
     Attributes:
         key: string
@@ -28,9 +28,9 @@ class Pair(_idlc.Message):
     )
 
     key: str
-    """string (msg/Pair.msg:1)"""
+    """string key (msg/Pair.msg)"""
     value: str
-    """string (msg/Pair.msg:2)"""
+    """string value (msg/Pair.msg)"""
 
     def __init__(
         self,

@@ -14,7 +14,7 @@ from ._titled import Titled
 class Texts(_idlc.Message):
     """layouts_msgs/msg/Texts.
 
-    Defined in msg/Texts.msg:1
+    Defined in msg/Texts.msg
 
     Attributes:
         pairs: layouts_msgs/Pair[]
@@ -34,13 +34,13 @@ class Texts(_idlc.Message):
     )
 
     pairs: list[Pair]
-    """layouts_msgs/Pair[] (msg/Texts.msg:1)"""
+    """layouts_msgs/Pair[] pairs (msg/Texts.msg)"""
     few: list[Pair]
-    """layouts_msgs/Pair[<=2] (msg/Texts.msg:2)"""
+    """layouts_msgs/Pair[<=2] few (msg/Texts.msg)"""
     titled: list[Titled]
-    """layouts_msgs/Titled[] (msg/Texts.msg:3)"""
+    """layouts_msgs/Titled[] titled (msg/Texts.msg)"""
     last: str
-    """string (msg/Texts.msg:4)"""
+    """string last (msg/Texts.msg)"""
 
     def __init__(
         self,

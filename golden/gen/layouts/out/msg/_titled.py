@@ -13,7 +13,7 @@ from ._pair import Pair
 class Titled(_idlc.Message):
     """layouts_msgs/msg/Titled.
 
-    Defined in msg/Titled.msg:1
+    Defined in msg/Titled.msg
 
     Attributes:
         level: uint8
@@ -33,13 +33,13 @@ class Titled(_idlc.Message):
     )
 
     level: int
-    """uint8 (msg/Titled.msg:1)"""
+    """uint8 level (msg/Titled.msg)"""
     title: str
-    """string (msg/Titled.msg:2)"""
+    """string title (msg/Titled.msg)"""
     pairs: list[Pair]
-    """layouts_msgs/Pair[] (msg/Titled.msg:3)"""
+    """layouts_msgs/Pair[] pairs (msg/Titled.msg)"""
     number: float
-    """float64 (msg/Titled.msg:4)"""
+    """float64 number (msg/Titled.msg)"""
 
     def __init__(
         self,

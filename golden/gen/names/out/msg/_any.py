@@ -17,7 +17,7 @@ with _idlc.importing():
 class Any(_idlc.Message):
     """names_msgs/msg/Any.
 
-    Defined in msg/Any.msg:1
+    Defined in msg/Any.msg
 
     Attributes:
         pose: geometry_msgs/Pose
@@ -31,7 +31,7 @@ class Any(_idlc.Message):
     )
 
     pose: Pose
-    """geometry_msgs/Pose (msg/Any.msg:1)"""
+    """geometry_msgs/Pose pose (msg/Any.msg)"""
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ from ._foo_bar_2 import FooBar
 class FOOBar(_idlc.Message):
     """names_msgs/msg/FOOBar.
 
-    Defined in msg/FOOBar.msg:1
+    Defined in msg/FOOBar.msg
 
     Attributes:
         inner: names_msgs/FooBar
@@ -27,7 +27,7 @@ class FOOBar(_idlc.Message):
     )
 
     inner: FooBar
-    """names_msgs/FooBar (msg/FOOBar.msg:1)"""
+    """names_msgs/FooBar inner (msg/FOOBar.msg)"""
 
     def __init__(
         self,

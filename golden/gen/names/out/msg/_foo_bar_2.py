@@ -12,7 +12,7 @@ from .. import _idlc
 class FooBar(_idlc.Message):
     """names_msgs/msg/FooBar.
 
-    Defined in msg/FooBar.msg:1
+    Defined in msg/FooBar.msg
 
     Attributes:
         a: int32
@@ -26,7 +26,7 @@ class FooBar(_idlc.Message):
     )
 
     a: int
-    """int32 (msg/FooBar.msg:1)"""
+    """int32 a (msg/FooBar.msg)"""
 
     def __init__(
         self,

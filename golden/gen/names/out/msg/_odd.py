@@ -20,7 +20,7 @@ class Odd(_idlc.Message):
     Fields hide the methods of the same name (serialize): `super(Odd, message)`
     still has them, and `super(Odd, Odd)` those of the class.
 
-    Defined in msg/Odd.msg:1
+    Defined in msg/Odd.msg
 
     Attributes:
         class_: int32
@@ -86,37 +86,37 @@ class Odd(_idlc.Message):
     ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
 
     class_: _builtins.int
-    """int32 (msg/Odd.msg:1)"""
+    """int32 class (msg/Odd.msg)"""
     serialize: _builtins.int  # type: ignore[assignment]
-    """int32 (msg/Odd.msg:2)"""
+    """int32 serialize (msg/Odd.msg)"""
     self: _builtins.int
-    """int32 (msg/Odd.msg:3)"""
+    """int32 self (msg/Odd.msg)"""
     fields_and_field_types: _builtins.int
-    """int32 (msg/Odd.msg:4)"""
+    """int32 fields_and_field_types (msg/Odd.msg)"""
     int: _builtins.int
-    """int32 (msg/Odd.msg:5)"""
+    """int32 int (msg/Odd.msg)"""
     list: _builtins.str
-    """string (msg/Odd.msg:6)"""
+    """string list (msg/Odd.msg)"""
     bytes: _builtins.bytes
-    """byte (msg/Odd.msg:7)"""
+    """byte bytes (msg/Odd.msg)"""
     bool: _builtins.bool
-    """bool (msg/Odd.msg:8)"""
+    """bool bool (msg/Odd.msg)"""
     float: _builtins.float
-    """float32 (msg/Odd.msg:9)"""
+    """float32 float (msg/Odd.msg)"""
     str: _builtins.list[_builtins.str]
-    """string[] (msg/Odd.msg:10)"""
+    """string[] str (msg/Odd.msg)"""
     message: _builtins.int
-    """int32 (msg/Odd.msg:11)"""
+    """int32 message (msg/Odd.msg)"""
     data: _builtins.int
-    """int32 (msg/Odd.msg:12)"""
+    """int32 data (msg/Odd.msg)"""
     at: _builtins.int
-    """int32 (msg/Odd.msg:13)"""
+    """int32 at (msg/Odd.msg)"""
     item: _builtins.list[Point]
-    """names_msgs/Point[] (msg/Odd.msg:14)"""
+    """names_msgs/Point[] item (msg/Odd.msg)"""
     array: Point
-    """names_msgs/Point (msg/Odd.msg:15)"""
+    """names_msgs/Point array (msg/Odd.msg)"""
     order: _arrays.Int32Array = _arrays.Int32Array(3)
-    """int32[3] (msg/Odd.msg:16)"""
+    """int32[3] order (msg/Odd.msg)"""
 
     def __init__(
         _self,

@@ -12,7 +12,7 @@ from .. import _idlc
 class Point(_idlc.Message):
     """names_msgs/msg/Point.
 
-    Defined in msg/Point.msg:1
+    Defined in msg/Point.msg
 
     Attributes:
         x: float64
@@ -28,9 +28,9 @@ class Point(_idlc.Message):
     )
 
     x: float
-    """float64 (msg/Point.msg:1)"""
+    """float64 x (msg/Point.msg)"""
     y: float
-    """float64 (msg/Point.msg:2)"""
+    """float64 y (msg/Point.msg)"""
 
     def __init__(
         self,

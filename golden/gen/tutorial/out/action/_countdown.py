@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class Countdown_Goal(_idlc.Message):
     """Where to start counting down.
 
-    Defined in action/Countdown.action:2
+    Defined in action/Countdown.action
 
     Attributes:
         target_count: int32
@@ -28,7 +28,7 @@ class Countdown_Goal(_idlc.Message):
     )
 
     target_count: int
-    """int32 (action/Countdown.action:2)"""
+    """int32 target_count (action/Countdown.action)"""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class Countdown_Goal(_idlc.Message):
 class Countdown_Result(_idlc.Message):
     """The result of the action tutorial_msgs/action/Countdown.
 
-    Defined in action/Countdown.action:4
+    Defined in action/Countdown.action
 
     Attributes:
         final_count: int32. The last number reached; 0 unless cancelled
@@ -67,9 +67,11 @@ class Countdown_Result(_idlc.Message):
     )
 
     final_count: int
-    """int32. The last number reached; 0 unless cancelled (action/Countdown.action:4)"""
+    """int32 final_count. The last number reached; 0 unless cancelled
+    (action/Countdown.action)
+    """
     success: bool
-    """bool (action/Countdown.action:5)"""
+    """bool success (action/Countdown.action)"""
 
     def __init__(
         self,
@@ -96,7 +98,7 @@ class Countdown_Result(_idlc.Message):
 class Countdown_Feedback(_idlc.Message):
     """The feedback of the action tutorial_msgs/action/Countdown.
 
-    Defined in action/Countdown.action:7
+    Defined in action/Countdown.action
 
     Attributes:
         current_count: int32
@@ -110,7 +112,7 @@ class Countdown_Feedback(_idlc.Message):
     )
 
     current_count: int
-    """int32 (action/Countdown.action:7)"""
+    """int32 current_count (action/Countdown.action)"""
 
     def __init__(
         self,

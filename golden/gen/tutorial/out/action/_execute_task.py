@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class ExecuteTask_Goal(_idlc.Message):
     """The goal of the action tutorial_msgs/action/ExecuteTask.
 
-    Defined in action/ExecuteTask.action:1
+    Defined in action/ExecuteTask.action
 
     Attributes:
         task_name: string. The task to execute, e.g. "dock"
@@ -28,7 +28,7 @@ class ExecuteTask_Goal(_idlc.Message):
     )
 
     task_name: str
-    """string. The task to execute, e.g. "dock" (action/ExecuteTask.action:1)"""
+    """string task_name. The task to execute, e.g. "dock" (action/ExecuteTask.action)"""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class ExecuteTask_Goal(_idlc.Message):
 class ExecuteTask_Result(_idlc.Message):
     """The result of the action tutorial_msgs/action/ExecuteTask.
 
-    Defined in action/ExecuteTask.action:3
+    Defined in action/ExecuteTask.action
 
     Attributes:
         success: bool
@@ -65,7 +65,7 @@ class ExecuteTask_Result(_idlc.Message):
     )
 
     success: bool
-    """bool (action/ExecuteTask.action:3)"""
+    """bool success (action/ExecuteTask.action)"""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class ExecuteTask_Result(_idlc.Message):
 class ExecuteTask_Feedback(_idlc.Message):
     """The feedback of the action tutorial_msgs/action/ExecuteTask.
 
-    Defined in action/ExecuteTask.action:5
+    Defined in action/ExecuteTask.action
 
     Attributes:
         current_status: string. What the robot is doing now, for people to read
@@ -102,8 +102,8 @@ class ExecuteTask_Feedback(_idlc.Message):
     )
 
     current_status: str
-    """string. What the robot is doing now, for people to read
-    (action/ExecuteTask.action:5)
+    """string current_status. What the robot is doing now, for people to read
+    (action/ExecuteTask.action)
     """
 
     def __init__(

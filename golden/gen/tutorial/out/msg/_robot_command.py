@@ -14,7 +14,7 @@ class RobotCommand(_idlc.Message):
 
     Sent by the operator, obeyed by the controller node.
 
-    Defined in msg/RobotCommand.msg:5
+    Defined in msg/RobotCommand.msg
 
     Attributes:
         command_type: string. What to do: STOP, MOVE or TURN
@@ -40,22 +40,26 @@ class RobotCommand(_idlc.Message):
     )
 
     STOP = "stop"
-    """string (msg/RobotCommand.msg:5)"""
+    """string STOP (msg/RobotCommand.msg)"""
     MOVE = "move"
-    """string (msg/RobotCommand.msg:6)"""
+    """string MOVE (msg/RobotCommand.msg)"""
     TURN = "turn"
-    """string (msg/RobotCommand.msg:7)"""
+    """string TURN (msg/RobotCommand.msg)"""
 
     command_type: str
-    """string. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg:9)"""
+    """string command_type. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg)"""
     linear_velocity_x: float
-    """float32 [m/s]. Forward speed, negative to reverse (msg/RobotCommand.msg:10)"""
+    """float32 linear_velocity_x [m/s]. Forward speed, negative to reverse
+    (msg/RobotCommand.msg)
+    """
     angular_velocity_z: float
-    """float32 [rad/s]. Turn rate, counter-clockwise seen from above
-    (msg/RobotCommand.msg:11)
+    """float32 angular_velocity_z [rad/s]. Turn rate, counter-clockwise seen from
+    above (msg/RobotCommand.msg)
     """
     frame_id: str
-    """string. The frame that the velocities are given in (msg/RobotCommand.msg:12)"""
+    """string frame_id. The frame that the velocities are given in
+    (msg/RobotCommand.msg)
+    """
 
     def __init__(
         self,

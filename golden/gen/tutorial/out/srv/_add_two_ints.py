@@ -14,7 +14,7 @@ TYPE_CHECKING = False
 class AddTwoInts_Request(_idlc.Message):
     """The service of the ROS 2 tutorials.
 
-    Defined in srv/AddTwoInts.srv:2
+    Defined in srv/AddTwoInts.srv
 
     Attributes:
         a: int64
@@ -30,9 +30,9 @@ class AddTwoInts_Request(_idlc.Message):
     )
 
     a: int
-    """int64 (srv/AddTwoInts.srv:2)"""
+    """int64 a (srv/AddTwoInts.srv)"""
     b: int
-    """int64 (srv/AddTwoInts.srv:3)"""
+    """int64 b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class AddTwoInts_Request(_idlc.Message):
 class AddTwoInts_Response(_idlc.Message):
     """The response of the service tutorial_msgs/srv/AddTwoInts.
 
-    Defined in srv/AddTwoInts.srv:5
+    Defined in srv/AddTwoInts.srv
 
     Attributes:
         sum: int64. a + b
@@ -71,7 +71,7 @@ class AddTwoInts_Response(_idlc.Message):
     )
 
     sum: int
-    """int64. a + b (srv/AddTwoInts.srv:5)"""
+    """int64 sum. a + b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,
