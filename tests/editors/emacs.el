@@ -109,6 +109,11 @@
       (open "msg/Drive.msg")
       (setq imenu--index-alist nil)
       (vconcat (names (funcall imenu-create-index-function))))
+(look "update"
+      (write-region (getenv "SETTINGS") nil (expand-file-name "pyproject.toml" root))
+      (mapc #'open '("msg/Fleet.msg" "msg/Drive.msg" "msg/Broken.msg" "msg/Untidy.msg"))
+      (eglot-code-actions (point-min) (point-max) "source.updateGenerated.idlc" t)
+      (file-exists-p (expand-file-name "out/demo_msgs/msg/_untidy.py" root)))
 
 (dolist (buffer (buffer-list)) (with-current-buffer buffer (set-buffer-modified-p nil)))
 (ignore-errors (eglot-shutdown-all))
