@@ -6,7 +6,10 @@ import subprocess
 import pytest
 from lsprotocol import types as lsp
 
+from idlc.lsp.features import lenses as features
+from idlc.lsp.protocol.parts import DocumentId, OfDocument
 from idlc.lsp.protocol.token_kinds import TYPES
+from idlc.lsp.workbench import Workbench
 from tests.support.editor import at, between
 
 STOP = """\
@@ -235,3 +238,25 @@ def watchers(asked):
     """Return what the client was asked to watch last."""
     (*_, params) = (params for method, params in asked if method == lsp.CLIENT_REGISTER_CAPABILITY)
     return params.registrations[0].register_options["watchers"]
+
+
+def test_without_watches_it_looks_while_nothing_is_said(package):
+    folder = package({"pyproject.toml": TABLE, "msg/New.msg": "int8 x\n"})
+    shutil.rmtree(folder / ".git")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "first")
+    asked = []
+    client = {"workspace": {"codeLens": {"refreshSupport": True}}}
+    said = {"capabilities": client, "workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]}
+    bench = Workbench(said, lambda *_: None, lambda method, *_: asked.append(method))
+    document = OfDocument(DocumentId((folder / "msg/New.msg").as_uri()))
+    bench.idle()
+    for lens in features.lenses(bench.world, document):
+        features.resolve(bench.world, lens)
+    bench.idle()
+    assert asked == []
+    git(folder, "commit", "-qm", "second", "--allow-empty")
+    bench.idle()
+    bench.idle()
+    assert asked == ["workspace/codeLens/refresh"]
