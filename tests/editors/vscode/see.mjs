@@ -184,8 +184,12 @@ const LOOKS = {
   async fix() {
     await open("msg/Broken.msg");
     await page.locator(".squiggly-error").first().waitFor();
-    await keyboard.press("Control+.");
-    await page.locator(".action-widget .monaco-list-row", { hasText: "float64" }).first().waitFor();
+    const row = page.locator(".action-widget .monaco-list-row", { hasText: "float64" }).first();
+    // a busy machine may answer before the squiggle's problem is known there
+    await until("fix", async () => {
+      await keyboard.press("Control+.");
+      return row.waitFor({ timeout: 5000 }).then(() => true, () => false);
+    });
     await picture("fix");
     await keyboard.press("Enter");
     await page.locator(".squiggly-error").first().waitFor({ state: "detached" });
