@@ -25,7 +25,11 @@ STDOUT = "-"
 
 
 class UnknownFieldError(Exception):
-    """A type has no such field."""
+    """The type of a topic has no such field."""
+
+    def __init__(self, message: str, topic: str) -> None:
+        super().__init__(message)
+        self.topic = topic
 
 
 #: Told how many messages of a topic are done.
@@ -87,7 +91,7 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
     except UnknownFieldError as error:
-        hint = f"`idlc show {options.recording} TOPIC` lists the fields"
+        hint = f"`idlc show {options.recording} {error.topic}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
         where = options.recording
@@ -165,7 +169,7 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
     try:
         reader = job.topic.to_reader(**wanted)
     except ValueError as error:
-        raise UnknownFieldError(str(error)) from None
+        raise UnknownFieldError(str(error), name) from None
     counted = _Counted(reader, name, job.topic.topic.count, progress)
     if job.path == STDOUT:
         export.write(counted.batches(), reader.schema, sys.stdout.buffer, job.style)
