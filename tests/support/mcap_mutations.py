@@ -148,15 +148,22 @@ def rearrange(rng: random.Random, found: list[Record], size: int) -> None:
             change(rng, found[at], size)
 
 
+def compression(chunk: Record) -> bytes:
+    """Return how a chunk is compressed."""
+    return bytes(chunk.content[32 : 32 + (chunk.fields()[4].text or 0)])
+
+
+def in_chunk(chunk: Record) -> list[Record]:
+    """Return the records of a chunk."""
+    return records(EXPAND[compression(chunk)](bytes(chunk.content[chunk.fields()[5].at + 8 :])))
+
+
 def inside(rng: random.Random, chunk: Record, size: int) -> None:
     """Change what stands in a chunk, and what its head says of that."""
-    fields = chunk.fields()
-    name = bytes(chunk.content[32 : 32 + (fields[4].text or 0)])
-    data = EXPAND[name](bytes(chunk.content[fields[5].at + 8 :]))
-    found = records(data)
+    found = in_chunk(chunk)
     rearrange(rng, found, size)
     data = b"".join(one.packed() for one in found)
-    name = rng.choice([*COMPRESS]) if rng.random() < 0.2 else name
+    name = rng.choice([*COMPRESS]) if rng.random() < 0.2 else compression(chunk)
     crc = zlib.crc32(data) if rng.random() < 0.8 else 0
     stored = COMPRESS[name](data)
     head = bytes(chunk.content[:16]) + pack("<QII", len(data), crc, len(name)) + name
