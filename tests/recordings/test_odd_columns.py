@@ -2,6 +2,7 @@
 
 import csv
 import json
+import pickle
 from base64 import b64encode
 
 import pyarrow as pa
@@ -12,6 +13,8 @@ from pyarrow import parquet
 import idlc
 from idlc.cli.main import main
 from idlc.model.ir import DUMMY_FIELD
+from idlc.recordings.errors import RecordingError
+from tests.support import recorded_text
 from tests.support import recordings as made
 
 DEFINITIONS = {
@@ -26,6 +29,9 @@ DEFINITIONS = {
     "Times": "builtin_interfaces/Time t\nbuiltin_interfaces/Time[] ts\nTimes2[] in\n",
     "Times2": "builtin_interfaces/Duration[2] ds\nbuiltin_interfaces/Time t\n",
     "Unsent": "Holds[] a\nstring b\nuint8[2] c\nTimes[] d\n",
+}
+BUILT_IN = {
+    f"builtin_interfaces/{name}": "int32 sec\nuint32 nanosec\n" for name in ("Time", "Duration")
 }
 #: Messages of these types by fields; there are none of the last.
 VALUES = {
@@ -65,7 +71,8 @@ def recording(tmp_path_factory):
     with (folder / "odd.mcap").open("wb") as file:
         writer = Writer(file, chunk_size=100)
         writer.start()
-        others = [f"{line}\nMSG: {package}/{name}\n{text}" for name, text in DEFINITIONS.items()]
+        known = {f"{package}/{name}": text for name, text in DEFINITIONS.items()} | BUILT_IN
+        others = [f"{line}\nMSG: {name}\n{text}" for name, text in known.items()]
         for name, values in VALUES.items():
             text = DEFINITIONS[name] + "\n".join(others)
             schema = writer.register_schema(f"{package}/msg/{name}", "ros2msg", text.encode())
@@ -156,3 +163,24 @@ def test_times_in_lists_keep_their_nanoseconds(recording, tmp_path):
     assert json.loads(first["ts"]) == ["2023-11-14 22:13:20.123456789"] * 2
     inside = {"ds": [-999_999_993, 0], "t": "1970-01-01 00:00:03.000000001"}
     assert json.loads(second["in"]) == [inside]
+
+
+def test_what_a_recording_does_not_define_is_looked_for_and_that_is_said(tmp_path, capfd):
+    """As with recordings of Humble, in which there are no definitions and no hashes."""
+    path = recorded_text.write(tmp_path / "a.mcap", "@ /x own_msgs/msg/Pair\n", {"/x": 2})
+    assert main(["columns", str(path), "-o", str(tmp_path / "a.csv")]) == 1
+    assert "there is no definition of `own_msgs/msg/Pair`" in capfd.readouterr().err
+    (tmp_path / "own_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "own_msgs" / "msg" / "Pair.msg").write_text("int8 a", encoding="utf-8")
+    words = ("-I", str(tmp_path / "own_msgs"))
+    assert main(["columns", str(path), "-o", str(tmp_path / "a.csv"), *words]) == 0
+    assert "warning[IDL652]: `/x`: there is no definition" in capfd.readouterr().err
+    with idlc.Recording(path, include=[tmp_path]) as opened:
+        (part,) = opened["/x"].parts()
+        with pytest.warns(UserWarning, match="no definition of `own_msgs/msg/Pair`"):
+            assert pickle.loads(pickle.dumps(part)).to_arrow().num_rows == 2
+    with (
+        idlc.Recording(path, include=["nowhere"]) as opened,
+        pytest.raises(RecordingError, match="nowhere"),
+    ):
+        opened["/x"].to_arrow()

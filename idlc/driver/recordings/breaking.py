@@ -12,7 +12,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
 from idlc.driver.compare.breaking import BreakingOptions, not_allowed, sound_ones
-from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.types import NAMED, Around, recorded_types
 from idlc.driver.recordings.versions import topics_of, versions
 from idlc.driver.stages import stage
 from idlc.model import ir
@@ -51,7 +51,7 @@ def compare_with_recordings(
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for version in versions(topics):
-        types = RecordedTypes(version, here.around, options.scope, report)
+        types = recorded_types(version, here.around, options.scope, report)
         models = types.models.values()
         report.extend(types.errors)
         for old, new in here.pairs(models, types.texts):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.driver.recordings.load import OtherDefinitionWarning
+from idlc.driver.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.driver.recordings.recording import RecordedTopic, Recording, UnknownTopicError
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 #: What stands in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
+BORROWED = "see to it that it is what was recorded, or point -I to it"
 
 
 class UnknownFieldError(Exception):
@@ -49,7 +50,9 @@ class ColumnsOptions(NamedTuple):
     nested: bool = False
     datetimes: bool = True
     check: bool = False
+    use_index: bool = True
     force: bool = False
+    include: tuple[str, ...] = ()
 
 
 class Written(NamedTuple):
@@ -74,7 +77,11 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     A topic that cannot be read does not keep others from being written.
     """
     done: list[Written] = []
-    with _problems(options, report), Recording(options.recording, check=options.check) as recording:
+    path, check, include = options.recording, options.check, options.include
+    with (
+        _problems(options, report),
+        Recording(path, index=options.use_index, check=check, include=include) as recording,
+    ):
         report.notes += recording.notes
         with _warnings(report):
             for job in _jobs(recording, options, report):
@@ -100,13 +107,15 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
 
 @contextmanager
 def _warnings(report: Report) -> Iterator[None]:
-    """Report IDL654 for definitions that are not those of what was recorded."""
+    """Report IDL652 and IDL654 for definitions that are not there, or of something else."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         yield
     for one in found:
         if issubclass(one.category, OtherDefinitionWarning):
             report.add(codes.RECORDED_HASH_DIFFERS.of("", str(one.message)))
+        if issubclass(one.category, MissingDefinitionWarning):
+            report.add(codes.MISSING_DEFINITION.of("", str(one.message), hint=BORROWED))
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:

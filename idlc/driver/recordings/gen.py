@@ -16,7 +16,7 @@ from idlc.disk.read import absolute
 from idlc.disk.requested import borrowed
 from idlc.driver.generate.gen import GenOptions
 from idlc.driver.recordings.models import check_versions, contradicted
-from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.types import NAMED, Around, recorded_types
 from idlc.driver.recordings.versions import topics_of, versions
 from idlc.model import ir
 
@@ -35,7 +35,7 @@ def recorded_packages(
     check_versions(found, report)
     if report.had_errors or not found:
         return [], {}
-    types = RecordedTypes(found[0], Around(options.scope, report), options.scope, report)
+    types = recorded_types(found[0], Around(options.scope, report), options.scope, report)
     report.extend(contradicted(types))
     names = types.names
     if options.ament:

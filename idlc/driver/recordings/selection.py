@@ -35,11 +35,13 @@ class Selection:
     """Messages of one topic.
 
     They are of the type that was recorded, compiled when it is first needed, unless a class that
-    idlc generated is given; that must be of the same type as the recorded one.
+    idlc generated is given; that must be of the same type as the recorded one. `include` are
+    folders in which types are looked for that the recording does not define.
     """
 
-    def __init__(self, topic: Topic) -> None:
+    def __init__(self, topic: Topic, include: tuple[str, ...] = ()) -> None:
         self.topic = topic
+        self.include = include
 
     def batches(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
@@ -50,7 +52,7 @@ class Selection:
         """The class of the messages, compiled from what was recorded."""
         from idlc.driver.recordings.load import class_of
 
-        return class_of(self.topic)
+        return class_of(self.topic, self.include)
 
     def _kind(self, given: Any) -> Any:
         """Return the class to read with: what was recorded, or one of the same type."""
@@ -61,7 +63,7 @@ class Selection:
             return self.kind
         from idlc.driver.recordings.load import accepted
 
-        return accepted(given, self.topic)
+        return accepted(given, self.topic, self.include)
 
     def __iter__(self) -> Iterator[Stamped]:
         return self.messages()
