@@ -107,7 +107,8 @@ def _against(
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], report) as revision:
-            return None if revision is None else _compare(options, given, revision, report)
+            found = revision and _compare(options, given, revision, report)
+        return found and found.placed(f"{options.against}:")
     if options.against.endswith(lock_file.FILE):
         return _compare_with_lock(options, given, report)
     if is_revision(options.against, options.paths[0]):

@@ -52,6 +52,7 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
                 f"{one.recorded.recording}: topic {topic.name}",
                 f"the definition of `{one.name}` is not that of what was recorded",
                 hint="the recorder found another version of its files than the publisher used",
+                place=one.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )
 

@@ -204,7 +204,8 @@ def _empty_ones(
             continue
         empty = Describer({name: ir.Message(name=name)}).hash(str(name))
         if (recorded or around.hash(name, name)) == empty:
-            yield name, Source(f"{topic.recording}: topic {topic.topic.name}: {name}.msg", "")
+            path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
+            yield name, Source(path, "", topic.recording)
 
 
 def _typed(
