@@ -17,6 +17,8 @@ ATOMIC = frozenset({bool, bytes, float, int, str})
 SMALL = 64
 #: Elements of large arrays that are compared at once.
 PIECE = 1 << 16
+#: What is not shown of the names of modules.
+HIDDEN = ""
 
 
 def owner_of(kind: type) -> Any:
@@ -114,7 +116,7 @@ represented.__qualname__ = "__create_fn__.<locals>.__repr__"
 
 def _shown_name(kind: type) -> str:
     """Return a class's name after that of its package, its module left out."""
-    package = kind.__module__.rpartition(".")[0]
+    package = kind.__module__.rpartition(".")[0].removeprefix(HIDDEN)
     return f"{package}.{kind.__name__}" if package else kind.__name__
 
 

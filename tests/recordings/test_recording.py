@@ -1,13 +1,17 @@
 """Values of recordings: those that other readers find, as objects, columns and tables."""
 
+import inspect
 import pickle
+import pydoc
 import subprocess
 import sys
 from datetime import datetime, timedelta, timezone
 
+import mypy.api
 import numpy as np
 import pyarrow as pa
 import pytest
+from IPython.lib.pretty import pretty
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -95,7 +99,7 @@ def test_a_recording_is_a_mapping_of_topics(tmp_path):
         assert len(recording) == 3
         assert "/imu" in recording
         assert "/nothing" not in recording
-        assert "/imu  sensor_msgs/msg/Imu  20" in repr(recording)
+        assert "/joints        sensor_msgs/msg/JointState  20" in repr(recording)
         assert recording["/imu"].topic.count == len(list(recording["/imu"])) == 20
         with pytest.raises(KeyError, match=r"has no topic `/im` \(did you mean `/imu`\?\)"):
             recording["/im"]
@@ -311,6 +315,43 @@ def test_messages_can_be_pickled_for_another_process(tmp_path):
     code = f"import pickle; print(pickle.load(open({str(kept)!r}, 'rb')) is not None)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"
+
+
+def test_messages_show_the_names_of_generated_ones(tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES)
+    with idlc.Recording(path) as recording:
+        message = next(iter(recording["/imu"])).message
+        assert repr(recording).splitlines()[1:] == [
+            "/imu           sensor_msgs/msg/Imu         20",
+            "/joints        sensor_msgs/msg/JointState  20",
+            "/camera/image  sensor_msgs/msg/Image       20",
+        ]
+        assert repr(recording["/imu"]) == f"</imu of {path}, sensor_msgs/msg/Imu>"
+    assert repr(message).startswith("sensor_msgs.msg.Imu(header=std_msgs.msg.Header(stamp=builtin")
+    assert "loaded" not in repr(message)
+    assert "loaded" not in pretty(message)
+    assert inspect.getsource(type(message)).startswith("@_idlc.dataclass")
+    assert pickle.loads(pickle.dumps(message)) == message
+
+
+def test_help_and_type_checkers_see_what_is_there(tmp_path):
+    assert {"Recording", "load"} <= set(dir(idlc))
+    assert "class Recording" in pydoc.plain(pydoc.render_doc(idlc))
+    code = (
+        "from idlc import Recording, load\n"
+        "topic = Recording('a.mcap')['/x']\n"
+        "for pair in topic.messages(bytes):\n"
+        "    time, message = pair\n"
+        "    reveal_type((topic, time, message, pair.message))\n"
+        "reveal_type(load('a.mcap'))\n"
+    )
+    (tmp_path / "mypy.ini").write_text("[mypy]\n", encoding="utf-8")
+    words = ["--strict", "--config-file", str(tmp_path / "mypy.ini"), "-c", code]
+    said, problems, status = mypy.api.run(words)
+    assert status == 0, said + problems
+    module = "idlc.driver.recordings"
+    assert f"({module}.recording.RecordedTopic, int, bytes, bytes)" in said
+    assert f'"{module}.load.Loaded"' in said
 
 
 def test_idlc_itself_stays_cheap_to_import():

@@ -33,6 +33,11 @@ import idlc
 _spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
 __path__ += _spec.submodule_search_locations
 exec(_spec.loader.get_code(_spec.name))
+
+from . import objects
+
+# messages show names as those of generated packages do
+objects.HIDDEN = __name__.rsplit(".", 2)[0] + "."
 '''
 
 

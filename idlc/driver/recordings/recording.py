@@ -66,8 +66,10 @@ class Recording(Mapping[str, "RecordedTopic"]):
         return len({topic.name for topic in self.topics})
 
     def __repr__(self) -> str:
-        lines = [f"  {one.name}  {one.type}  {one.count:,}" for one in self.topics]
-        return "\n".join([f"<Recording {self._container.name}", *lines]) + ">"
+        rows = [(one.name, one.type, f"{one.count:,}") for one in self.topics]
+        name, kind, count = (max((len(row[at]) for row in rows), default=0) for at in range(3))
+        lines = [f"{row[0]:{name}}  {row[1]:{kind}}  {row[2]:>{count}}" for row in rows]
+        return "\n".join([f"<Recording {self._container.name}>", *lines])
 
     def close(self) -> None:
         """Close the files. Columns and messages that were made stay as they are."""
@@ -99,6 +101,9 @@ class RecordedTopic(Selection):
         super().__init__(topic, include)
         self._container = container
         self._window = window
+
+    def __repr__(self) -> str:
+        return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
 
     def between(self, start: Any = None, end: Any = None) -> RecordedTopic:
         """Return those of a time: from `start`, until before `end`.
