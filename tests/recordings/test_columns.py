@@ -77,6 +77,23 @@ def test_options_choose_rows_and_columns(recording):
     assert found.to_pylist() == table(recording, "/imu", flat=False, datetimes=False).to_pylist()
 
 
+@pytest.mark.parametrize("words", [["drive_*.mcap"], ["drive_0.mcap", "drive_1.mcap"]])
+def test_several_recordings_are_read_as_one(words, here):
+    for number in range(2):
+        made.by_mcap(here / f"drive_{number}.mcap", MESSAGES[number * 30 : number * 30 + 30])
+    assert run(*words, "/imu", "-o", "a.parquet") == 0
+    found = parquet.read_table("a.parquet")["log_time"].cast("int64").to_pylist()
+    assert found == [one.log_time for one in MESSAGES if one.topic == "/imu"]
+
+
+def test_a_folder_of_bags_is_none(here, capfd):
+    made.by_rosbags(here / "bags/first", MESSAGES, "db3")
+    assert run("bags", "/imu", "-o", "a.csv") == 1
+    assert "name a bag in it, such as `bags/first`" in capfd.readouterr().err
+    assert run("nothing_*.mcap", "-o", "a.csv") == 1
+    assert "`nothing_*.mcap` cannot be read" in capfd.readouterr().err
+
+
 def test_a_pipe_gets_the_stream_format(recording):
     command = [sys.executable, "-m", "idlc", "columns", str(recording), "/imu"]
     done = subprocess.run(command, capture_output=True, check=True)

@@ -67,16 +67,20 @@ Example:
 def command(wanted: str, fields: str | None, **given: Any) -> int:
     """Write topics of a recording as columns, for pandas, DuckDB and others.
 
-    REC is an .mcap or .db3 file, or the folder of a bag. Without TOPIC, all topics are written.
+    REC is an .mcap or .db3 file, or the folder of a bag; several, or a pattern such as
+    'drive_*.mcap', are read as one. Without TOPIC, all topics are written.
     Each row has the time when a message was recorded, and a column for each of its fields.
     """
     from idlc.cli import output, progress
     from idlc.diagnostics.report import Report
     from idlc.driver.recordings.columns import ColumnsOptions, columns
+    from idlc.recordings.find import divided, expanded
 
     report = Report()
     names = None if fields is None else tuple(one.strip() for one in fields.split(","))
-    asked = ColumnsOptions(wanted, fields=names, **given)
+    recordings, topics = divided(given.pop("topics"))
+    paths = (*expanded(wanted), *recordings)
+    asked = ColumnsOptions(paths or (wanted,), tuple(topics), fields=names, **given)
     with progress.shown(sys.stderr) as tell:
         written = columns(asked, report, tell)
     for one in written:

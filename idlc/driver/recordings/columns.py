@@ -10,9 +10,10 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.driver.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.driver.recordings.recording import RecordedTopic, Recording, UnknownTopicError
+from idlc.driver.recordings.types import NAMED
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
 
@@ -38,9 +39,9 @@ Progress = Callable[[str, int, int], None]
 
 
 class ColumnsOptions(NamedTuple):
-    """What `idlc columns` was asked to do."""
+    """What `idlc columns` was asked to do; several recordings are read as one."""
 
-    recording: str
+    recordings: tuple[str, ...]
     topics: tuple[str, ...] = ()
     out: str = STDOUT
     style: str | None = None
@@ -77,10 +78,15 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     A topic that cannot be read does not keep others from being written.
     """
     done: list[Written] = []
-    path, check, include = options.recording, options.check, options.include
+    paths, check, include = options.recordings, options.check, options.include
     with (
         _problems(options, report),
-        Recording(path, index=options.use_index, check=check, include=include) as recording,
+        Recording(
+            paths[0] if len(paths) == 1 else paths,
+            index=options.use_index,
+            check=check,
+            include=include,
+        ) as recording,
     ):
         report.notes += recording.notes
         with _warnings(report):
@@ -98,10 +104,10 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
     except UnknownFieldError as error:
-        hint = f"`idlc show {options.recording} {error.topic}` lists the fields"
+        hint = f"`idlc show {options.recordings[0]} {error.topic}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
-        where = options.recording
+        where = ", ".join(options.recordings)
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
 
 
@@ -111,11 +117,15 @@ def _warnings(report: Report) -> Iterator[None]:
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         yield
-    for one in found:
-        if issubclass(one.category, OtherDefinitionWarning):
-            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(one.message)))
-        if issubclass(one.category, MissingDefinitionWarning):
-            report.add(codes.MISSING_DEFINITION.of("", str(one.message), hint=BORROWED))
+    missing: dict[str, list[str]] = {}
+    for message in (one.message for one in found):
+        if isinstance(message, OtherDefinitionWarning):
+            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+        if isinstance(message, MissingDefinitionWarning):
+            missing.setdefault(message.message, []).append(f"`{message.topic}`")
+    for problem, topics in missing.items():
+        text = f"{first_few(topics, NAMED)}: {problem}"
+        report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:

@@ -108,8 +108,7 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
 
         models, told = topic_models(topic, include)
         for one in told:
-            text = f"`{topic.name}`: {one.message}"
-            warnings.warn(text, MissingDefinitionWarning, stacklevel=2)
+            warnings.warn(MissingDefinitionWarning(topic.name, one.message), stacklevel=2)
         # what was borrowed from around here may be another thing tomorrow
         key = _kept(models, "" if list(told) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
@@ -125,6 +124,14 @@ class OtherDefinitionWarning(UserWarning):
 
 class MissingDefinitionWarning(UserWarning):
     """A recording does not define a type in it; what is known here by its name is used."""
+
+    def __init__(self, topic: str, message: str) -> None:
+        super().__init__(topic, message)
+        self.topic = topic
+        self.message = message
+
+    def __str__(self) -> str:
+        return f"`{self.topic}`: {self.message}"
 
 
 def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:

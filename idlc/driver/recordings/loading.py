@@ -78,6 +78,7 @@ def topic_models(topic: Topic, include: tuple[str, ...]) -> tuple[Models, Report
     if not types.topics or types.errors or told.had_errors:
         first = min([*types.errors, *told], key=lambda one: one.severity, default=None)
         why = first.message if first else "its type is not known"
+        why = why.removeprefix(f"`{topic.name}` is left out: ")
         raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
     return types.models, told
 
