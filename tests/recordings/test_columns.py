@@ -15,6 +15,7 @@ from pyarrow import parquet
 
 import idlc
 from idlc.cli.main import main
+from tests.support import recorded_text
 from tests.support import recordings as made
 
 MESSAGES = made.messages()
@@ -84,6 +85,22 @@ def test_several_recordings_are_read_as_one(words, here):
     assert run(*words, "/imu", "-o", "a.parquet") == 0
     found = parquet.read_table("a.parquet")["log_time"].cast("int64").to_pylist()
     assert found == [one.log_time for one in MESSAGES if one.topic == "/imu"]
+
+
+def test_a_name_may_stand_for_topics_of_several_types(here, capfd):
+    text = "@ /x a_msgs/msg/A\nint8 a\n@ /x a_msgs/msg/B\nuint8 a\n@ /y a_msgs/msg/A\nint8 a\n"
+    recorded_text.write("rec.mcap", text, {"/x": 1, "/y": 2})
+    assert main(["show", "rec.mcap", "--format", "json"]) == 0
+    lines = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert [one["name"] for one in lines] == ["/x", "/x", "/y"]
+    assert lines[0]["hash"] == lines[2]["hash"] != lines[1]["hash"]
+    assert run("rec.mcap", "-o", "out/") == 1
+    said = capfd.readouterr().err
+    assert "`/x` has messages of several definitions, of a_msgs/msg/A, a_msgs/msg/B" in said
+    assert "/y: 2 messages → out/y.parquet" in said
+    assert [path.name for path in (here / "out").iterdir()] == ["y.parquet"]
+    assert run("rec.mcap", "/x", "/y", "-o", "other/") == 1
+    assert not (here / "other").exists()
 
 
 def test_a_folder_of_bags_is_none(here, capfd):

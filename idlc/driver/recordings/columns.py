@@ -6,7 +6,7 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
@@ -130,18 +130,23 @@ def _warnings(report: Report) -> Iterator[None]:
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:
     """Return what there is to do; empty if it cannot be done."""
-    names = options.topics or tuple(recording)
-    topics = [recording[name].between(options.start, options.end) for name in dict.fromkeys(names)]
+    names = tuple(dict.fromkeys(options.topics or recording))
+    topics = []
+    for name in names:
+        # what was not asked for by its name does not keep others from being written
+        with nullcontext() if options.topics else _problems(options, report):
+            topics.append(recording[name].between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
     problem = _problem(jobs, options)
     if problem:
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
         return ()
-    taken = [job.path for job in jobs if job.path != STDOUT and export.exists(job.path)]
-    for path in [] if options.force else taken:
+    paths = [] if options.force else [job.path for job in jobs if job.path != STDOUT]
+    taken = [path for path in paths if export.exists(path)]
+    for path in taken:
         report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint="--force replaces it"))
-    return () if report.had_errors else jobs
+    return () if taken else jobs
 
 
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:

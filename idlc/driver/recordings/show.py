@@ -38,8 +38,9 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     for version in versions(recording.topics) if recording else ():
         types = recorded_types(version, around, scope, Report())
         own = (one for one in types.topics if one.interface in types.texts)
-        hashes = {one.recorded.topic.name: types.hash(one) for one in own}
-        found += [_facts(one, hashes.get(one.topic.name), around) for one in version.topics]
+        # a name may stand for several topics, of different types
+        hashes = {id(one.recorded): types.hash(one) for one in own}
+        found += [_facts(one, hashes.get(id(one)), around) for one in version.topics]
     return sorted(found, key=lambda one: (one.name, one.type_name))
 
 
