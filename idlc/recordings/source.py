@@ -68,6 +68,17 @@ def source_of(place: Any) -> Source:
     """Return a file at a path, at a URL that fsspec can open, or of an object that is one."""
     if is_local(place):
         return MappedFile(Path(place))
+    name = _name(place)
+    try:
+        return OpenedFile(_opened(place), name)
+    except RecordingError:
+        raise
+    except Exception as error:  # each kind of store raises its own
+        raise RecordingError(f"`{name}` cannot be read: {_told(error)}") from None
+
+
+def _opened(place: Any) -> Any:
+    """Return a file object of a URL, of an fsspec file, or the one that is given."""
     if isinstance(place, str):
         try:
             import fsspec
@@ -75,11 +86,14 @@ def source_of(place: Any) -> Source:
             message = f"`{place}` is opened by fsspec, which is not installed"
             raise RecordingError(message, "pip install fsspec") from None
         place = fsspec.open(place, "rb")
-    opened = place.open() if hasattr(place, "open") else place
-    try:
-        return OpenedFile(opened, _name(place))
-    except OSError as error:
-        raise RecordingError(f"`{place}` cannot be read: {error}") from None
+    return place.open() if hasattr(place, "open") else place
+
+
+def _told(error: Exception) -> str:
+    """Return what an error says, or is."""
+    if isinstance(error, FileNotFoundError):
+        return "No such file or directory"
+    return str(error) or type(error).__name__
 
 
 def _name(place: Any) -> str:
@@ -102,10 +116,7 @@ class OpenedFile:
         self.name = name
         self._file = file
         self._lock = threading.Lock()
-        try:
-            self.size = int(file.seek(0, 2))
-        except (OSError, ValueError) as error:
-            raise RecordingError(f"`{name}` cannot be read: {error}") from None
+        self.size = int(file.seek(0, 2))
 
     def view(self, start: int, size: int) -> memoryview:
         """Return bytes that are read now."""
@@ -114,8 +125,8 @@ class OpenedFile:
             with self._lock:
                 self._file.seek(start)
                 found = self._file.read(size)
-        except (OSError, ValueError) as error:
-            raise RecordingError(f"`{self.name}` cannot be read: {error}") from None
+        except Exception as error:  # each kind of store raises its own
+            raise RecordingError(f"`{self.name}` cannot be read: {_told(error)}") from None
         if len(found) != size:
             raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
         return memoryview(found)

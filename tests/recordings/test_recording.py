@@ -3,6 +3,7 @@
 import inspect
 import pickle
 import pydoc
+import re
 import subprocess
 import sys
 from datetime import datetime, timedelta, timezone
@@ -17,6 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 import idlc
+from idlc.cli.main import main
 from idlc.recordings.container import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import recordings as made
@@ -132,6 +134,21 @@ def test_what_fsspec_opens_is_read(place, tmp_path):
             assert len(parts) >= 5
             tables = [part.to_arrow() for part in parts]
             assert pa.concat_tables(tables).equals(local["/imu"].to_arrow())
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("memory://nothing.mcap", "`memory://nothing.mcap` cannot be read: No such file"),
+        ("nosuch://a.mcap", "Protocol not known: nosuch"),
+        ("https://localhost:1/a.mcap", "`https://localhost:1/a.mcap` cannot be read: "),
+    ],
+)
+def test_what_fsspec_cannot_open_is_said(place, said, capsys):
+    with pytest.raises(RecordingError, match=re.escape(said)):
+        idlc.Recording(place)
+    assert main(["columns", place, "-o", "a.csv"]) == 1
+    assert said in capsys.readouterr().err
 
 
 def test_a_time_is_a_number_a_text_or_a_date(tmp_path):
