@@ -35,6 +35,7 @@ def folder(tmp_path_factory):
 def run(folder, *words):
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
     env = {**os.environ, "PYTHONPATH": path, "DO_NOT_TRACK": "1", "DAFT_ANALYTICS_ENABLED": "0"}
+    env["MPLBACKEND"] = "agg"
     command = [sys.executable, *words]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder, env=env)
     assert done.returncode == 0, done.stderr
