@@ -107,8 +107,12 @@ def outcome(work):
 
 
 def exhausted(container, topic):
-    for _ in container.messages(topic, ALWAYS):
-        pass
+    """Read all messages, which lie in their buffer and not in each other."""
+    for some in container.messages(topic, ALWAYS):
+        assert some.starts[0] >= 0
+        assert some.stops[-1] <= len(some.buffer)
+        assert (some.starts <= some.stops).all()
+        assert (some.stops[:-1] <= some.starts[1:]).all()
 
 
 def walk(path, kinds, **options):
