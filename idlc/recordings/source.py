@@ -15,6 +15,8 @@ class Source(Protocol):
 
     name: str
     size: int
+    #: The whole file, if it is read where it is.
+    mapped: memoryview | None
 
     def view(self, start: int, size: int) -> memoryview:
         """Return so many bytes; raise RecordingError if the file has fewer."""
@@ -40,12 +42,13 @@ class MappedFile:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise RecordingError(f"`{path}` cannot be read: {reason}") from None
-        self._bytes = memoryview(self._map or b"")
+        self.mapped: memoryview | None = memoryview(self._map or b"")
 
     def view(self, start: int, size: int) -> memoryview:
         """Return a view of the mapped file."""
         within(self, start, size)
-        return self._bytes[start : start + size]
+        assert self.mapped is not None
+        return self.mapped[start : start + size]
 
     def forget(self, start: int, stop: int) -> None:
         """Unmap pages, or the whole of a long file would count as this process's memory."""
@@ -55,7 +58,7 @@ class MappedFile:
 
     def close(self) -> None:
         """Forget the map, which lives as long as views of it."""
-        self._map, self._bytes = None, memoryview(b"")
+        self._map, self.mapped = None, memoryview(b"")
         self.size = 0
 
 
@@ -97,6 +100,8 @@ def first_bytes(path: Path, size: int = 16) -> bytes:
 
 class OpenedFile:
     """A binary file object that can seek, such as fsspec's on an object store."""
+
+    mapped: memoryview | None = None
 
     def __init__(self, file: Any, name: str) -> None:
         self.name = name

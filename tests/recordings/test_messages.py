@@ -17,7 +17,7 @@ SMALL = 3000
 
 
 def read(path, topic, window=None, **options):
-    """Return what is read of a topic, by way of messages of one buffer."""
+    """Return what is read of a topic, by way of all of them as one."""
     with open_recording(path, **options) as container:
         (found,) = (one for one in container.topics if one.name == topic)
         parts = list(container.messages(found, Window(*(window or ()))))

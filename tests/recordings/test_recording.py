@@ -1,5 +1,6 @@
 """Values of recordings: those that other readers find, as objects, columns and tables."""
 
+import io
 import pickle
 import subprocess
 import sys
@@ -109,6 +110,23 @@ def test_several_files_are_one_recording(tmp_path):
         ]
 
 
+def test_files_of_different_kinds_are_one_recording(tmp_path):
+    """Their messages are kept in different ways, which shows nowhere."""
+    bag = made.by_rosbags(tmp_path / "bag", MESSAGES[30:60], "db3")
+    other = made.by_mcap(tmp_path / "b.mcap", MESSAGES[60:], "zstd", chunk_size=3000)
+    paths = [made.by_mcap(tmp_path / "a.mcap", MESSAGES[:30]), bag, other]
+    with idlc.Recording(paths) as recording, idlc.Recording(bag) as rows:
+        for name, topic in recording.items():
+            values = [message.to_dict() for _, message in topic]
+            for columns in (topic.to_columns(), topic.to_arrow().to_pandas()):
+                times = [one.log_time for one in MESSAGES if one.topic == name]
+                assert np.asarray(columns["log_time"]).astype(np.int64).tolist() == times
+            found = topic.to_columns().to_list()
+            assert [{k: v for k, v in row.items() if k in values[0]} for row in found] == values
+            nothing = rows[name].between(0, 0)
+            assert len(nothing.to_columns()) == nothing.to_arrow().num_rows == 0
+
+
 @pytest.mark.parametrize("place", ["url", "fsspec file", "file object"])
 def test_what_fsspec_opens_is_read(place, tmp_path):
     import fsspec
@@ -128,6 +146,23 @@ def test_what_fsspec_opens_is_read(place, tmp_path):
             assert len(parts) >= 5
             tables = [part.to_arrow() for part in parts]
             assert pa.concat_tables(tables).equals(local["/imu"].to_arrow())
+
+
+def test_of_a_file_object_no_more_is_read_than_is_needed(tmp_path):
+    class Counted(io.FileIO):
+        done = 0
+
+        def read(self, size=-1):
+            found = super().read(size)
+            self.done += len(found)
+            return found
+
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES * 20, chunk_size=3000)
+    with Counted(path) as file, idlc.Recording(file) as recording:
+        opening = file.done
+        first, *_ = recording["/imu"].parts(1)
+        assert first.to_arrow().num_rows
+        assert file.done - opening < 10_000 < path.stat().st_size // 10
 
 
 def test_a_time_is_a_number_a_text_or_a_date(tmp_path):
