@@ -10,7 +10,8 @@
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
-#   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind
+#   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind, with
+#                       twenty times as many recordings
 
 PYTHON ?= python3
 ROS ?= $(if $(filter Linux-x86_64,$(shell uname -s)-$(shell uname -m)),yes,no)
@@ -105,6 +106,7 @@ test-vscode: $(TEST_ENV)/installed vscode ## try the extension in a real VS Code
 fuzz: $(TEST_ENV)/installed ## search for input that breaks idlc, for an hour or more
 	IDLC_LONG=1 IDLC_FUZZ=$(FUZZ) IDLC_FUZZ_SEED=$(SEED) IDLC_LIVE_SEED=$(SEED) IDLC_LIVE_FILES=$(FUZZ) \
 	    $(TEST_ENV)/bin/python -m pytest -n 2 $(SELECTION) tests/hardening/test_fuzz.py \
+	    tests/hardening/test_fuzz_recordings.py tests/recordings/test_hostile_containers.py \
 	    tests/hardening/test_limits.py tests/runtime/test_hostile.py \
 	    $(if $(filter no,$(ROS)),,tests/ros/test_verdict_live.py) $(ARGS)
 	@if $(TEST_ENV)/bin/python $(PIP_INSTALL) atheris; then \

@@ -14,6 +14,7 @@ from benchmarks import (
     compiling,
     editing,
     imports,
+    recordings,
     report,
     results,
     starting,
@@ -25,7 +26,7 @@ from benchmarks.work import Work, in_memory
 
 GROUPS = (
     *(codec, batches, columns, classes, imports),
-    *(compiling, starting, editing, topics),
+    *(recordings, compiling, starting, editing, topics),
 )
 
 

@@ -73,6 +73,7 @@ def views(work: Work, name: str):
     others = {
         label(who, "deserialize"): Repeated(implementation.decoder(name, raw))
         for who, implementation in work.implementations.items()
+        if work.message(who, name) is not None
     }
     memcpy = {"memcpy": Repeated(lambda: bytes(payload))}
     return {IDLC: Repeated(lambda: kind.deserialize(raw, copy=False))} | others | memcpy

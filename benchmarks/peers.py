@@ -7,12 +7,14 @@ import contextlib
 import io
 import json
 import re
+import shutil
 import sys
 from collections.abc import Callable
 from functools import cached_property, lru_cache
 from importlib import import_module, metadata, util
 from pathlib import Path
 
+from benchmarks import jit
 from benchmarks.measure import IDLC
 from benchmarks.messages import MESSAGES, PACKAGES, Maker
 from idlc.cli.main import main as idlc_main
@@ -29,12 +31,17 @@ PEERS = {
     "rosidl": ("rosidl_generator_py", "ros-rosidl-generator-py"),
     "mcap-ros2": ("mcap_ros2", "mcap-ros2-support"),
     "cyclonedds": ("cyclonedds", "cyclonedds"),
+    "cydr": ("cydr", "cydr"),
+    "rerun-sdk": ("rerun", "rerun-sdk"),
+    "roboto-mcap-codec": ("mcap_codec", "roboto-mcap-codec"),
     "ros2-pkg-create": ("ros2_pkg_create", "ros2-pkg-create"),
 }
+COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
 def installed(peer: str) -> bool:
-    return util.find_spec(PEERS[peer][0]) is not None
+    """Return whether a peer can be used; cydr compiles its codecs by a C compiler."""
+    return util.find_spec(PEERS[peer][0]) is not None and (peer != "cydr" or bool(COMPILER))
 
 
 def versions() -> dict[str, str]:
@@ -205,7 +212,37 @@ class Cyclonedds(Implementation):
         return lambda: kind.deserialize(raw)
 
 
+class Cydr(Implementation):
+    """cydr, of which codecs are machine code; it has no sequences of structures."""
+
+    def __init__(self, folder: Path) -> None:
+        self.classes = jit.Classes(folder)
+
+    def class_of(self, row: str):
+        facts = json.loads(run_idlc("show", MESSAGES[row].type, "--format", "json"))
+        return self.classes.of([*facts["structures"], *facts["uses"]])
+
+    def message(self, row, raw):
+        try:
+            return self.class_of(row).deserialize(raw)
+        except KeyError:
+            return None
+
+    def encoder(self, row, message):
+        return lambda: message.serialize()
+
+    def decoder(self, row, raw):
+        kind = self.class_of(row)
+        return lambda: kind.deserialize(raw)
+
+
 def implementations(generated: Path) -> dict[str, Implementation]:
     """Return all that are installed; idlc comes first."""
-    peers = {"rclpy": Rclpy, "rosbags": Rosbags, "mcap-ros2": McapRos2, "cyclonedds": Cyclonedds}
+    peers = {
+        "rclpy": Rclpy,
+        "rosbags": Rosbags,
+        "mcap-ros2": McapRos2,
+        "cyclonedds": Cyclonedds,
+        "cydr": lambda: Cydr(generated.parent / "cydr"),
+    }
     return {IDLC: Idlc(generated)} | {name: peers[name]() for name in peers if installed(name)}

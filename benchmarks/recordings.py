@@ -1,24 +1,29 @@
-"""One topic of a recording → a table of Arrow: python -m benchmarks.recordings.
+"""One topic of a recording → a table of Arrow, or what a reader has instead.
 
-CPU seconds of a process from opening the file, the best of some rounds. Each reader
-has a process of its own, in which it has read the file once when the clock begins. The goals: ahead
-of rerun without compression, within 1.2 of its time with zstd, and five times as fast as rosbags.
+CPU seconds from opening the file. Each reader has a process of its own, in which it has read the
+file once when the clock begins. What cannot be faster, whoever reads, stands beside it: one copy of
+the messages to memory that nobody had yet, or decompressing the chunks into memory that is there.
 """
 
-import argparse
-import json
+import os
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from functools import lru_cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measure import IDLC, Candidate, Goal, Row
+from benchmarks.work import Work
+
 TOPICS = {"/imu": "Imu", "/scan": "LaserScan", "/image": "Image"}
 LABELS = ("none", "zstd", "lz4", "db3")
+GROUP = "recording"
+#: What readers make their tables of at once, about.
+PIECE = 1 << 24
 START = 1_700_000_000 * 10**9
 #: How many messages of each topic there are, and how far apart: about 220 MB.
 COUNTS = {"/imu": (60_000, 5_000_000), "/scan": (6_000, 50_000_000), "/image": (180, 1_666_666_667)}
@@ -71,46 +76,49 @@ def messages(share: int) -> Iterator[tuple[int, str, str, bytes]]:
         yield time_, topic, name, bytes(raw)
 
 
-def write(folder: Path, share: int, labels: Sequence[str]) -> dict[str, Path]:
-    """Write the recording in each compression of MCAP, and as .db3."""
+@lru_cache
+def written(folder: Path, label: str, share: int) -> Path:
+    """Write the recording in a compression of MCAP, or as .db3."""
+    if label == "db3":
+        return written_db3(folder / label, share)
     from mcap.writer import CompressionType, Writer
-    from rosbags.rosbag2 import StoragePlugin
-    from rosbags.rosbag2 import Writer as BagWriter
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_JAZZY)
-    found = list(messages(share))
-    paths = {}
-    for label in labels[:3]:
-        paths[label] = folder / f"{label}.mcap"
-        with paths[label].open("wb") as file:
-            writer = Writer(file, compression=CompressionType[label.upper()])
-            writer.start(profile="ros2")
-            channels: dict[str, int] = {}
-            for time_, topic, name, raw in found:
-                if topic not in channels:
-                    text = store.generate_msgdef(name, ros_version=2)[0].encode()
-                    schema = writer.register_schema(name, "ros2msg", text)
-                    channels[topic] = writer.register_channel(topic, "cdr", schema)
-                writer.add_message(channels[topic], time_, raw, time_)
-            writer.finish()
-    if "db3" not in labels:
-        return paths
-    paths["db3"] = folder / "bag"
-    with BagWriter(paths["db3"], version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+    path = folder / f"{label}.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType[label.upper()])
+        writer.start(profile="ros2")
+        channels: dict[str, int] = {}
+        for time_, topic, name, raw in messages(share):
+            if topic not in channels:
+                text = store.generate_msgdef(name, ros_version=2)[0].encode()
+                schema = writer.register_schema(name, "ros2msg", text)
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], time_, raw, time_)
+        writer.finish()
+    return path
+
+
+def written_db3(path: Path, share: int) -> Path:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
         connections = {
             topic: bag.add_connection(topic, f"sensor_msgs/msg/{name}", typestore=store)
             for topic, name in TOPICS.items()
         }
-        for time_, topic, _, raw in found:
+        for time_, topic, _, raw in messages(share):
             bag.write(connections[topic], time_, raw)
-    return paths
+    return path
 
 
 # who reads it: each returns how many messages it found
 
 
-def idlc(path: str, topic: str) -> int:
+def by_idlc(path: str, topic: str) -> int:
     from idlc import Recording
 
     with Recording(path) as recording:
@@ -162,62 +170,115 @@ def mcap_ros2(path: str, topic: str) -> int:
         return len(list(reader.iter_decoded_messages(topics=[topic])))
 
 
-#: Each reader, the module that it needs, and what it cannot read.
+# what nobody can do without
+
+
+@lru_cache
+def payload(path: str, topic: str) -> np.ndarray:
+    """Return the bytes of all messages of a topic."""
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([Path(path)]) as reader:
+        wanted = [one for one in reader.connections if one.topic == topic]
+        raws = [bytes(raw) for _, _, raw in reader.messages(connections=wanted)]
+    return np.frombuffer(b"".join(raws), np.uint8)
+
+
+def copy(path: str, topic: str) -> int:
+    """Copy them to memory that is asked for piece by piece, as readers do."""
+    whole = payload(path, topic)
+    return sum(map(len, [whole[at : at + PIECE].copy() for at in range(0, len(whole), PIECE)]))
+
+
+@lru_cache
+def compressed(path: str) -> list:
+    """Return the chunks of a file, all of which have messages of each topic."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader
+
+    np.ones(PIECE, np.uint8)  # once it is free, malloc has memory at hand for each chunk
+    with Path(path).open("rb") as file:
+        records = StreamReader(file, emit_chunks=True).records
+        return [one for one in records if isinstance(one, Chunk)]
+
+
+def decompression(path: str, _topic: str) -> int:
+    """Decompress one chunk after the other, of which none is kept."""
+    import zstandard
+    from lz4 import frame
+
+    whole = zstandard.ZstdDecompressor()
+    functions = {"zstd": whole.decompress, "lz4": frame.decompress}
+    return sum(len(functions[one.compression](one.data)) for one in compressed(path))
+
+
+#: Each reader, the module that it needs, and what it reads.
+MCAP = ("none", "zstd", "lz4")
 READERS: dict[str, tuple[Callable[[str, str], int], str, tuple[str, ...]]] = {
-    "idlc": (idlc, "pyarrow", ()),
-    "rerun-sdk": (rerun, "rerun", ("db3",)),
-    "roboto-mcap-codec": (roboto, "mcap_codec", ("db3",)),
-    "rosbags": (rosbags, "rosbags", ()),
-    "mcap-ros2-support": (mcap_ros2, "mcap_ros2", ("db3",)),
+    IDLC: (by_idlc, "pyarrow", LABELS),
+    "rerun-sdk": (rerun, "rerun", MCAP),
+    "roboto-mcap-codec": (roboto, "mcap_codec", MCAP),
+    "rosbags": (rosbags, "rosbags", LABELS),
+    "mcap-ros2": (mcap_ros2, "mcap_ros2", MCAP),
+    "copy": (copy, "rosbags", LABELS),
+    "decompression": (decompression, "mcap", ("zstd", "lz4")),
 }
 
 
-def measured(who: str, path: Path, topic: str, rounds: int) -> float:
-    """Return the CPU seconds that a reader takes, in a process of its own."""
-    words = ["-m", "benchmarks.recordings", "--one", who, str(path), topic, str(rounds)]
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return float(json.loads(done.stdout.splitlines()[-1]))
+# rows
 
 
-def one(who: str, path: str, topic: str, rounds: int) -> float:
-    """Return the best of some rounds, after one that imports and compiles."""
-    read = READERS[who][0]
-    read(path, topic)
-    best = float("inf")
-    for _ in range(rounds):
+def rows(work: Work) -> Iterator[Row]:
+    """Yield a row for each file and topic.
+
+    The goal is to be five times as fast as rosbags; a .db3 file is read by SQLite, whoever asks.
+    """
+    for label in LABELS:
+        goal = Goal(times=1) if label == "db3" else Goal(at_most=0.2, than="rosbags")
+        for topic, name in TOPICS.items():
+            yield Row(
+                f"{GROUP} {label}", name, partial(readers, work, label, topic), goal, rounds=3
+            )
+
+
+def readers(work: Work, label: str, topic: str) -> dict[str, Candidate]:
+    folder = work.folder / GROUP
+    folder.mkdir(exist_ok=True)
+    path = written(folder, label, 100 if work.quick else 1)
+    return {
+        who: Process(who, path, topic)
+        for who, (_, module, labels) in READERS.items()
+        if label in labels and find_spec(module)
+    }
+
+
+class Process:
+    """The candidate that reads in a process of its own, which has done so once before."""
+
+    def __init__(self, who: str, path: Path, topic: str) -> None:
+        words = [sys.executable, "-m", "benchmarks.recordings", who, str(path), topic]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True)
+        self()
+
+    def __call__(self) -> float:
+        print(file=self._process.stdin, flush=True)
+        return float(self._process.stdout.readline())
+
+    def __del__(self) -> None:
+        self._process.communicate()
+
+
+def main(who: str, path: str, topic: str) -> None:
+    """Read whenever there is a line of input, and print the seconds that it took."""
+    output = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # where readers may print whatever they want
+    for _ in sys.stdin:
         begin = time.process_time()
-        count = read(path, topic)
-        best = min(best, time.process_time() - begin)
+        count = READERS[who][0](path, topic)
+        print(time.process_time() - begin, file=output, flush=True)
         assert count
-    return best
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.recordings", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="one row of few messages, once")
-    parser.add_argument("--one", nargs=4, metavar="WORD", help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.one:
-        who, path, topic, rounds = given.one
-        print(json.dumps(one(who, path, topic, int(rounds))))
-        return
-    readers = [who for who, (_, module, _) in READERS.items() if find_spec(module)]
-    print("| | " + " | ".join(readers) + " |")
-    print("|---|" + "---:|" * len(readers))
-    with tempfile.TemporaryDirectory(prefix="idlc-recordings-") as folder:
-        labels = LABELS[: 1 if given.quick else None]
-        topics = list(TOPICS.items())[: 1 if given.quick else None]
-        for label, path in write(Path(folder), 100 if given.quick else 1, labels).items():
-            for topic, name in topics:
-                cells = [
-                    ""
-                    if label in READERS[who][2]
-                    else f"{measured(who, path, topic, 1 if given.quick else 5):.3f}"
-                    for who in readers
-                ]
-                print(f"| {label} {name} | " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -1,9 +1,10 @@
-"""How results are shown: in the terminal, in README.md and in docs/performance.md."""
+"""How results are shown: in the terminal, in README.md and in docs."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 
+from benchmarks import recordings
 from benchmarks.measure import IDLC, Result
 from benchmarks.results import REFERENCES, Run, standing
 
@@ -72,15 +73,31 @@ def readme_part(run: Run) -> str:
 
 
 def full_table(run: Run) -> str:
-    """Return every row, with every implementation's time and how many times idlc's that is."""
-    used = dict.fromkeys(who for one in run.results for who in one.times)
-    peers = [who for who in used if who not in (IDLC, *REFERENCES)]
+    """Return every row but those of recordings, and how many times idlc's time others take."""
+    found = [one for one in run.results if not of_recordings(one)]
+    return table(found, REFERENCES, run)
+
+
+def recordings_table(run: Run) -> str:
+    """Return the rows of recordings, what nobody can do without among the others."""
+    return table(filter(of_recordings, run.results), (), run)
+
+
+def of_recordings(result: Result) -> bool:
+    return result.group.startswith(recordings.GROUP)
+
+
+def table(found: Iterable[Result], left_out: Collection[str], run: Run) -> str:
+    """Return rows, with every implementation's time and how many times idlc's that is."""
+    found = list(found)
+    used = dict.fromkeys(who for one in found for who in one.times)
+    peers = [who for who in used if who not in (IDLC, *left_out)]
     lines = [
         f"| | idlc | quartiles | {' | '.join(peers)} | goal | |",
         "|---|---:|---:|" + "---:|" * len(peers) + "---|---|",
     ]
-    for one in run.results:
-        mine, found = one.times[IDLC], standing(one)
+    for one in found:
+        mine, said = one.times[IDLC], standing(one)
         cells = [
             f"{amount(one.times[who].median)}, {one.times[who].median / mine.median:.1f}×"
             if who in one.times
@@ -89,12 +106,16 @@ def full_table(run: Run) -> str:
         ]
         spread = f"{amount(mine.low)} to {amount(mine.high)}"
         words = [f"{one.group} {one.name}", amount(mine.median), spread, *cells]
-        lines.append("| " + " | ".join([*words, found.said, found.verdict]) + " |")
+        lines.append("| " + " | ".join([*words, said.said, said.verdict]) + " |")
     return "\n".join([*lines, "", head(run) + "."])
 
 
 #: A document, and what stands in it between `<!-- benchmarks -->` and `<!-- end -->`.
-PARTS = {ROOT / "README.md": readme_part, ROOT / "docs" / "performance.md": full_table}
+PARTS = {
+    ROOT / "README.md": readme_part,
+    ROOT / "docs" / "performance.md": full_table,
+    ROOT / "docs" / "recorded-data.md": recordings_table,
+}
 PART = re.compile(r"(?<=<!-- benchmarks -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 

@@ -17,12 +17,16 @@ KEPT = Path(__file__).with_name("results.json")
 #: Candidates that compete with nobody.
 REFERENCES = {
     "bare interpreter",
+    "copy",
+    "decompression",
+    "deserialize_many",
     "deserialize",
     "empty module",
     "idlc cold",
     "join of the buffers",
     "memcpy",
     "serialize",
+    "to_arrow",
 }
 
 

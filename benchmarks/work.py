@@ -9,7 +9,7 @@ from benchmarks.peers import Implementation, generate, implementations
 
 MEMORY = Path("/dev/shm")  # noqa: S108 - folders in it are made by tempfile
 #: Bytes that a whole run writes, with room to spare.
-ROOM = 1 << 30
+ROOM = 1 << 31
 
 
 def in_memory() -> Path | None:

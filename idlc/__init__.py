@@ -23,3 +23,8 @@ def __getattr__(name: str) -> object:
 
         return load
     raise AttributeError(f"module 'idlc' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Return what there is, for help() and completion."""
+    return sorted({*globals(), *__all__})

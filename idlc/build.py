@@ -10,11 +10,11 @@ from pathlib import Path
 
 from idlc.cli import output
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject
 from idlc.disk.find import look
-from idlc.disk.inputs import packages
 from idlc.disk.output.project import Project
+from idlc.disk.packages.inputs import packages
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject
 from idlc.disk.setup_command import distribution_class
 from idlc.driver.generate.gen import GenOptions, gen
 from idlc.driver.generate.libraries import Libraries, libraries_of

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 
-from release.project import FailedError, Project
+from release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
 
 #: The paragraphs that say what to do as long as there is no repository and no index.
 _UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
@@ -48,6 +49,9 @@ def publish_at(project: Project, repository: str) -> None:
     _write(project, "pyproject.toml", text.replace(mark, _URLS.format(**facts) + mark, 1))
     citation = project.text("CITATION.cff")
     _write(project, "CITATION.cff", f"{citation}repository-code: {repository}\n")
+    place = {"type": "git", "url": f"{repository}.git", "directory": EXTENSION}
+    manifest = json.loads(project.text(f"{EXTENSION}/package.json"))
+    _write_json(project, f"{EXTENSION}/package.json", {**manifest, "repository": place})
     for path, pairs in PASTED.items():
         text = _UNTIL.sub("", project.text(path))
         for now, then in pairs.items():
@@ -58,9 +62,17 @@ def publish_at(project: Project, repository: str) -> None:
 
 
 def version_is(project: Project, version: str, day: str) -> None:
-    """Give the version and its day to the package, the changelog, documents and the citation."""
+    """Give the version and its day to everything that names them.
+
+    That is the package, the extension of VS Code, the changelog, documents and the citation.
+    """
     line = f'__version__ = "{version}"'
     _substitute(project, "idlc/__init__.py", r'(?m)^__version__ = ".*"$', line)
+    manifest, lock = (json.loads(project.text(path)) for path in EXTENSION_FILES)
+    for part in (manifest, lock, lock["packages"][""]):
+        part["version"] = version
+    for path, content in zip(EXTENSION_FILES, (manifest, lock), strict=True):
+        _write_json(project, path, content)
     head = rf"(?m)^## {re.escape(version)} \(.*\)$"
     _substitute(project, "CHANGELOG.md", head, f"## {version} ({day})")
     _substitute(project, "CITATION.cff", r"(?m)^version: .*$", f"version: {version}")
@@ -75,6 +87,10 @@ def _substitute(project: Project, path: str, pattern: str, new: str) -> None:
     if number != 1:
         raise FailedError(f"{path} has {number} places like {pattern}")
     _write(project, path, text)
+
+
+def _write_json(project: Project, path: str, content: dict[str, object]) -> None:
+    _write(project, path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
 def _write(project: Project, path: str, text: str) -> None:

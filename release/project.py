@@ -17,6 +17,10 @@ else:
 
 #: What a source distribution holds besides the package.
 BESIDE = ("LICENSE", "README.md", "pyproject.toml")
+#: The extension of VS Code.
+EXTENSION = "editors/vscode"
+#: Its files that have a version.
+EXTENSION_FILES = (f"{EXTENSION}/package.json", f"{EXTENSION}/package-lock.json")
 #: The package's folders, and what they are called in it.
 PACKAGE = {"idlc": "idlc", "templates": "idlc/templates"}
 

@@ -11,13 +11,13 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject
-from idlc.disk.distribution import Distribution
-from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.find import look, nothing_in
-from idlc.disk.inputs import Inputs, packages
+from idlc.disk.machine.distribution import Distribution
+from idlc.disk.packages.enclosing import MANIFEST
+from idlc.disk.packages.inputs import Inputs, packages
 from idlc.disk.read import is_folder, read_bytes
 from idlc.disk.scope import Scope, scope
+from idlc.disk.settings import pyproject
 from idlc.driver.generate.gen import GenOptions, gen
 from idlc.driver.generate.libraries import libraries_of
 from idlc.driver.generate.share import INTERFACES, shared

@@ -17,10 +17,11 @@ from idlc.cli import output
 from idlc.cli.exit_status import ended
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import environment, pyproject
-from idlc.disk.distribution import Distribution
-from idlc.disk.enclosing_package import MANIFEST
+from idlc.disk.machine import environment
+from idlc.disk.machine.distribution import Distribution
+from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.read import reason
+from idlc.disk.settings import pyproject
 
 if TYPE_CHECKING:
     from hatchling.builders.plugin.interface import BuilderInterface

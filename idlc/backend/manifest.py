@@ -10,7 +10,7 @@ from typing import Any
 from idlc.checks.package.facts import Statement
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk.enclosing_package import MANIFEST, declared_name, statements
+from idlc.disk.packages.enclosing import MANIFEST, declared_name, statements
 from idlc.emit.package_name import why_not_package
 
 #: What every generated package needs of others on PyPI. The packages of ROS 2 that it imports are

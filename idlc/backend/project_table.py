@@ -8,7 +8,7 @@ from typing import Any
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk.pyproject import FILE
+from idlc.disk.settings.pyproject import FILE
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -20,7 +20,8 @@ class Change(NamedTuple):
     """A difference that breaks something, with its place in the new version and in the old.
 
     `subject` is what changed, such as `pkg/msg/Name.field`; `cause` is the other type whose change
-    it follows from. A change without a `span` has the `path` of its file.
+    it follows from. A change without a `span` has the `path` of its file; `place` is where that
+    would be, if it is not there.
     `detail` is text of several lines.
     """
 
@@ -34,6 +35,7 @@ class Change(NamedTuple):
     hint: str | None = None
     cause: str = ""
     detail: str = ""
+    place: str = ""
 
     def without(self, level: Level) -> Change:
         """Return the change with a level that turned out not to be true."""
@@ -52,5 +54,6 @@ class Change(NamedTuple):
             labels=label,
             hint=self.hint,
             detail=self.detail,
+            place=self.place,
             levels=tuple(level for level in LEVELS if level in self.levels),
         )

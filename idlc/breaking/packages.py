@@ -28,6 +28,14 @@ class Comparison(NamedTuple):
     additions: tuple[str, ...] = ()
     differs: bool = False
 
+    def placed(self, prefix: str) -> Comparison:
+        """Return it with what was removed in the files whose names follow a prefix."""
+        changes = (
+            one if one.span else one._replace(place=one.path.removeprefix(prefix))
+            for one in self.changes
+        )
+        return self._replace(changes=tuple(changes))
+
 
 def together(comparisons: Iterable[Comparison]) -> Comparison:
     """Return the comparisons of several packages as one."""
@@ -128,6 +136,7 @@ def _removed(interface: ir.Interface) -> Change:
         f"{_what(interface.name.kind)} `{interface.name}` was removed",
         frozenset(LEVELS[:3]),
         path=_path(interface),
+        place=interface.source.file if interface.source else "",
     )
 
 

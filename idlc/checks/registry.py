@@ -5,15 +5,15 @@ Each list is a function, so that a run imports only the rules that it asks.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report
-from idlc.model import ir
+from idlc.diagnostics.report import Report
 from idlc.model.link import Model
 
 if TYPE_CHECKING:
+    from idlc.checks.memory import Memory
     from idlc.checks.package.facts import Facts
     from idlc.checks.select import Selection
 
@@ -30,10 +30,6 @@ class Rule(NamedTuple):
     check: Check
     codes: tuple[codes.Code, ...]
     together: bool = False
-
-
-#: What rules found in an interface, by its name, with all that this depends on.
-Memory: TypeAlias = dict[ir.TypeName, tuple[Hashable, tuple[Diagnostic, ...]]]
 
 
 class PackageRule(NamedTuple):
@@ -138,15 +134,16 @@ def _ask(rules: Sequence[Rule], model: Model, report: Report, memory: Memory | N
             rule.check(model, report)
     if memory is None:
         return
-    for one, reach in model.each():
+    known = memory.of(model)
+    for one in model.each():
         name = one.own[0].name
-        if name not in memory or memory[name][0] != reach:
+        if name not in known:
             found = Report()
             for rule in rules:
                 if not rule.together:
                     rule.check(one, found)
-            memory[name] = reach, tuple(found)
-        report.extend(memory[name][1])
+            known[name] = tuple(found)
+        report.extend(known[name])
 
 
 def check_package(facts: Facts, model: Model, report: Report, selection: Selection) -> None:

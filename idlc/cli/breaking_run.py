@@ -14,8 +14,9 @@ from idlc.cli import output, reports
 from idlc.diagnostics.formats.github import notice
 from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk import command_settings, pyproject
 from idlc.disk.scope import scope
+from idlc.disk.settings import commands as command_settings
+from idlc.disk.settings import pyproject
 from idlc.driver.check import Checked
 from idlc.driver.compare.breaking import GIT, BreakingOptions, Verdict, breaking
 from idlc.driver.compare.distribution import is_distro

@@ -8,8 +8,9 @@ import msgspec
 
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
-from idlc.disk import command_settings, pyproject
 from idlc.disk.scope import scope
+from idlc.disk.settings import commands as command_settings
+from idlc.disk.settings import pyproject
 from idlc.driver.check import Checked, CheckOptions, check
 
 

@@ -10,8 +10,8 @@ from idlc.cli import output
 from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line, visible
-from idlc.disk import pyproject
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject
 from idlc.driver.fmt import Formatted, fmt
 
 

@@ -9,18 +9,8 @@ from idlc.cli import output, reports
 from idlc.diagnostics.formats.terminal import counted, summary
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
-from idlc.disk.pyproject import Config
 from idlc.driver.generate.gen import GenOptions, gen
 from idlc.driver.generate.result import Generated
-
-
-def completed(wanted: GenOptions, settings: Config) -> GenOptions:
-    """Return what was typed, with what pyproject.toml says where nothing was."""
-    return wanted._replace(
-        paths=wanted.paths or settings.paths,
-        out=wanted.out or ("" if wanted.ament else settings.out or ""),
-        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
-    )
 
 
 def refuse(report: Report, style: str) -> None:

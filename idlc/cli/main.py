@@ -11,10 +11,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status."""
     if arguments is not None:
         return _run(list(arguments))
+    if sys.argv[1:] != ["lsp"]:  # which stays
+        look_for_garbage_seldom()
     status = _run(sys.argv[1:])
     # the program ends: to look for garbage once more takes longer than to check a file
     gc.freeze()
     return status
+
+
+def look_for_garbage_seldom() -> None:
+    """Let the interpreter keep more garbage: a run makes little, and to look for it takes time.
+
+    That is a fifteenth of all, most of it while modules are imported.
+    """
+    gc.set_threshold(200_000, 30, 30)
 
 
 def _run(words: list[str]) -> int:
@@ -27,7 +37,7 @@ def _run(words: list[str]) -> int:
         from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
-    if words == ["lsp"]:
+    if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
         from idlc.cli.exit_status import ended
         from idlc.cli.lsp_run import run as serve
 
@@ -35,3 +45,8 @@ def _run(words: list[str]) -> int:
     from idlc.cli.click_runner import run
 
     return run(words)
+
+
+def _is_added_by_clients(word: str) -> bool:
+    """Return whether many editors add a word to a server's command; it changes nothing."""
+    return word == "--stdio" or word.startswith("--clientProcessId=")

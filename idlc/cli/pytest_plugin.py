@@ -79,8 +79,9 @@ class InterfaceItem(pytest.Item):
 
 def _problems(path: Path) -> list[Diagnostic]:
     from idlc.diagnostics.report import Report
-    from idlc.disk import command_settings, pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import commands as command_settings
+    from idlc.disk.settings import pyproject
     from idlc.driver.check import CheckOptions, check
 
     report = Report()

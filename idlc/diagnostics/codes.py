@@ -57,7 +57,13 @@ class Code(msgspec.Struct, frozen=True):
         )
 
     def of(
-        self, path: str, message: str, *, hint: str | None = None, detail: str = ""
+        self,
+        path: str,
+        message: str,
+        *,
+        hint: str | None = None,
+        detail: str = "",
+        place: str = "",
     ) -> Diagnostic:
         """Return a problem of this kind with a whole file or folder."""
         return Diagnostic(
@@ -67,6 +73,7 @@ class Code(msgspec.Struct, frozen=True):
             path=path,
             hint=hint,
             detail=detail,
+            place=place,
         )
 
 

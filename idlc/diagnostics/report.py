@@ -43,6 +43,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     `detail` is preformatted text of several lines, such as a diff.
     `levels` is what a change between two versions breaks, `edits` is what `check --fix` does.
     `distros` are the distributions of ROS 2 that it holds for, where not for all that were asked.
+    `place` is the file that services show if `path` is none, such as one that was removed.
     """
 
     code: str
@@ -56,11 +57,22 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     levels: tuple[str, ...] = ()
     edits: tuple[Edit, ...] = ()
     distros: tuple[str, ...] = ()
+    place: str = ""
 
     @property
     def where(self) -> tuple[str, int]:
         """The path and offset that order diagnostics."""
         return (self.span.source.path, self.span.start) if self.span else (self.path, -1)
+
+    @property
+    def file(self) -> str:
+        """The file of a repository that it is about."""
+        return self.place or (self.span.source.file if self.span else self.path)
+
+    @property
+    def within(self) -> str:
+        """Where it is, in words, if that is no place in its file."""
+        return f"in {self.where[0]}" if self.file != self.where[0] else ""
 
     @property
     def breaks(self) -> str:

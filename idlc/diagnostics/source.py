@@ -12,11 +12,15 @@ from typing import NamedTuple
 
 
 class Source:
-    """One file's exact text. Compared by identity; `path` is what messages show."""
+    """One file's exact text. Compared by identity; `path` is what messages show.
 
-    def __init__(self, path: str, text: str) -> None:
+    `file` is the file that the text is a part of, where that is not the file itself.
+    """
+
+    def __init__(self, path: str, text: str, file: str = "") -> None:
         self.path = path
         self.text = text
+        self.file = file or path
 
     def __repr__(self) -> str:
         return f"Source({self.path!r})"

@@ -15,8 +15,8 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.suggest import closest
-from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.exclude import Exclusions
+from idlc.disk.packages.enclosing import MANIFEST, manifest
 from idlc.disk.read import (
     NOTHING_OPEN,
     Unsaved,

@@ -11,11 +11,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
-from idlc.disk import environment
-from idlc.disk.distribution import installed
-from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
+from idlc.disk.machine import environment
+from idlc.disk.machine.distribution import installed
+from idlc.disk.packages.enclosing import declared_name, manifest
 from idlc.disk.read import NOTHING_OPEN, Unsaved, absolute, is_file, is_folder, shown
 from idlc.model import catalog, derive, ir
 from idlc.model.distro import DEFAULT, Distro
@@ -92,7 +92,7 @@ class Prefix:
 
 
 def _has_interfaces(root: Path) -> bool:
-    return any(is_folder(root / kind) for kind in KIND_FOLDERS)
+    return any(os.path.isdir(f"{root}/{kind}") for kind in KIND_FOLDERS)  # noqa: PTH112 - for each look
 
 
 class Library:

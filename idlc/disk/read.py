@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -34,6 +35,7 @@ _SPECIAL = {
     stat.S_IFDIR: "a folder",
 }
 
+_READING = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"))
 
 
@@ -55,7 +57,11 @@ def is_folder(path: Path) -> bool:
 def shown(path: Path) -> str:
     """Return a path as a person knows it: relative to the working folder where that is below."""
     try:
-        return path.relative_to(Path.cwd()).as_posix()
+        here = Path.cwd()
+        below, whole = f"{here}{os.sep}", str(path)
+        if whole.startswith(below):  # as `relative_to` says, in a fraction of the time
+            return whole[len(below) :].replace(os.sep, "/")
+        return path.relative_to(here).as_posix()
     except (ValueError, OSError):
         return path.as_posix()
 
@@ -75,13 +81,12 @@ def kind_of(mode: int) -> str:
 def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
     """Return a regular file's bytes; report IDL601, IDL604 or IDL605 and return `None` else."""
     try:
-        status = path.stat()
+        status = os.stat(path)  # noqa: PTH116 - a Path's takes as long again
         if not stat.S_ISREG(status.st_mode):
             report.add(codes.NOT_AN_INTERFACE.of(name, f"`{name}` is {kind_of(status.st_mode)}"))
             return None
         if status.st_size <= MAX_SIZE:
-            with path.open("rb") as file:
-                data = file.read(MAX_SIZE + 1)
+            data = content(path, status.st_size, MAX_SIZE + 1)
             if len(data) <= MAX_SIZE:
                 return data
     except (OSError, ValueError) as error:
@@ -89,6 +94,21 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
         return None
     report.add(_too_large(name))
     return None
+
+
+def content(path: str | Path, size: int, most: int = sys.maxsize) -> bytes:
+    """Return a file's content, of which `most` bytes; `size` is what is expected.
+
+    The layers above the system's calls would take half of the time.
+    """
+    handle = os.open(path, _READING)
+    try:
+        data = os.read(handle, size + 1)
+        while len(data) != size and (more := os.read(handle, min(1 << 20, most - len(data)))):
+            data += more
+        return data
+    finally:
+        os.close(handle)
 
 
 def _too_large(name: str) -> Diagnostic:

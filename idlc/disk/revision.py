@@ -15,9 +15,9 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.visible import one_line
-from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, InterfaceFile, look
+from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.read import absolute
 
 
@@ -79,6 +79,19 @@ def _commit(name: str, path: str) -> bytes | None:
     if not name or name.startswith("-"):
         return None
     return _git(_folder(path), ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"])
+
+
+def commit(name: str, path: str) -> str | None:
+    """Return which commit a name means in the repository that holds `path`, if it means one."""
+    found = _commit(name, path)
+    return _text(found) if found else None
+
+
+def places(path: str) -> tuple[Path, ...]:
+    """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
+    words = ["rev-parse", "--path-format=absolute", "--git-dir", "--git-common-dir"]
+    found = _git(_folder(path), words)
+    return tuple(dict.fromkeys(Path(line) for line in _text(found).splitlines())) if found else ()
 
 
 def _folder(path: str) -> Path:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from idlc.disk.distribution import distribution
 from idlc.disk.exclude import Exclusions, exclusion
+from idlc.disk.machine.distribution import distribution
 from idlc.disk.read import NOTHING_OPEN, Unsaved
 from idlc.model.distro import BY_NAME, DEFAULT, Distro, listed
 
 if TYPE_CHECKING:
-    from idlc.disk.pyproject import Config
+    from idlc.disk.settings.pyproject import Config
 
 
 class Scope(msgspec.Struct, frozen=True):

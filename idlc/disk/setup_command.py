@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from idlc.disk import environment
+from idlc.disk.machine import environment
 from idlc.disk.read import reason
 
 #: By an entry here, recorders and others take a package for one whose library can be loaded.

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.find import look
+from idlc.disk.packages.enclosing import MANIFEST
 
 
 def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, tuple[int, int]]:

@@ -9,15 +9,15 @@ import msgspec
 
 from idlc.checks.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
-from idlc.disk import inputs
 from idlc.disk.find import KINDS, look, nothing_in
-from idlc.disk.package_facts import facts
+from idlc.disk.packages import inputs
+from idlc.disk.packages.facts import facts
 from idlc.disk.read import absolute
 from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, library_for, stage
 
 if TYPE_CHECKING:
-    from idlc.checks import registry
+    from idlc.checks.memory import Memory
     from idlc.checks.package.facts import Facts
     from idlc.diagnostics.source import Source
     from idlc.model import pool
@@ -126,6 +126,12 @@ def checkers(
     }
 
 
+def _memory() -> Memory:
+    from idlc.checks.memory import Memory
+
+    return Memory()
+
+
 class Checker:
     """Checks packages for one distribution, also again after some of their texts changed.
 
@@ -139,8 +145,8 @@ class Checker:
         self.library = library_for(packages, scope, Report())
         self._lowered: pool.Memory = {}
         # what each interface depends on is only worth remembering if there is a next time
-        self._checked: registry.Memory | None = {} if again else None
-        self._advised: registry.Memory | None = {} if again else None
+        self._checked = _memory() if again else None
+        self._advised = _memory() if again else None
         self._facts: dict[str, Facts | None] = {}
 
     def check(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from idlc.diagnostics.report import Report
-from idlc.disk import nearby, pyproject
 from idlc.disk.library import Library
+from idlc.disk.packages import nearby
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject
 from idlc.model import ir
 from idlc.model.distro import BY_NAME
 

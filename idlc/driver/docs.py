@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
-from idlc.disk import inputs
-from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import find
 from idlc.disk.output.site import write
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import manifest, statements
 from idlc.disk.scope import Scope
 from idlc.driver.generate.gen import is_name, named_packages
 from idlc.driver.stages import sound_models, stage
@@ -29,7 +29,7 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     models = [model for model, _ in sound_models(given, scope, report) if model.own]
     if not models:
         return 0
-    from idlc.disk import template_cache
+    from idlc.disk.cache import templates as template_cache
     from idlc.site.pages import site
 
     about = {one.package: _about(one) for one in given}

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.suggest import closest, did_you_mean
-from idlc.disk import nearby
 from idlc.disk.library import Library
+from idlc.disk.packages import nearby
 from idlc.disk.read import shown
 from idlc.disk.scope import Scope
 from idlc.model import ir

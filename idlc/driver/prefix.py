@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk import environment, inputs
-from idlc.disk.distribution import distribution
 from idlc.disk.find import look
-from idlc.disk.prefix import Installed, installed, prefixes
+from idlc.disk.machine import environment
+from idlc.disk.machine.distribution import distribution
+from idlc.disk.machine.prefix import Installed, installed, prefixes
+from idlc.disk.packages import inputs
 from idlc.disk.read import absolute
 from idlc.disk.scope import Scope
 from idlc.driver.check import Checked

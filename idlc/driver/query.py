@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import inputs
 from idlc.disk.find import find, is_path
+from idlc.disk.packages import inputs
 from idlc.disk.scope import Scope
 from idlc.driver import named_types
 from idlc.driver.stages import compile_package, derived_names, sound_models, stage

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
 from idlc.disk.library import Library
+from idlc.disk.packages import inputs
 from idlc.disk.scope import Scope
 from idlc.model import derive, ir
 
 if TYPE_CHECKING:
-    from idlc.checks import registry
+    from idlc.checks.memory import Memory
     from idlc.model import pool
     from idlc.model.link import Model
     from idlc.model.pool import Pool
@@ -57,7 +57,7 @@ class Compiler:
         self,
         library: Library,
         memory: pool.Memory | None = None,
-        checked: registry.Memory | None = None,
+        checked: Memory | None = None,
     ) -> None:
         self.library = library
         self._memory = memory

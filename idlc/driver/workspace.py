@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from idlc.diagnostics.report import Report, Severity
-from idlc.disk import command_settings, environment, inputs, pyproject
-from idlc.disk.enclosing_package import MANIFEST, manifest
 from idlc.disk.find import look, root_of
-from idlc.disk.package_names import locks, places
-from idlc.disk.read import MAX_SIZE, NOTHING_OPEN, Unsaved, absolute
+from idlc.disk.machine import environment
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import MANIFEST, manifest
+from idlc.disk.packages.names import locks, places
+from idlc.disk.read import MAX_SIZE, Unsaved, absolute
 from idlc.disk.scope import scope
+from idlc.disk.settings import commands as command_settings
+from idlc.disk.settings import pyproject
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
 from idlc.model import ir
@@ -31,6 +34,7 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Edit
     from idlc.diagnostics.source import Source, Span
     from idlc.disk.library import Library
+    from idlc.driver.compare.earlier import Earlier
     from idlc.model.link import Model
 
 
@@ -114,11 +118,11 @@ class Workspace:
         Raises OSError if the folder is gone.
         """
         self._fixed = report = Report()
-        self._earlier: dict[str, Mapping[str, Model]] = {}
+        self._earlier: dict[str, Earlier] = {}
         self._packages: tuple[inputs.Inputs, ...] = ()
         with working_in(self.folder):
             wishes = self._wishes
-            settings = pyproject.load(report, unsaved)
+            self._settings = settings = pyproject.load(report, unsaved)
             selected = command_settings.selection(settings, report)
             self._selection = selected.with_lists(wishes.select, wishes.ignore)
             found = scope(
@@ -188,6 +192,12 @@ class Workspace:
         file = self._packages[number].files[at].file
         return ir.TypeName(self._packages[number].package, file.kind, file.name)
 
+    def inputs(self, path: Path) -> tuple[str, Mapping[str, str], str]:
+        """Return the package of a file, its files' digests, and the file's name among them."""
+        number, at = self._places[path]
+        given = self._packages[number]
+        return given.package, given.digests, given.files[at].file.key
+
     def packages(self) -> Iterable[str]:
         """Return the packages that are known here and have messages."""
         return (one for one in self._library.packages() if self.names(one))
@@ -215,22 +225,18 @@ class Workspace:
         with working_in(self.folder):
             return next(iter(self._checkers.values())).around(given)
 
-    def earlier(self, against: str) -> Mapping[str, Model]:
-        """Return the packages' models as they are in a git revision or folder.
-
-        They are compiled once after each load; empty if they cannot be.
-        """
+    def earlier(self, against: str = "") -> Earlier:
+        """Return what the packages are compared with: `against`, or what pyproject.toml says."""
         if against not in self._earlier:
-            from idlc.driver.compare.breaking import BreakingOptions, earlier
+            from idlc.driver.compare.earlier import Earlier
 
-            report = Report()
-            paths = tuple(one.home.as_posix() for one in self._packages)
-            scope = msgspec.structs.replace(self._scope, unsaved=NOTHING_OPEN)
-            options = BreakingOptions(paths, against, scope)
-            with working_in(self.folder):
-                found = earlier(options, self._packages, report) if paths else {}
-            self._earlier[against] = {} if report.had_errors else found
+            found = Earlier(self.folder, against, self._settings, self._scope)
+            self._earlier[against] = found
         return self._earlier[against]
+
+    def before(self, against: str = "") -> Mapping[str, Model]:
+        """Return the packages' models as they were; empty if they cannot be compiled."""
+        return self.earlier(against).models(self._packages)
 
     @property
     def _library(self) -> Library:

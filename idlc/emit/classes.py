@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
 
@@ -12,6 +12,13 @@ from idlc.emit.fields import FieldView, Naming
 from idlc.emit.python_lines import assign, if_one_or_all, lines, tuple_of
 from idlc.emit.references import References
 from idlc.model import derive, ir
+
+
+class ConstantView(msgspec.Struct, frozen=True):
+    """A constant, or a default that has the place of one; the file says nothing about that."""
+
+    statement: str
+    docstring: str = ""
 
 
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
@@ -25,7 +32,7 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     docstring: documentation.Docstring
     match_args: str
-    constants: tuple[str, ...]
+    constants: tuple[ConstantView, ...]
     fields: tuple[FieldView, ...]
     equality: Equality
     receiver: str
@@ -46,18 +53,20 @@ class GroupView(msgspec.Struct, frozen=True):
 Purposes = Mapping[ir.TypeName, str]
 
 
-def message(structure: ir.Message, references: References, purposes: Purposes) -> MessageView:
-    """Return the view of a structure's class."""
+def message(
+    structure: ir.Message, references: References, purposes: Purposes, file: str
+) -> MessageView:
+    """Return the view of a structure's class; `file` is the one that defines it."""
     naming = Naming.of(structure)
-    views = tuple(fields.view(field, references, naming) for field in structure.fields)
+    views = tuple(fields.view(field, references, naming, file) for field in structure.fields)
     names = tuple_of(*(f'"{view.name}"' for view in views))
     entries = tuple(view.description for view in views)
     doubt = views[0].doubt if views else ()
     return MessageView(
         name=references.name(structure.name),
-        docstring=documentation.message(structure, purposes[structure.name], entries),
+        docstring=documentation.message(structure, purposes[structure.name], entries, file),
         match_args="\n".join(lines(names, 4, "__match_args__ = ")).partition(" = ")[2],
-        constants=tuple(_constants(structure)),
+        constants=tuple(_constants(structure, file)),
         fields=views,
         equality=equality(structure, naming.receiver, references),
         receiver=naming.receiver,
@@ -68,13 +77,19 @@ def message(structure: ir.Message, references: References, purposes: Purposes) -
     )
 
 
-def _constants(structure: ir.Message) -> list[str]:
-    found = [
-        assign(constant.name, literals.scalar(constant.type, constant.value), 4)
-        for constant in structure.constants
-    ]
-    found += [fields.default_constant(field) for field in structure.fields if field.default]
-    return ["\n".join(statement).lstrip() for statement in found]
+def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
+    for one in structure.constants:
+        statement = assign(one.name, literals.scalar(one.type, one.value), 4)
+        yield ConstantView(
+            _statement(statement), documentation.attribute(one, documentation.words(one), file)
+        )
+    for field in structure.fields:
+        if field.default:
+            yield ConstantView(_statement(fields.default_constant(field)))
+
+
+def _statement(on_lines: Iterable[str]) -> str:
+    return "\n".join(on_lines).lstrip()
 
 
 def services(interface: ir.Interface, purposes: Purposes) -> tuple[GroupView, ...]:

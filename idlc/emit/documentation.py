@@ -31,12 +31,17 @@ class Docstring(msgspec.Struct, frozen=True):
         return not self.sections and "\n" not in self.text
 
 
-def message(structure: ir.Message, purpose: str, entries: tuple[str, ...]) -> Docstring:
-    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries."""
+def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file: str) -> Docstring:
+    """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries.
+
+    `file` is the one that defines it, within its package.
+    """
     lines = [literals.prose(line) for line in structure.comment] or [purpose]
     if len(lines) > 1 and lines[1]:
         lines.insert(1, "")
     lines += _hidden(structure)
+    place = _place(structure, file)
+    lines += ["", f"Defined in {place}"] if place else []
     constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
     sections = (Section("Attributes", entries), Section("Constants", constants))
     found = tuple(section for section in sections if section.entries)
@@ -95,18 +100,47 @@ def _hidden(structure: ir.Message) -> list[str]:
     return ["", *literals.wrapped(text, 4)]
 
 
-def field(described: ir.Field) -> str:
-    """Return a field's entry, on as many lines as it takes."""
-    return _entry(pynames.field(described.name), described)
+def _place(structure: ir.Message, file: str) -> str:
+    """Return the file and line where a structure begins; empty if nobody wrote any of it.
+
+    Later sections have no line: it would change with each field of those before, and people review
+    what one more field changes.
+    """
+    described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
+    spans = [one.name_span for one in described if one.name_span]
+    if not spans:
+        return ""
+    first = min(spans, key=lambda span: span.start)
+    above = first.source.text[: first.start].split("\n")
+    is_later = any(line.startswith("---") for line in above)
+    return file if is_later else f"{file}:{len(above)}"
 
 
 def _constant(constant: ir.Constant) -> str:
-    return _entry(constant.name, constant)
+    return entry(constant.name, constant, words(constant))
 
 
-def _entry(name: str, described: ir.Field | ir.Constant) -> str:
-    """Return the type, unit and comment of a field or constant."""
+def words(described: ir.Field | ir.Constant) -> str:
+    """Return the unit and comment of a field or constant, to stand after its type or name."""
     unit = f" [{literals.prose(described.unit)}]" if described.unit else ""
-    words = " ".join(literals.prose(line).strip() for line in described.comment).strip()
-    text = f"{name}: {spell(described.type)}{unit}" + (f". {words}" if words else "")
+    said = " ".join(literals.prose(line).strip() for line in described.comment).strip()
+    return unit + (f". {said}" if said else "")
+
+
+def entry(name: str, described: ir.Field | ir.Constant, said: str) -> str:
+    """Return the entry of a field or constant in a list, on as many lines as it takes."""
+    text = f"{name}: {spell(described.type)}{said}"
     return "\n".join(literals.wrapped(text, 8, hanging=4))
+
+
+def attribute(described: ir.Field | ir.Constant, said: str, file: str) -> str:
+    """Return the statement that editors show of a field or constant: its words, and its line.
+
+    That is named by what it begins with, not by its number, which other lines would change. The
+    statement is empty for what ROS 2 adds, of which there is no more to say than its annotation.
+    """
+    if described.name_span is None:
+        return ""
+    lines = literals.wrapped(f"{spell(described.type)} {described.name}{said} ({file})", 6)
+    text = literals.docstring(lines, one_line=True)
+    return f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""'

@@ -28,6 +28,7 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     wire_name: str
     idl: str
     description: str
+    docstring: str
     annotation: str
     parameter: str
     store: str
@@ -105,16 +106,18 @@ def idl_text(type_: ir.FieldType) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def view(field: ir.Field, references: References, naming: Naming) -> FieldView:
-    """Return the view of a field."""
+def view(field: ir.Field, references: References, naming: Naming, file: str) -> FieldView:
+    """Return the view of a field; `file` is the one that defines it."""
     name = pynames.field(field.name)
     slot = f"{naming.receiver}.{pynames.slot(field.name)}"
     shape = _shape(field, references, naming)
+    words = documentation.words(field)
     return FieldView(
         name=name,
         wire_name=field.name,
         idl=idl_text(field.type),
-        description=documentation.field(field),
+        description=documentation.entry(name, field, words),
+        docstring=documentation.attribute(field, words, file),
         annotation=shape.annotation + _ignored(name),
         parameter=shape.parameter,
         store="\n".join(_store(slot, name, shape)).lstrip(),

@@ -78,6 +78,7 @@ def _classes(part: _Part, homes: Homes) -> ModuleView:
     name = interface.name
     purposes = documentation.purposes(interface)
     is_action = isinstance(interface, ir.Action)
+    file = f"{name.kind}/{name.name}.{name.kind}"
     return ModuleView(
         template="protocol" if part.is_added else name.kind,
         path=f"{name.kind}/{part.module}.py",
@@ -88,7 +89,7 @@ def _classes(part: _Part, homes: Homes) -> ModuleView:
         ),
         title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
         imports=tuple(_imports(references, part.structures)),
-        messages=tuple(classes.message(one, references, purposes) for one in part.structures),
+        messages=tuple(classes.message(one, references, purposes, file) for one in part.structures),
         # a service's own class is its author's; those of an action's services are not
         services=classes.services(interface, purposes) if part.is_added == is_action else (),
         action=classes.action(interface) if isinstance(interface, ir.Action) else None,

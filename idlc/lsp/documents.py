@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from urllib.parse import unquote
 
 from idlc.disk.find import KINDS
+from idlc.disk.output.lock_file import digest
 from idlc.disk.read import Unsaved, absolute
-from idlc.lsp import uris
-from idlc.lsp.positions import in_lines, lines_of
-from idlc.lsp.protocol import Change, DocumentItem, Range
+from idlc.lsp.protocol import uris
+from idlc.lsp.protocol.parts import Change, DocumentItem, Range
+from idlc.lsp.protocol.positions import in_lines, lines_of
 from idlc.model import ir
 
 #: The language id of interface files.
@@ -37,6 +39,14 @@ class Document:
     def data(self) -> bytes:
         """What a file would hold; halves of characters, which no file can hold, become `?`."""
         return self.text.encode("utf-8", errors="replace")
+
+    def is_on_disk(self) -> bool:
+        """Return whether its file holds this text, however that is spelled on disk."""
+        try:
+            data = self.path.read_bytes() if self.path else b""
+        except OSError:
+            return False
+        return self.path is None or digest(data.removeprefix(BOM_UTF8)) == digest(self.data)
 
     def change(self, changes: Iterable[Change], encoding: str) -> None:
         """Make changes, one after the other."""

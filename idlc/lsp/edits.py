@@ -7,8 +7,8 @@ from difflib import SequenceMatcher
 
 from idlc.diagnostics.report import Edit
 from idlc.driver.workspace import State
-from idlc.lsp.positions import Places, lines_of
-from idlc.lsp.protocol import TextEdit
+from idlc.lsp.protocol.parts import TextEdit
+from idlc.lsp.protocol.positions import Places, lines_of
 from idlc.lsp.world import World
 
 

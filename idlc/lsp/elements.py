@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple, TypeAlias
 
 from idlc.diagnostics.source import Source, Span
-from idlc.lsp.protocol import Position
+from idlc.lsp.protocol.parts import Position
 from idlc.lsp.world import Known, World
 from idlc.model import derive, ir
 from idlc.model.lowering.file import SECTIONS

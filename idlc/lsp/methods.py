@@ -6,6 +6,7 @@ The modules of features are imported when they are needed.
 from __future__ import annotations
 
 from importlib import import_module
+from types import ModuleType
 from typing import Any, NamedTuple
 
 
@@ -16,13 +17,18 @@ class Method(NamedTuple):
     function: str
     params: str
 
+    def prepare(self) -> ModuleType:
+        """Import and return its module."""
+        return import_module(f"idlc.lsp.features.{self.module}")
+
     def call(self, world: Any, params: object) -> object:
         """Return what the function answers; raises ValidationError for wrong parameters."""
         import msgspec
 
-        asked = msgspec.convert(params, getattr(import_module("idlc.lsp.protocol"), self.params))
-        module = import_module(f"idlc.lsp.features.{self.module}")
-        answer: object = getattr(module, self.function)(world, asked)
+        asked = msgspec.convert(
+            params, getattr(import_module("idlc.lsp.protocol.parts"), self.params)
+        )
+        answer: object = getattr(self.prepare(), self.function)(world, asked)
         return answer
 
 

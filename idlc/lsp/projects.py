@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from idlc.diagnostics import codes
@@ -29,6 +28,11 @@ class Project:
         #: What went wrong within idlc itself.
         self.failure: Diagnostic | None = None
 
+    @property
+    def is_loaded(self) -> bool:
+        """Whether what is on disk was read."""
+        return self._documents is not None
+
     def forget(self) -> None:
         """Let everything be read again when it is needed."""
         self._documents = self._state = None
@@ -49,10 +53,12 @@ class Project:
         """Return what is known now; `None` if the folder cannot be looked at."""
         if self._state is None:
             self.failure = None
+            anew = self._documents is None
             try:
-                with _without_garbage(anew=self._documents is None):
-                    self.load(documents)
-                    self._state = self.workspace.state()
+                self.load(documents)
+                self._state = self.workspace.state()
+                if anew:
+                    gc.freeze()  # what a whole folder is read into is no garbage
             except OSError:
                 self.forget()
             except Exception as error:
@@ -76,23 +82,6 @@ class Project:
         except Exception:  # of which `state` tells
             return False
         return self.has(path)
-
-
-@contextmanager
-def _without_garbage(*, anew: bool) -> Iterator[None]:
-    """Keep what a whole folder is read into from being searched for garbage, now and later.
-
-    That takes longer than to check a file, and finds nothing.
-    """
-    if not anew:
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-        gc.freeze()
-    finally:
-        gc.enable()
 
 
 def _failure(error: Exception, folder: Path) -> Diagnostic:

@@ -8,9 +8,9 @@ from pathlib import Path
 from idlc.diagnostics import code_pages, codes
 from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.driver.workspace import State
-from idlc.lsp import uris
 from idlc.lsp.projects import Project
-from idlc.lsp.protocol import Location, Part, Position, Range
+from idlc.lsp.protocol import uris
+from idlc.lsp.protocol.parts import Location, Part, Position, Range
 from idlc.lsp.world import World
 
 _SEVERITIES = {Severity.ERROR: 1, Severity.WARNING: 2}

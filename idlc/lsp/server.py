@@ -6,14 +6,15 @@ changes in a row are followed by one check. Whatever a client sends, the server 
 
 from __future__ import annotations
 
+import gc
 import json
 import queue
 import threading
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeAlias
 
-from idlc.lsp import framing
-from idlc.lsp.errors import (
+from idlc.lsp.protocol import framing
+from idlc.lsp.protocol.errors import (
     CANCELLED,
     INTERNAL_ERROR,
     INVALID_PARAMS,
@@ -27,6 +28,8 @@ from idlc.lsp.session import Session
 MOST_IN_A_ROW = 500
 #: Seconds between looks at whether the client still lives.
 PATIENCE = 10.0
+#: Seconds without a message after which there is time for what nobody waits for.
+QUIET = 0.3
 #: What came in: a message, something that is none, or the end.
 Message: TypeAlias = "dict[str, Any]"
 Arrival: TypeAlias = "Message | RequestError | None"
@@ -52,24 +55,39 @@ class Server:
     def run(self) -> int:
         """Serve, and return the exit status."""
         threading.Thread(target=self._read, daemon=True).start()
-        in_a_row = 0
+        # to search for garbage takes longer than any answer, and there is hardly any
+        gc.disable()
+        in_a_row = since = 0
         try:
             while True:
                 if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
                     in_a_row = 0
                     self._attempt("problems", self._session.settle)
+                if since >= MOST_IN_A_ROW:
+                    since = self._tidy()
                 try:
-                    arrival = self._arrivals.get(timeout=PATIENCE)
+                    arrival = self._arrivals.get(timeout=QUIET if since else PATIENCE)
                 except queue.Empty:
-                    if self._session.client_is_gone():
+                    if since:
+                        since = self._tidy()
+                    elif self._session.client_is_gone():
                         return 1
+                    else:
+                        self._attempt("idle", self._session.idle)
                     continue
                 in_a_row += 1
+                since += 1
                 if arrival is None or _is_exit(arrival):
                     return 0 if self._session.is_shut_down else 1
                 self._take(arrival)
         except (OSError, ValueError):  # nobody reads what is written
             return 1
+
+    def _tidy(self) -> int:
+        """Do what nobody waits for; return how many messages came since then."""
+        self._attempt("preparation", self._session.prepare)
+        gc.collect()
+        return 0
 
     def _read(self) -> None:
         """Put each message that comes in where the loop takes it; `None` comes last."""

@@ -11,15 +11,15 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from idlc.lsp import capabilities
-from idlc.lsp.errors import (
+from idlc.lsp.methods import METHODS
+from idlc.lsp.protocol import capabilities
+from idlc.lsp.protocol.errors import (
     INVALID_PARAMS,
     INVALID_REQUEST,
     METHOD_NOT_FOUND,
     NOT_INITIALIZED,
     RequestError,
 )
-from idlc.lsp.methods import METHODS
 
 if TYPE_CHECKING:
     from idlc.lsp.workbench import Workbench
@@ -89,6 +89,17 @@ class Session:
         import msgspec
 
         return msgspec.json.encode(message)
+
+    def idle(self) -> None:
+        """Do what can be done while the client says nothing."""
+        if "workbench" in self.__dict__ and not self.is_shut_down:
+            self.workbench.idle()
+
+    def prepare(self) -> None:
+        """Import what answers, so that the first time takes no longer than others."""
+        if "workbench" in self.__dict__ and any(True for _ in self.workbench.world.documents):
+            for method in METHODS.values():
+                method.prepare()
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""

@@ -7,10 +7,10 @@ from typing import Any
 
 import msgspec
 
-from idlc.lsp import capabilities, uris
 from idlc.lsp.documents import Document
-from idlc.lsp.errors import INVALID_REQUEST, RequestError
-from idlc.lsp.protocol import (
+from idlc.lsp.protocol import capabilities, uris
+from idlc.lsp.protocol.errors import INVALID_REQUEST, RequestError
+from idlc.lsp.protocol.parts import (
     DidChange,
     DidChangeFiles,
     DidChangeFolders,
@@ -20,7 +20,7 @@ from idlc.lsp.protocol import (
     Initialize,
     OfDocument,
 )
-from idlc.lsp.world import World
+from idlc.lsp.world import RELATIVE, World
 
 #: What is watched on disk: what a check may read.
 WATCHED = (
@@ -144,9 +144,17 @@ class Workbench:
         self._changed = True
 
     def _change_files(self, given: DidChangeFiles) -> None:
-        paths = {uris.to_path(one.uri) for one in given.changes}
-        self.world.projects.changed_on_disk(filter(None, paths))
+        paths = {path for one in given.changes if (path := uris.to_path(one.uri))}
+        gits = {path for path in paths if self.world.is_gits(path)}
+        if gits:
+            self.world.lenses_moved()
+        self.world.projects.changed_on_disk(paths - gits)
         self._changed = True
+
+    def idle(self) -> None:
+        """Look for what a client does not tell, while it says nothing."""
+        if not self.world.supports("workspace", "didChangeWatchedFiles", RELATIVE):
+            self.world.lenses_moved()
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""

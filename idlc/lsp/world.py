@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 
 from idlc.diagnostics.source import Source, Span
+from idlc.disk.built_in_files import file_of, inside
 from idlc.driver.workspace import State, Wishes
-from idlc.lsp import positions, uris
-from idlc.lsp.capabilities import DEFAULT_ENCODING
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
-from idlc.lsp.protocol import Location, Position, Range
+from idlc.lsp.protocol import positions, uris
+from idlc.lsp.protocol.capabilities import DEFAULT_ENCODING
+from idlc.lsp.protocol.parts import Location, Position, Range
 from idlc.model import ir
+
+#: What a client calls that it can watch folders which are not below the workspace's.
+RELATIVE = "relativePatternSupport"
+#: What it calls that it can show documents which are no files.
+CONTENT = "textDocumentContent"
 
 
 class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
@@ -26,6 +32,7 @@ class Settings(Wishes, frozen=True, rename="camel", kw_only=True):
 
     inlay_hints: bool = True
     code_lens: bool = True
+    default_lens: bool = True
     against: str = ""
 
 
@@ -53,6 +60,8 @@ class World:
         self.encoding = DEFAULT_ENCODING
         self.settings = Settings()
         self.client: dict[str, Any] = {}
+        #: Folders that lenses compare with a revision, with those in which git notes what it is.
+        self.repositories: dict[Path, tuple[Path, ...]] = {}
 
     def supports(self, *path: str) -> bool:
         """Return whether the client says that it can do something."""
@@ -60,6 +69,39 @@ class World:
         for name in path:
             found = found.get(name) if isinstance(found, dict) else None
         return found not in (None, False)
+
+    def follow_git(self, folder: Path, repository: Callable[[], Iterable[Path]]) -> None:
+        """Have the client tell when something else is checked out for a folder, if it can."""
+        if folder in self.repositories:
+            return
+        places = self.repositories[folder] = tuple(repository())
+        if not (places and self.supports("workspace", "didChangeWatchedFiles", RELATIVE)):
+            return
+        watchers = [
+            {"globPattern": {"baseUri": uris.from_path(place), "pattern": pattern}}
+            for place in places
+            for pattern in ("{HEAD,packed-refs}", "refs/**")
+        ]
+        method = "workspace/didChangeWatchedFiles"
+        options = {"watchers": watchers}
+        one = {"id": uris.from_path(folder), "method": method, "registerOptions": options}
+        self.ask("client/registerCapability", {"registrations": [one]})
+
+    def is_gits(self, path: Path) -> bool:
+        """Return whether a file is one in which git notes what is checked out."""
+        places = (place for some in self.repositories.values() for place in some)
+        return any(path.is_relative_to(place) for place in places)
+
+    def lenses_moved(self) -> None:
+        """Have lenses asked for again if what they compare with is another commit now."""
+        against = self.settings.against
+        moved = [
+            one.workspace.earlier(against).has_moved()
+            for one in self.projects
+            if one.folder in self.repositories and one.is_loaded
+        ]
+        if any(moved) and self.supports("workspace", "codeLens", "refreshSupport"):
+            self.ask("workspace/codeLens/refresh", None)
 
     def settle(self, given: object) -> str:
         """Take the client's settings; return what is wrong with them, empty if nothing is."""
@@ -101,13 +143,18 @@ class World:
         return positions.range_of(span, self.encoding)
 
     def location(self, span: Span, state: State) -> Location:
-        """Return the location of a span; what is built in is a document of its own."""
+        """Return the location of a span; what is built in is a document of its own.
+
+        For clients that cannot show such a document, it is a file of the user's cache.
+        """
         source = span.source
-        if source.path.startswith("<"):
-            return Location(built_in(source), self.range(span))
+        if is_built_in(source):
+            path = None if self.supports("workspace", CONTENT) else file_of(source)
+            uri = uris.from_path(path) if path else f"idlc:/{inside(source)}"
+            return Location(uri, self.range(span))
         return Location(self.uri(state.path_of(source)), self.range(span))
 
 
-def built_in(source: Source) -> str:
-    """Return the URI of an interface of the catalogue, such as `idlc:/jazzy/std_msgs/msg/…`."""
-    return "idlc:/" + source.path.replace("<", "", 1).replace(">", "", 1)
+def is_built_in(source: Source) -> bool:
+    """Return whether a text is of the catalogue."""
+    return source.path.startswith("<")

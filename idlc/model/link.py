@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Hashable, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import Container, Iterable, Iterator, Mapping, MutableMapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
@@ -15,7 +15,7 @@ from idlc.model.circles import check_recursion
 from idlc.model.distro import DEFAULT, Distro, titles
 from idlc.model.lowering import slips
 from idlc.model.lowering.types import STRINGS
-from idlc.model.pool import Pool
+from idlc.model.pool import Graph, Pool
 
 if TYPE_CHECKING:
     from idlc.model.describe import Describer
@@ -92,10 +92,16 @@ class Model:
         own = tuple(interface for interface in self.own if interface.name in names)
         return Model(self.package, own, self.interfaces, self._pool)
 
-    def each(self) -> Iterator[tuple[Model, Hashable]]:
-        """Yield the model with each of its own interfaces alone, and all that it depends on."""
+    def each(self) -> Iterator[Model]:
+        """Yield the model with each of its own interfaces alone."""
         for one in self.own:
-            yield Model(self.package, (one,), self.interfaces, self._pool), self.reach(one.name)
+            yield Model(self.package, (one,), self.interfaces, self._pool)
+
+    def graph(self) -> Graph:
+        """Return the own interfaces and all that they refer to, `None` for what there is not."""
+        if self._pool is None:
+            return {one.name: (one, ()) for one in self.own}
+        return self._pool.graph(one.name for one in self.own)
 
     def alone(self, interface: ir.Interface) -> Model:
         """Return the model of one interface and all that it refers to."""

@@ -43,6 +43,8 @@ class Lowered(msgspec.Struct, frozen=True):
     references: tuple[tuple[ir.Field, ir.TypeName], ...]
 
 
+#: Interfaces with what they refer to; `None` for what there is not.
+Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
 #: What was lowered before, by name; it holds for the same `Source` and distribution.
 Memory: TypeAlias = dict[ir.TypeName, Lowered]
 
@@ -114,15 +116,21 @@ class Pool:
 
     def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
         """Return an interface with all that it refers to, `None` for what there is not."""
-        seen = {name: self._entries.get(name)}
-        waiting = [name]
+        return tuple(one for one, _ in self.graph((name,)).values())
+
+    def graph(self, names: Iterable[ir.TypeName]) -> Graph:
+        """Return interfaces and all that they refer to, `None` for what there is not."""
+        found: Graph = {}
+        waiting = list(names)
         while waiting:
-            entry = seen[waiting.pop()]
-            for _, target in entry.references if entry else ():
-                if target not in seen:
-                    seen[target] = self._entries.get(target)
-                    waiting.append(target)
-        return tuple(entry.interface if entry else None for entry in seen.values())
+            name = waiting.pop()
+            if name in found:
+                continue
+            entry = self._entries.get(name)
+            targets = tuple(target for _, target in entry.references) if entry else ()
+            found[name] = (entry.interface if entry else None, targets)
+            waiting += targets
+        return found
 
     def is_sound(self, name: ir.TypeName) -> bool:
         """Return whether an interface and all that it refers to exist and have no errors."""

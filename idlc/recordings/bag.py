@@ -33,7 +33,11 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
             notes += [f"`{name}` is not named in {METADATA} and left out" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
-        raise RecordingError(f"`{folder}` holds no recording", "it has no .mcap and no .db3 file")
+        inside = sorted(one.parent for one in folder.glob(f"*/{METADATA}"))
+        hint = (
+            f"name a bag in it, such as `{inside[0]}`" if inside else "it has no .mcap or .db3 file"
+        )
+        raise RecordingError(f"`{folder}` holds no recording", hint)
     for name in present:
         if name.endswith(COMPRESSED):
             hint = f"zstd -d {folder / name}"

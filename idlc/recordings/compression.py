@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,9 @@ from idlc.recordings.errors import RecordingError
 PIECE = 1 << 22
 #: A chunk may not be larger, whatever it says: no writer makes chunks that come near.
 MOST_IN_A_CHUNK = 1 << 29
+#: Has one decompressor of zstd: making one for each chunk takes a tenth of the time, and threads
+#: cannot share it.
+_THREAD = threading.local()
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
@@ -65,7 +69,9 @@ def _zstd(data: memoryview, target: memoryview) -> int:
         import zstandard
     except ImportError:
         raise missing("zstandard", "chunks are compressed with zstd") from None
-    reader = zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True)
+    if not hasattr(_THREAD, "zstd"):
+        _THREAD.zstd = zstandard.ZstdDecompressor()
+    reader = _THREAD.zstd.stream_reader(data, read_across_frames=True)
     done = 0
     try:
         while done < len(target) and (size := reader.readinto(target[done:])):
@@ -107,13 +113,32 @@ def _newer_zstd(data: memoryview, target: memoryview) -> int:
 
 def _lz4(data: memoryview, target: memoryview) -> int:
     try:
-        from lz4.frame import LZ4FrameDecompressor
+        from lz4 import frame
     except ImportError:
         raise missing("lz4", "chunks are compressed with lz4") from None
     try:
-        return _by_pieces(LZ4FrameDecompressor(), data, target)
+        return _by_pieces(_Lz4(frame), data, target)
     except (RuntimeError, ValueError, EOFError) as error:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
+
+
+class _Lz4:
+    """Decompresses as the standard library does; lz4's own class copies its input each time."""
+
+    def __init__(self, frame: Any) -> None:
+        self._piece = frame.decompress_chunk
+        self._context = frame.create_decompression_context()
+        self._rest = memoryview(b"")
+        self.eof = self.needs_input = False
+
+    def decompress(self, data: memoryview, max_length: int) -> bytes:
+        """Return the next bytes."""
+        rest = self._rest or data
+        found: bytes
+        found, read, self.eof = self._piece(self._context, rest, max_length=max_length)
+        self._rest = rest[read:]
+        self.needs_input = len(found) < max_length
+        return found
 
 
 def _by_pieces(decompressor: Any, data: memoryview, target: memoryview) -> int:

@@ -169,7 +169,14 @@ class Container(File):
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""
         for file, ids in self.ids_of(topic):
-            yield from file.messages(ids, file.pieces(ids, window), window)  # type: ignore[arg-type]
+            found = 0
+            for some in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
+                found += len(some)
+                yield some
+            told = sum(one.count for one, number in file.topics if number in ids)
+            if window == (None, None) and found != told:
+                what = f"{told:,} messages of `{topic.name}` are counted, and there are {found:,}"
+                raise RecordingError(f"`{file.name}`: {what}")
 
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""

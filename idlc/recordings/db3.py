@@ -122,12 +122,11 @@ class Db3:
 
     def rows_of_messages(self) -> list[Rows]:
         """Return the rows that there are, in one piece; none if there are no messages."""
-        query = "SELECT MIN(rowid), MAX(rowid) FROM messages NOT INDEXED"
-        return [
-            Rows(first, last)
-            for first, last in self.rows(query)
-            if isinstance(first, int) and isinstance(last, int)
-        ]
+        # one query for both would go over all rows
+        query = "SELECT {}(rowid) FROM messages NOT INDEXED"
+        first, last = (next(self.rows(query.format(one)))[0] for one in ("MIN", "MAX"))
+        whole = isinstance(first, int) and isinstance(last, int)
+        return [Rows(first, last)] if whole else []
 
     def start(self) -> int | None:
         """Return when the first message came."""

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
 from idlc.recordings.compression import ZSTD_MAGIC, zstd_frame
 from idlc.recordings.db3 import Db3, Rows
 from idlc.recordings.errors import RecordingError, of_file
-from idlc.recordings.messages import Messages, Window
+from idlc.recordings.messages import Messages, Raw, Separate, Window
 
 #: Rows are handed on together until they have so many bytes.
-GROUP = 1 << 24
+GROUP = 1 << 25
 #: SQLite has no larger integers.
 LARGEST = (1 << 63) - 1
 
@@ -24,16 +23,18 @@ def messages(
     """Yield the messages of some topics in some rows."""
     for piece in pieces:
         with of_file(database.name):
-            rows: list[tuple[int, bytes]] = []
+            times: list[int] = []
+            raws: list[Raw] = []
             size = 0
             for time, data in _rows(database, piece, topics, window):
-                rows.append((time, data))
+                times.append(time)
+                raws.append(data)
                 size += len(data)
                 if size >= GROUP:
-                    yield _messages(rows)
-                    rows, size = [], 0
-            if rows:
-                yield _messages(rows)
+                    yield Separate(np.array(times, np.int64), None, raws)
+                    times, raws, size = [], [], 0
+            if raws:
+                yield Separate(np.array(times, np.int64), None, raws)
 
 
 def _rows(
@@ -58,10 +59,3 @@ def _rows(
 def _plain(data: bytes) -> bytes:
     """Return a message that may be compressed by itself; none begins like a zstd frame."""
     return zstd_frame(data) if data.startswith(ZSTD_MAGIC) else data
-
-
-def _messages(rows: list[tuple[int, bytes]]) -> Messages:
-    times, found = zip(*rows, strict=True)
-    sizes: Any = np.fromiter(map(len, found), np.int64, len(found))
-    stops = np.cumsum(sizes)
-    return Messages(b"".join(found), stops - sizes, stops, np.array(times, np.int64), None)

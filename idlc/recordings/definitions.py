@@ -62,7 +62,7 @@ def recorded(topic: Topic, recording: str) -> Recorded:
     texts: dict[ir.TypeName, Source] = {}
     repeated = []
     for one, extension, text in _definitions(topic, interface):
-        source = Source(f"{recording}: topic {topic.name}: {one}.{extension}", text)
+        source = Source(f"{recording}: topic {topic.name}: {one}.{extension}", text, recording)
         if texts.setdefault(one, source).text != text:
             repeated.append((one, source))
     return Recorded(recording, topic, name, interface, texts, tuple(repeated))

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import secrets
 import sys
-from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -62,9 +60,13 @@ def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) ->
     import pyarrow as pa
     from pyarrow import parquet
 
-    with parquet.ParquetWriter(file, schema) as writer:
+    from idlc.recordings.plain import storable, stored
+
+    kept = storable(schema)
+    with parquet.ParquetWriter(file, kept) as writer:
         for group in _groups(batches):
-            writer.write_table(pa.Table.from_batches(group, schema), row_group_size=ROWS * 2)
+            table = pa.Table.from_batches([stored(one, kept) for one in group], kept)
+            writer.write_table(table, row_group_size=ROWS * 2)
 
 
 def _groups(batches: Iterator[pa.RecordBatch]) -> Iterator[list[pa.RecordBatch]]:
@@ -92,51 +94,14 @@ def _arrow(
 
 
 def _csv(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
-    import pyarrow as pa
     from pyarrow import csv
 
-    plain = pa.schema([field.with_type(_plain(field.type)) for field in schema])
+    from idlc.recordings.plain import as_text, textual
+
+    plain = textual(schema)
     with csv.CSVWriter(file, plain) as writer:
         for batch in batches:
-            pairs = zip(batch.columns, plain, strict=True)
-            columns = [_as_text(column, field.type) for column, field in pairs]
-            writer.write_batch(pa.RecordBatch.from_arrays(columns, schema=plain))
-
-
-def _plain(kind: pa.DataType) -> pa.DataType:
-    """Return the type that a column has in a CSV file, which knows no lists."""
-    from pyarrow import types
-
-    if types.is_duration(kind):
-        return _of("int64")
-    if types.is_nested(kind) or types.is_large_binary(kind) or types.is_binary(kind):
-        return _of("string")
-    return _plain(kind.value_type) if types.is_dictionary(kind) else kind
-
-
-def _of(name: str) -> pa.DataType:
-    import pyarrow as pa
-
-    return pa.type_for_alias(name)
-
-
-def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
-    """Return a column of another type: lists are JSON, bytes are in base64."""
-    import pyarrow as pa
-
-    if column.type == kind:
-        return column
-    if kind != _of("string"):
-        return column.cast(kind)
-    return pa.array([json.dumps(_value(one), default=_base64) for one in column.to_pylist()], kind)
-
-
-def _value(one: Any) -> Any:
-    return _base64(one) if isinstance(one, bytes) else one
-
-
-def _base64(one: Any) -> str:
-    return b64encode(one).decode() if isinstance(one, bytes) else str(one)
+            writer.write_batch(as_text(batch, plain))
 
 
 def style_of(path: str) -> str | None:

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from glob import glob, has_magic
 from pathlib import Path
 
-from idlc.disk.enclosing_package import MANIFEST
 from idlc.disk.find import KIND_FOLDERS, KINDS
+from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.read import is_file, is_folder
 from idlc.recordings.bag import COMPRESSED, METADATA, SUFFIXES
 

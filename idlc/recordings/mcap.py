@@ -53,7 +53,7 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> McapF
             return _summary(source, check)
         except RecordingError as error:
             reason = error.message
-    return _walk(source, reason)
+    return _walk(source, reason, index)
 
 
 def _summary(source: Source, check: bool) -> McapFacts:
@@ -109,14 +109,19 @@ def _believe(facts: McapFacts, statistics: mcap.Statistics | None, start: int) -
 
 
 class _Walk:
-    """A walk over all records of a file, which goes from head to head and opens what it must."""
+    """A walk over all records of a file, which goes from head to head and opens what it must.
 
-    def __init__(self, source: Source) -> None:
+    That is every chunk if their indexes are not to be used.
+    """
+
+    def __init__(self, source: Source, index: bool) -> None:
         self.source = source
+        self.uses_index = index
         self.facts = McapFacts()
         self.loose: tuple[int, int] | None = None
         self.last: Chunk | None = None
         self.offsets = bytearray()
+        self.entries: dict[int, int] = {}
 
     def heads(self) -> Iterator[tuple[int, int, int]]:
         """Yield kind, place and size, with the head, of each record that is there as a whole."""
@@ -170,20 +175,24 @@ class _Walk:
         """Take note of the index of one channel in the chunk before it."""
         fields = mcap.Fields(self.content(at, size), "the index of a chunk")
         channel, entries = fields.number(2), fields.number(4)
-        assert self.last is not None
-        self.count(channel, entries // 16, self.last.first)
+        self.entries[channel] = self.entries.get(channel, 0) + entries // 16
         self.offsets += mcap.INDEX_OFFSET.pack(channel, at)
 
-    def end_of_chunk(self) -> None:
-        """Keep the chunk before; open it if it alone can say what its channels are."""
+    def end_of_chunk(self, *, cut_off: bool = False) -> None:
+        """Keep the chunk before; open it if it alone can say what its channels are.
+
+        Where the file is cut off, so may be what it has of indexes.
+        """
         if self.last is None:
             return
-        known = self.facts.channels.keys()
-        named = {found for found, _ in mcap.INDEX_OFFSET.iter_unpack(self.offsets)}
-        if not named or not named <= known:
-            self.open(self.last, counting=not named)
+        if cut_off:
+            self.entries, self.offsets = {}, bytearray()
+        for channel, messages in self.entries.items():
+            self.count(channel, messages, self.last.first)
+        if not self.entries or not self.entries.keys() <= self.facts.channels.keys():
+            self.open(self.last, counting=not self.entries)
         self.facts.chunks.append(self.last._replace(indexes=bytes(self.offsets) or None))
-        self.last, self.offsets = None, bytearray()
+        self.last, self.offsets, self.entries = None, bytearray(), {}
 
     def open(self, chunk: Chunk, counting: bool) -> None:
         """Take note of what stands in a chunk."""
@@ -194,13 +203,17 @@ class _Walk:
                 self.count_one(data)
 
 
-def _walk(source: Source, reason: str) -> McapFacts:
-    """Return what the whole records of a file say; `reason` is why its summary is not used."""
-    walk, ended, end = _Walk(source), False, len(MAGIC)
+def _walk(source: Source, reason: str, index: bool) -> McapFacts:
+    """Return what the whole records of a file say; `reason` is why its summary is not used.
+
+    Without `index`, those of chunks are not used either.
+    """
+    walk, ended, end = _Walk(source, index), False, len(MAGIC)
     for op, at, size in walk.heads():
         end = at + size
         if op == mcap.MESSAGE_INDEX_OP and walk.last:
-            walk.index(at, size)
+            if walk.uses_index:
+                walk.index(at, size)
             continue
         walk.end_of_chunk()
         if op == mcap.MESSAGE_OP:
@@ -211,7 +224,7 @@ def _walk(source: Source, reason: str) -> McapFacts:
         elif op in (mcap.SCHEMA_OP, mcap.CHANNEL_OP):
             walk.facts.add(op, walk.content(at, size))
         ended = op == mcap.DATA_END_OP
-    walk.end_of_chunk()
+    walk.end_of_chunk(cut_off=not ended)
     walk.end_of_loose()
     if ended:
         walk.facts.notes.append(f"{reason}: read from its records")

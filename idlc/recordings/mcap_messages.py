@@ -20,8 +20,8 @@ from idlc.recordings import mcap_records as mcap
 from idlc.recordings.compression import check_size, decompress
 from idlc.recordings.errors import RecordingError, of_file
 from idlc.recordings.mcap_records import HEAD, Chunk, ChunkHead
-from idlc.recordings.messages import Messages, Window, times_of
-from idlc.recordings.source import MappedFile, Source
+from idlc.recordings.messages import Messages, Ranges, Window, times_of
+from idlc.recordings.source import Source
 
 #: What stands before the bytes of a message.
 MESSAGE = np.dtype(
@@ -36,8 +36,9 @@ MESSAGE = np.dtype(
 )
 MESSAGE_HEAD = Struct("<BQH")
 LEAST = MESSAGE.itemsize - HEAD.size
-#: Neighbours are opened together up to so many bytes: few calls, and memory stays bounded.
-GROUP = 1 << 24
+#: Neighbours are opened together up to so many bytes: few calls, and memory stays bounded. What is
+#: read in place takes no memory of its own.
+GROUP, GROUP_IN_PLACE = 1 << 24, 1 << 26
 
 
 class Opened(NamedTuple):
@@ -89,26 +90,33 @@ def _head(source: Source, chunk: Chunk) -> ChunkHead:
 
 
 def _groups(source: Source, chunks: Iterable[Chunk]) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
-    """Yield neighbours that are opened together."""
+    """Yield neighbours that are opened together: all of them in place, or none."""
     group: list[tuple[Chunk, ChunkHead]] = []
-    size = 0
+    size = most = 0
     for chunk in chunks:
         head = _head(source, chunk)
-        if group and size + head.size > GROUP:
+        room = GROUP_IN_PLACE if _in_place(source, head) else GROUP
+        if group and (room != most or size + head.size > room):
             yield group
             group, size = [], 0
+        most = room
         group.append((chunk, head))
         size += head.size
     if group:
         yield group
 
 
+def _in_place(source: Source, head: ChunkHead) -> bool:
+    """Return whether the records of a chunk are read where they are in the file."""
+    return source.mapped is not None and not head.compression
+
+
 def _opened(
     source: Source, group: list[tuple[Chunk, ChunkHead]], check: bool
 ) -> tuple[Any, list[Opened]]:
-    """Return a buffer with the records of chunks: the file itself if none is compressed."""
-    in_place = isinstance(source, MappedFile) and not any(head.compression for _, head in group)
-    buffer: Any = source.view(0, source.size)
+    """Return a buffer with the records of chunks: the file itself if they are in place."""
+    in_place = _in_place(source, group[0][1])
+    buffer: Any = source.mapped
     if not in_place:
         buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
     opened, at = [], 0
@@ -174,7 +182,7 @@ def _walked(array: Any, one: Opened, channels: Collection[int]) -> list[int]:
 
 def _messages(
     buffer: Any, array: Any, opened: list[Opened], offsets: list[Any], channels: Collection[int]
-) -> Messages:
+) -> Ranges:
     """Return the messages at some offsets of a buffer, or fail if there are none."""
     at = np.concatenate(offsets)
     counts = [len(one) for one in offsets]
@@ -193,4 +201,4 @@ def _messages(
     if (stops[:-1] > at[1:]).any():
         raise RecordingError("an index names messages that overlap")
     log, publish = times_of(heads["log"], "log time"), times_of(heads["publish"], "publish time")
-    return Messages(buffer, at + MESSAGE.itemsize, stops, log, publish)
+    return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,11 @@ from idlc.recordings.errors import RecordingError
 
 #: What numpy and Arrow can say of times ends here, in the year 2262.
 END_OF_TIME = 1 << 63
+
+#: From this mean size on, messages are not copied to be one buffer.
+LARGE = 1 << 15
+
+Raw: TypeAlias = bytes | memoryview
 
 
 class Window(NamedTuple):
@@ -50,38 +55,58 @@ ALWAYS = Window()
 
 @dataclass(frozen=True)
 class Messages:
-    """Messages of one topic, in the order in which they were recorded, each a part of one buffer.
+    """Messages of one topic, in the order in which they were recorded, for `to_columns` to read.
 
     Times are int64, in nanoseconds; `publish_times` is None where a recording has none.
     """
 
-    buffer: Any
-    starts: Any
-    stops: Any
     log_times: Any
     publish_times: Any | None
 
     def __len__(self) -> int:
-        return len(self.starts)
+        return len(self.log_times)
 
-    def within(self, window: Window) -> Messages:
+    def views(self) -> list[Raw]:
+        """Return the bytes of each message."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Ranges(Messages):
+    """Messages that are each a part of one buffer."""
+
+    buffer: Any
+    starts: Any
+    stops: Any
+
+    def within(self, window: Window) -> Ranges:
         """Return those of a window."""
         inside = window.holds(self.log_times)
         if inside is None or inside.all():
             return self
-        return Messages(
-            self.buffer,
-            self.starts[inside],
-            self.stops[inside],
-            self.log_times[inside],
-            None if self.publish_times is None else self.publish_times[inside],
-        )
+        publish = None if self.publish_times is None else self.publish_times[inside]
+        starts, stops = self.starts[inside], self.stops[inside]
+        return Ranges(self.log_times[inside], publish, self.buffer, starts, stops)
 
-    def views(self) -> list[memoryview]:
+    def views(self) -> list[Raw]:
         """Return each message as a part of the buffer."""
         view = memoryview(self.buffer)
         pairs = zip(self.starts.tolist(), self.stops.tolist(), strict=True)
         return [view[start:stop] for start, stop in pairs]
+
+
+@dataclass(frozen=True)
+class Separate(Messages):
+    """Messages that are each by themselves: to join large ones would only be another copy."""
+
+    raws: list[Raw]
+
+    def __iter__(self) -> Iterator[Raw]:
+        return iter(self.raws)
+
+    def views(self) -> list[Raw]:
+        """Return the bytes of each message."""
+        return self.raws
 
 
 def times_of(values: Any, what: str) -> Any:
@@ -92,25 +117,21 @@ def times_of(values: Any, what: str) -> Any:
 
 
 def joined(parts: Sequence[Messages]) -> Messages:
-    """Return messages of several buffers as parts of one that holds nothing else."""
+    """Return the messages of all parts, in memory once more only if they are small."""
     if len(parts) == 1:
         return parts[0]
-    if not parts:
-        none = np.zeros(0, np.int64)
-        return Messages(b"", none, none, none, none)
-    starts = np.concatenate([part.starts for part in parts])
-    stops = np.concatenate([part.stops for part in parts])
-    buffer = parts[0].buffer
-    if any(part.buffer is not buffer for part in parts):
-        buffer = b"".join(view for part in parts for view in part.views())
-        sizes = stops - starts
-        stops = np.cumsum(sizes)
-        starts = stops - sizes
-    publish = [part.publish_times for part in parts if part.publish_times is not None]
-    return Messages(
-        buffer,
-        starts,
-        stops,
-        np.concatenate([part.log_times for part in parts]),
-        np.concatenate(publish) if len(publish) == len(parts) else None,
-    )
+    none: Any = np.zeros(0, np.int64)
+    log = np.concatenate([none, *(part.log_times for part in parts)])
+    found = [part.publish_times for part in parts if part.publish_times is not None]
+    publish = np.concatenate([none, *found]) if len(found) == len(parts) else None
+    ranges = [part for part in parts if isinstance(part, Ranges)]
+    if len(ranges) == len(parts) and len({id(part.buffer) for part in ranges}) == 1:
+        starts = np.concatenate([part.starts for part in ranges])
+        stops = np.concatenate([part.stops for part in ranges])
+        return Ranges(log, publish, ranges[0].buffer, starts, stops)
+    raws = [raw for part in parts for raw in part.views()]
+    sizes: Any = np.fromiter(map(len, raws), np.int64, len(raws))
+    if sizes.sum() >= LARGE * len(raws):
+        return Separate(log, publish, raws)
+    stops = np.cumsum(sizes)
+    return Ranges(log, publish, b"".join(raws), stops - sizes, stops)

@@ -15,6 +15,8 @@ class Source(Protocol):
 
     name: str
     size: int
+    #: The whole file, if it is read where it is.
+    mapped: memoryview | None
 
     def view(self, start: int, size: int) -> memoryview:
         """Return so many bytes; raise RecordingError if the file has fewer."""
@@ -40,12 +42,13 @@ class MappedFile:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise RecordingError(f"`{path}` cannot be read: {reason}") from None
-        self._bytes = memoryview(self._map or b"")
+        self.mapped: memoryview | None = memoryview(self._map or b"")
 
     def view(self, start: int, size: int) -> memoryview:
         """Return a view of the mapped file."""
         within(self, start, size)
-        return self._bytes[start : start + size]
+        assert self.mapped is not None
+        return self.mapped[start : start + size]
 
     def forget(self, start: int, stop: int) -> None:
         """Unmap pages, or the whole of a long file would count as this process's memory."""
@@ -55,7 +58,7 @@ class MappedFile:
 
     def close(self) -> None:
         """Forget the map, which lives as long as views of it."""
-        self._map, self._bytes = None, memoryview(b"")
+        self._map, self.mapped = None, memoryview(b"")
         self.size = 0
 
 
@@ -68,6 +71,17 @@ def source_of(place: Any) -> Source:
     """Return a file at a path, at a URL that fsspec can open, or of an object that is one."""
     if is_local(place):
         return MappedFile(Path(place))
+    name = _name(place)
+    try:
+        return OpenedFile(_opened(place), name)
+    except RecordingError:
+        raise
+    except Exception as error:  # each kind of store raises its own
+        raise RecordingError(f"`{name}` cannot be read: {_told(error)}") from None
+
+
+def _opened(place: Any) -> Any:
+    """Return a file object of a URL, of an fsspec file, or the one that is given."""
     if isinstance(place, str):
         try:
             import fsspec
@@ -75,11 +89,14 @@ def source_of(place: Any) -> Source:
             message = f"`{place}` is opened by fsspec, which is not installed"
             raise RecordingError(message, "pip install fsspec") from None
         place = fsspec.open(place, "rb")
-    opened = place.open() if hasattr(place, "open") else place
-    try:
-        return OpenedFile(opened, _name(place))
-    except OSError as error:
-        raise RecordingError(f"`{place}` cannot be read: {error}") from None
+    return place.open() if hasattr(place, "open") else place
+
+
+def _told(error: Exception) -> str:
+    """Return what an error says, or is."""
+    if isinstance(error, FileNotFoundError):
+        return "No such file or directory"
+    return str(error) or type(error).__name__
 
 
 def _name(place: Any) -> str:
@@ -98,14 +115,13 @@ def first_bytes(path: Path, size: int = 16) -> bytes:
 class OpenedFile:
     """A binary file object that can seek, such as fsspec's on an object store."""
 
+    mapped: memoryview | None = None
+
     def __init__(self, file: Any, name: str) -> None:
         self.name = name
         self._file = file
         self._lock = threading.Lock()
-        try:
-            self.size = int(file.seek(0, 2))
-        except (OSError, ValueError) as error:
-            raise RecordingError(f"`{name}` cannot be read: {error}") from None
+        self.size = int(file.seek(0, 2))
 
     def view(self, start: int, size: int) -> memoryview:
         """Return bytes that are read now."""
@@ -114,8 +130,8 @@ class OpenedFile:
             with self._lock:
                 self._file.seek(start)
                 found = self._file.read(size)
-        except (OSError, ValueError) as error:
-            raise RecordingError(f"`{self.name}` cannot be read: {error}") from None
+        except Exception as error:  # each kind of store raises its own
+            raise RecordingError(f"`{self.name}` cannot be read: {_told(error)}") from None
         if len(found) != size:
             raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
         return memoryview(found)

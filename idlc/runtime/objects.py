@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from array import array
 
 from .names import slot_name
@@ -17,6 +18,11 @@ ATOMIC = frozenset({bool, bytes, float, int, str})
 SMALL = 64
 #: Elements of large arrays that are compared at once.
 PIECE = 1 << 16
+#: What is not shown of the names of modules.
+HIDDEN = ""
+_found: Any = None
+#: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
+_of_numpy: set[type] = set()
 
 
 def owner_of(kind: type) -> Any:
@@ -29,31 +35,51 @@ def owner_of(kind: type) -> Any:
 
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
-    if type(mine) is array and type(other) is array:
-        if (
-            len(mine) > SMALL
-            and mine.typecode == other.typecode
-            and mine.typecode not in "fd"
-        ):
-            # only `bytes` and `bytearray` compare memory at once
-            if len(mine) <= PIECE or len(mine) != len(other):
-                return bytearray(mine) == memoryview(other)
-            return _in_pieces(memoryview(mine), memoryview(other))
-    elif type(mine).__module__ == "numpy" or type(other).__module__ == "numpy":
-        if type(mine) is type(other) and len(mine) <= SMALL:
-            return memoryview(mine) == memoryview(other)
+    kind = type(mine)
+    if kind is array and type(other) is array:
+        if mine.typecode == other.typecode:
+            if mine.typecode in "fd":  # no nan is equal to another
+                return memoryview(mine) == memoryview(other)
+            if len(mine) > SMALL:
+                return len(mine) == len(other) and _same_memory(mine, other)
+    elif kind in _of_numpy and type(other) is kind and len(mine) <= SMALL:
+        return bool(mine.data == other)
+    elif kind.__module__ == "numpy" or type(other).__module__ == "numpy":
         import numpy as np
 
+        _of_numpy.add(np.ndarray)
         return np.array_equal(mine, other)
     return bool(mine == other)
 
 
-def _in_pieces(mine: memoryview, other: memoryview) -> bool:
-    """Return whether two long arrays are equal; a copy of a piece stays in a cache."""
-    return all(
-        bytearray(mine[at : at + PIECE]) == other[at : at + PIECE]
-        for at in range(0, len(mine), PIECE)
-    )
+def _same_memory(mine: array[Any], other: array[Any]) -> bool:
+    """Return whether two arrays of one size and kind hold the same bytes."""
+    if len(mine) <= PIECE:  # only `bytes` and `bytearray` compare memory at once
+        return bytearray(mine) == memoryview(other)
+    with memoryview(mine) as one, memoryview(other) as two:  # no thread moves them now
+        compare = _memcmp()
+        if compare is None:  # a copy of a piece stays in a cache
+            pieces = range(0, len(one), PIECE)
+            return all(
+                bytearray(one[at : at + PIECE]) == two[at : at + PIECE] for at in pieces
+            )
+        (here, _), (there, _) = mine.buffer_info(), other.buffer_info()
+        return bool(compare(here, there, one.nbytes) == 0)
+
+
+def _memcmp() -> Any:
+    """Return the function of C, if ctypes has been loaded, as it is with numpy and rclpy."""
+    global _found
+    if _found is None and "ctypes" in sys.modules:
+        import ctypes
+
+        try:
+            made = ctypes.pythonapi["memcmp"]
+        except AttributeError:  # Windows
+            return None
+        made.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+        _found = made  # not before: another thread may be waiting for it
+    return _found
 
 
 def copied(message: Any) -> Any:
@@ -114,7 +140,7 @@ represented.__qualname__ = "__create_fn__.<locals>.__repr__"
 
 def _shown_name(kind: type) -> str:
     """Return a class's name after that of its package, its module left out."""
-    package = kind.__module__.rpartition(".")[0]
+    package = kind.__module__.rpartition(".")[0].removeprefix(HIDDEN)
     return f"{package}.{kind.__name__}" if package else kind.__name__
 
 

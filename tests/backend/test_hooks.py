@@ -13,7 +13,7 @@ from email.parser import Parser
 import pytest
 
 from idlc import backend
-from idlc.disk import environment
+from idlc.disk.machine import environment
 from tests.support.programs import ended
 
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'

@@ -154,7 +154,7 @@ def test_circles_and_depth_do_no_harm():
 def say(monkeypatch, tmp_path, capsys):
     """Return what idlc says of a recorded graph, as status and text."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
 
     def run(graph, *words):
         take_the_place(monkeypatch, graph)

@@ -15,6 +15,8 @@ from tests.support.github_runner import Runner, plain_environment
 from tests.support.paths import DOCS
 from tests.support.sarif_schema import runs_of
 
+pytestmark = pytest.mark.long
+
 CI = (DOCS / "ci.md").read_text(encoding="utf-8")
 BIN = Path(sys.executable).parent
 

@@ -467,7 +467,7 @@ def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monk
 
     make("demo/msg/A.msg", "stereo_msgs/DisparityImage image\nstd_msgs/Header header\n")
     here = {"rclpy": ["/ros/rclpy"]}
-    folders = "idlc.disk.environment.python_folders"
+    folders = "idlc.disk.machine.environment.python_folders"
     monkeypatch.setattr(folders, lambda package: [Path(one) for one in here.get(package, ())])
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
     assert "warning[IDL617]" in capsys.readouterr().err

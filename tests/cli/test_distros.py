@@ -43,7 +43,7 @@ ROSIDL = {
 def _nothing_is_installed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / ".git").mkdir()
-    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
     monkeypatch.delenv("ROS_DISTRO", raising=False)
 
 
@@ -58,7 +58,7 @@ def install(tmp_path_factory, monkeypatch):
         for path, text in files.items():
             (prefix / "share" / path).parent.mkdir(parents=True, exist_ok=True)
             (prefix / "share" / path).write_text(text, encoding="utf-8")
-        monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: (prefix,))
+        monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: (prefix,))
         return prefix
 
     return make

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from idlc.disk import cache
+from idlc.disk.cache import place as cache
 
 WITH_CACHE = {"PYTHONDONTWRITEBYTECODE": ""}
 

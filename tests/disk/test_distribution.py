@@ -2,7 +2,7 @@
 
 import pytest
 
-from idlc.disk.distribution import DEFAULT, distribution
+from idlc.disk.machine.distribution import DEFAULT, distribution
 from idlc.driver.generate.libraries import target_of
 from idlc.native.layouts import LAYOUTS
 

@@ -8,9 +8,9 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.disk.distribution import Distribution
 from idlc.disk.find import look
-from idlc.disk.inputs import load
+from idlc.disk.machine.distribution import Distribution
+from idlc.disk.packages.inputs import load
 from idlc.disk.scope import Scope
 from idlc.driver.stages import models_of
 from idlc.native.inspect import inspect
@@ -103,13 +103,13 @@ def test_a_type_that_is_missing(here, said):
 
 
 def test_another_processor(here, said, monkeypatch):
-    monkeypatch.setattr("idlc.disk.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
     (here / LIBRARY).write_bytes(made(machine="aarch64"))
     assert said() == (1, [(NAME, "is for another processor than x86_64")])
 
 
 def test_another_distribution(here, said, monkeypatch):
-    monkeypatch.setattr("idlc.disk.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
     for name, fits in (("jazzy", True), ("kilted", True), ("humble", False), ("lyrical", False)):
         (here / LIBRARY).write_bytes(made(layout=name))
         there = Distribution("jazzy", "for this test")

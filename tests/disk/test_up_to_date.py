@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from idlc.diagnostics.report import Report
 from idlc.disk.output import up_to_date
+from idlc.disk.scope import Scope
+from idlc.driver.generate.gen import GenOptions, gen
 
 PACKAGE = Path(up_to_date.__file__).parents[2]
 MAKERS = [path for path in up_to_date._MAKERS if path.is_dir()]
@@ -30,3 +33,43 @@ def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     up_to_date._newest_maker.cache_clear()
     assert up_to_date._newest_maker() == before + 1
     up_to_date._newest_maker.cache_clear()
+
+
+def written(folder: Path, package: str) -> tuple[int, list[str]]:
+    """Compile one of two packages; return how many files were written, and what was reported."""
+    report = Report()
+    options = GenOptions((str(folder / package),), str(folder / "out" / package), Scope(package))
+    done = gen(options, report)
+    return sum(one.written for one in done), [found.code for found in report]
+
+
+@pytest.fixture
+def both(tmp_path):
+    """The folder of two packages with the same support code, compiled in this process."""
+    for package in ("a_msgs", "b_msgs"):
+        (tmp_path / package / "msg").mkdir(parents=True)
+        (tmp_path / package / "msg" / "A.msg").write_text("int32 a\n")
+        assert written(tmp_path, package)[0]
+        assert written(tmp_path, package) == (0, [])
+    return tmp_path
+
+
+@pytest.mark.parametrize("path", ["_idlc/message.py", "_idlc/type_data.py", "msg/_a.py"])
+def test_an_edit_of_the_same_size_and_time_is_seen(both, path):
+    edited = both / "out" / "b_msgs" / path
+    status, content = edited.stat(), edited.read_bytes()
+    edited.write_bytes(content[:-2] + b"#\n")
+    os.utime(edited, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert edited.stat().st_size == status.st_size
+    assert written(both, "b_msgs") == (0, ["IDL613"])
+    assert written(both, "a_msgs") == (0, [])
+    edited.write_bytes(content)
+    assert written(both, "b_msgs") == (0, [])
+
+
+def test_other_line_ends_are_no_edit(both):
+    for path in ("_idlc/message.py", "msg/_a.py"):
+        file = both / "out" / "b_msgs" / path
+        file.write_bytes(file.read_bytes().replace(b"\n", b"\r\n"))
+    for package in ("b_msgs", "a_msgs", "b_msgs"):
+        assert written(both, package) == (0, [])

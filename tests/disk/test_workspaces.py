@@ -20,7 +20,7 @@ COMMANDS = ("check", "hash", "gen", "docs", "breaking", "fmt")
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
     (tmp_path / ".git").mkdir()
     return tmp_path
 

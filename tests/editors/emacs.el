@@ -78,6 +78,11 @@
       (let ((xref-prompt-for-identifier nil))
         (call-interactively #'xref-find-definitions))
       (file-name-nondirectory (buffer-file-name)))
+(look "built_in"
+      (open "msg/Drive.msg" "Header")
+      (let ((xref-prompt-for-identifier nil))
+        (call-interactively #'xref-find-definitions))
+      (text))
 (look "references"
       (open "msg/Fleet.msg" "Drive")
       (vconcat (mapcar #'place (xref-backend-references 'eglot (xref-backend-identifier-at-point 'eglot)))))
@@ -104,6 +109,11 @@
       (open "msg/Drive.msg")
       (setq imenu--index-alist nil)
       (vconcat (names (funcall imenu-create-index-function))))
+(look "update"
+      (write-region (getenv "SETTINGS") nil (expand-file-name "pyproject.toml" root))
+      (mapc #'open '("msg/Fleet.msg" "msg/Drive.msg" "msg/Broken.msg" "msg/Untidy.msg"))
+      (eglot-code-actions (point-min) (point-max) "source.updateGenerated.idlc" t)
+      (file-exists-p (expand-file-name "out/demo_msgs/msg/_untidy.py" root)))
 
 (dolist (buffer (buffer-list)) (with-current-buffer buffer (set-buffer-modified-p nil)))
 (ignore-errors (eglot-shutdown-all))

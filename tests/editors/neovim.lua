@@ -175,13 +175,25 @@ local look = {
       return #found > 0 and found
     end)
   end,
+  update = function()
+    vim.fn.writefile(vim.split(vim.env.SETTINGS, '\n'), 'pyproject.toml')
+    open('msg/Untidy.msg')
+    vim.ui.select = function(actions, _, choose)
+      choose(actions[1], 1)
+    end
+    local context = { only = { 'source.updateGenerated' }, diagnostics = {} }
+    vim.lsp.buf.code_action(vim.lsp.enable and { context = context } or context)
+    return wait('generated package', function()
+      return vim.fn.filereadable('out/demo_msgs/msg/_untidy.py') == 1
+    end)
+  end,
 }
 
 local CAPABILITIES = vim.tbl_filter(function(one)
   return look[one]
 end, {
   'diagnostic', 'fix', 'hover', 'definition', 'built_in', 'references',
-  'completion', 'rename', 'format', 'symbol', 'inlay_hint',
+  'completion', 'rename', 'format', 'symbol', 'inlay_hint', 'update',
 })
 
 -- Neovim 0.7 has neither `vim.lsp.enable`, which the plugin calls, nor `vim.lsp.start`.

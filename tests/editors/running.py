@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tests.editors.scenario import SETTINGS
 from tests.support.paths import ROOT
 
 HERE = Path(__file__).parent
@@ -33,7 +34,7 @@ def see(
     done = subprocess.run(
         [str(word) for word in command],
         cwd=package,
-        env=environment(folder, SEEN=str(seen), **variables),
+        env=environment(folder, SEEN=str(seen), SETTINGS=SETTINGS, **variables),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

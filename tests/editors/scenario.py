@@ -13,6 +13,8 @@ FILES = {
     "msg/Broken.msg": "flot64 x\n",
     "msg/Untidy.msg": "float64   speed 0.5# [m/s]\n",
 }
+#: What is written into pyproject.toml at the end, when there are files that cannot be compiled.
+SETTINGS = '[tool.idlc]\npaths = ["msg/Untidy.msg"]\nout = "out/demo_msgs"\n'
 #: What each editor shows: of the first problem its text and the marked words; after a fix, a rename
 #: or formatting the file's text; of a hover some lines; of places the file and the line.
 EXPECTED: dict[str, Any] = {

@@ -23,6 +23,9 @@ def test_neovim_of_debian(package):
     seen = running.neovim("/usr/bin/nvim", package)
     assert scenario.normal(seen) == expected(seen)
     assert seen["syntax"] == "rosmsgPrimitive"
+    # what is built into the server is a file for an editor without the plugin's documents
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
+    assert seen["update"] is True
 
 
 def test_emacs(package, tmp_path):
@@ -35,3 +38,5 @@ def test_emacs(package, tmp_path):
     )
     assert scenario.normal(seen) == expected(seen)
     assert seen["language"] == "rosmsg-mode"
+    assert "builtin_interfaces/Time stamp" in seen["built_in"]
+    assert seen["update"] is True

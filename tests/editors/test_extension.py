@@ -50,7 +50,8 @@ def test_each_command_has_a_function():
 
 
 @pytest.mark.parametrize(
-    "path", ["vscode/syntaxes/rosmsg.tmLanguage.json", "neovim/syntax/rosmsg.vim"]
+    "path",
+    ["vscode/syntaxes/rosmsg.tmLanguage.json", "neovim/syntax/rosmsg.vim", "kate/rosmsg.xml"],
 )
 def test_primitive_types_have_a_colour(path):
     text = (ROOT / "editors" / path).read_text(encoding="utf-8")

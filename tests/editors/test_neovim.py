@@ -13,6 +13,7 @@ def test_neovim(package):
     seen = running.neovim(program.locate(), package)
     assert scenario.normal(seen) == scenario.EXPECTED
     assert seen["syntax"] == "rosmsgPrimitive"
+    assert seen["update"] is True
     # what is built into the server opens as a document
     assert seen["built_in"]["language"] == seen["language"] == "rosmsg"
     assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]

@@ -32,6 +32,8 @@ def test_vscode(package):
     assert scenario.normal(seen) == scenario.EXPECTED
     assert "builtin_interfaces/Time stamp" in seen["built_in"]["text"]
     assert "uint32 nanosec" in seen["show"]
+    assert seen["lens"]
+    assert seen["update"]
     assert seen["gen"]
     assert seen["scaffold"]
     assert seen["errors"] == 0

@@ -216,9 +216,10 @@ def test_user_code_and_generated_code_pass_mypy_strict(user):
 def test_user_code_and_generated_code_pass_basedpyright(user):
     (user / "pyrightconfig.json").write_text('{"typeCheckingMode": "standard"}', encoding="utf-8")
     packages = [package_of(case) for case in CASES]
-    result = run("basedpyright", *packages, "user_code.py", cwd=user)
+    flags = ["--pythonpath", sys.executable]  # otherwise it asks the first python on PATH
+    result = run("basedpyright", *flags, *packages, "user_code.py", cwd=user)
     assert result.returncode == 0, result.stdout[-3000:]
-    result = run("basedpyright", "mistakes.py", cwd=user)
+    result = run("basedpyright", *flags, "mistakes.py", cwd=user)
     assert wrong_lines(result.stdout) == {4, 5, 6, 7, 8, 9}, result.stdout
 
 

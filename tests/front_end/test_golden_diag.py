@@ -83,7 +83,7 @@ def tried(tmp_path, monkeypatch, capsys):
         return done.stdout + done.stderr
 
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.setattr("idlc.disk.environment.runs_nodes", lambda: True)
+    monkeypatch.setattr("idlc.disk.machine.environment.runs_nodes", lambda: True)
     return run
 
 

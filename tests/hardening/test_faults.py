@@ -59,6 +59,7 @@ def assert_new(machine, versions):
     assert not list((machine.folder / "out").rglob(".idlc-stage-*"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("torn", [False, True], ids=["before", "while"])
 def test_killed_at_any_write(torn, before, machine, versions):
     words, start = before
@@ -129,6 +130,7 @@ def test_a_disk_that_takes_only_part_of_a_file(size, before, machine, versions):
     assert_new(machine, versions)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("where", ["out", "out/demo", "out/demo/msg", "pkg"])
 def test_folders_removed_meanwhile(where, machine, versions):
     machine.write(NEW)
@@ -159,21 +161,23 @@ def test_without_permission(mode, machine, versions):
     machine.write(NEW)
     machine.reset(versions[0])
     out = machine.folder / "out"
-    everything = [out, *out.rglob("*")]
+    folders = [out, *(path for path in out.rglob("*") if path.is_dir())]
+    files = [path for path in out.rglob("*") if path.is_file()]
     if other and mode != "another's":
-        for path in everything:
+        for path in (*folders, *files):
             os.chown(path, 65534, 65534)
-    for path in everything:
-        if path.is_dir() and mode != "read-only files":
-            path.chmod(0o555 if mode != "no access" else 0o000)
-        elif path.is_file() and mode == "read-only files":
+    if mode == "read-only files":
+        for path in files:
             path.chmod(0o444)
+    else:
+        for path in reversed(folders):  # who is not root must do the inner ones first
+            path.chmod(0o000 if mode == "no access" else 0o555)
     try:
         found = machine.run(**other)
     finally:
-        for path in everything:
-            if path.is_dir() or path.exists():
-                path.chmod(0o755 if path.is_dir() else 0o644)
+        for path in (*folders, *files):
+            if path.exists():
+                path.chmod(0o755 if path in folders else 0o644)
     if mode == "read-only files":  # what counts is the folder: idlc never writes into a file
         assert found["status"] == 0, found["said"]
         assert_new(machine, versions)

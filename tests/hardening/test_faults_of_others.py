@@ -17,6 +17,8 @@ import pytest
 
 from tests.support.machine import running, tree
 
+pytestmark = pytest.mark.long
+
 PACKAGE = {
     "package.xml": "<?xml version='1.0'?>\n<package format='3'>\n  <name>pkg</name>\n</package>\n",
     "setup.py": "from setuptools import setup\n\nsetup(\n    name='pkg',\n    data_files=[],\n)\n",

@@ -127,6 +127,7 @@ def test_names_while_watching(tmp_path, monkeypatch):
         assert_harmless(said.stdout + said.stderr)
 
 
+@pytest.mark.long
 def test_the_actions_script_obeys_no_name(tmp_path):
     commands = tmp_path / "bin"
     commands.mkdir()

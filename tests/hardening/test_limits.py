@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-import idlc.disk.inputs
+import idlc.disk.packages.inputs
 import idlc.model.lowering.file
 import idlc.model.pool
 from idlc.checks.size import MAX_DEPTH
@@ -316,6 +316,7 @@ def limited(commands):
     return {" ".join(words): (status, out) for words, status, out in said}
 
 
+@pytest.mark.long
 def test_what_is_very_long_is_judged_soon(here):
     for number, (text, _) in enumerate(LONG.values()):
         make(here / f"p{number}", {A: text + "\n"})
@@ -328,6 +329,7 @@ def test_what_is_very_long_is_judged_soon(here):
         assert len(out) < 1_000_000, what
 
 
+@pytest.mark.long
 def test_what_is_very_long_is_generated_and_laid_out_soon(here):
     chosen = ["long default", "comment", "comment of units", "size", "real", "many fields"]
     for number, what in enumerate(chosen):
@@ -383,6 +385,7 @@ def test_what_is_too_large_is_refused_in_plain_words(what, here):
     assert not (here / "site").exists()
 
 
+@pytest.mark.long
 def test_ten_thousand_files(here):
     make(here / "pkg", numbered_files(10_000))
     commands = [["check", "pkg"], ["fmt", "--check", "pkg"], ["hash", "pkg"]]

@@ -7,6 +7,7 @@ import sys
 import pytest
 from lsprotocol import types as lsp
 
+from idlc.cli.main import main
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -229,3 +230,54 @@ def test_what_the_server_can_do_is_what_it_says(editor, package):
     assert said["capabilities"]["hoverProvider"] is answer.capabilities.hover_provider is True
     providers = {name for name in said["capabilities"] if name.endswith("Provider")}
     assert len(providers) == 21
+
+
+def test_line_ends_of_windows_stay_those_of_the_document(editor, package):
+    text = "# Text.\r\nflot64 x\r\nint8   y\r\n"
+    folder = package({"msg/A.msg": text})
+    one = editor(folder)
+    uri = one.open(folder / "msg/A.msg")
+    (problem,) = one.pull(uri)
+    assert problem.range == between(1, 0, 6)
+    one.change(uri, "float64", 2, between(1, 0, 6))
+    assert one.pull(uri) == []
+    options = lsp.FormattingOptions(tab_size=4, insert_spaces=True)
+    params = lsp.DocumentFormattingParams(lsp.TextDocumentIdentifier(uri=uri), options)
+    (edit,) = one.ask(lsp.TEXT_DOCUMENT_FORMATTING, params)
+    assert (edit.range, edit.new_text) == (
+        lsp.Range(start=at(2, 0), end=at(3, 0)),
+        "int8 y\r\n",
+    )
+
+
+def test_a_mark_of_utf_8_counts_as_on_the_command_line(editor, package, capsys):
+    folder = package({"msg/A.msg": "\ufeffint8 x\n", "msg/B.msg": "int8 x\n"})
+    one = editor(folder)
+    uri = (folder / "msg/A.msg").as_uri()
+    main(["check", str(folder), "--format", "json"])
+    lines = capsys.readouterr().out.splitlines()
+    told = [found["code"] for line in lines if "code" in (found := json.loads(line))]
+    assert codes(one.pull(uri)) == told
+    one.open(uri, "int8 x\n")  # editors open it without the mark
+    assert one.pull(uri) == []
+
+
+def test_a_folder_may_be_a_symbolic_link(editor, package, tmp_path):
+    folder = package({"msg/A.msg": "B b\n", "msg/B.msg": "int9 x\n"})
+    link = tmp_path / "link"
+    link.symlink_to(folder, target_is_directory=True)
+    one = editor(link)
+    uri = one.open(link / "msg/A.msg")
+    assert one.pull(uri) == []
+    assert codes(one.wait((link / "msg/B.msg").as_uri())) == ["IDL201"]
+    # the same file by its other name, as some editors open it
+    other = one.open(folder / "msg/A.msg", "B b\nflot64 y\n")
+    assert codes(one.pull(other)) == ["IDL201"]
+
+
+def test_a_folder_without_settings_or_packages_is_looked_at(editor, tmp_path):
+    one = editor(tmp_path)
+    uri = one.open(tmp_path / "A.msg", "flot64 x\n")
+    assert codes(one.pull(uri)) == ["IDL201"]
+    (tmp_path / "B.txt").write_text("x")
+    assert one.pull((tmp_path / "B.txt").as_uri()) == []

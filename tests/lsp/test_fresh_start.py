@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from idlc.lsp.positions import Places
+from idlc.lsp.protocol.positions import Places
 from idlc.lsp.publish import diagnostics
 from idlc.lsp.session import Session
 

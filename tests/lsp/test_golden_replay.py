@@ -14,10 +14,10 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.source import Source
 from idlc.disk.read import is_folder
-from idlc.lsp import framing, uris
-from idlc.lsp.capabilities import ENCODINGS
-from idlc.lsp.positions import Places
-from idlc.lsp.protocol import Position
+from idlc.lsp.protocol import framing, uris
+from idlc.lsp.protocol.capabilities import ENCODINGS
+from idlc.lsp.protocol.parts import Position
+from idlc.lsp.protocol.positions import Places
 from idlc.lsp.server import serve
 from tests.support import golden_text
 from tests.support.paths import GOLDEN

@@ -108,9 +108,16 @@ def test_a_definition_is_found_where_it_is(opened):
     assert found.uri.endswith("Wheel.msg")
 
 
+SHOWS_TEXTS = lsp.ClientCapabilities(
+    workspace=lsp.WorkspaceClientCapabilities(
+        text_document_content=lsp.TextDocumentContentClientCapabilities()
+    )
+)
+
+
 def test_what_is_built_in_is_a_document_of_its_own(editor, package):
     folder = package({"msg/Plan.msg": "shape_msgs/Plane plane\n"})
-    one = editor(folder, options={"idlc": {"distro": "jazzy"}})
+    one = editor(folder, options={"idlc": {"distro": "jazzy"}}, capabilities=SHOWS_TEXTS)
     uri = one.open(folder / "msg/Plan.msg")
     found = ask(one, lsp.TEXT_DOCUMENT_DEFINITION, lsp.DefinitionParams, uri, 0, 3)
     assert found.uri == "idlc:/jazzy/shape_msgs/msg/Plane.msg"
@@ -118,6 +125,66 @@ def test_what_is_built_in_is_a_document_of_its_own(editor, package):
     assert answer.text == "float64[4] coef\n"
     with pytest.raises(JsonRpcException, match="there is no document"):
         one.ask(CONTENT, lsp.TextDocumentContentParams(uri="idlc:/jazzy/../../etc/passwd"))
+
+
+def test_an_editor_that_shows_files_only_gets_one(editor, package, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder = package({"msg/Plan.msg": "shape_msgs/SolidPrimitive solid\nshape_msgs/Plane plane\n"})
+    one = editor(folder, options={"idlc": {"distro": "jazzy"}})
+    uri = one.open(folder / "msg/Plan.msg")
+    params = lsp.DocumentLinkParams(text_document=document(uri))
+    assert one.ask(lsp.TEXT_DOCUMENT_DOCUMENT_LINK, params) == ()
+    assert not list(tmp_path.rglob("*.msg"))
+    found = ask(one, lsp.TEXT_DOCUMENT_DEFINITION, lsp.DefinitionParams, uri, 1, 3)
+    path = tmp_path / "idlc/interfaces/jazzy/shape_msgs/msg/Plane.msg"
+    assert found.uri == path.as_uri()
+    assert path.read_text() == "float64[4] coef\n"
+    assert path.stat().st_mode & 0o777 == 0o444
+    assert one.pull(one.open(path)) == []
+    assert hover((one, found.uri, None), 0, 12)
+    path.unlink()
+    path.write_text("edited\n")
+    ask(one, lsp.TEXT_DOCUMENT_DEFINITION, lsp.DefinitionParams, uri, 1, 3)
+    assert path.read_text() == "float64[4] coef\n"
+
+
+MANIFEST = """\
+<package format="3">
+  <name>one</name>
+  <depend>two</depend>
+  <exec_depend> shape_msgs </exec_depend>
+  <depend>unheard_of</depend>
+</package>
+"""
+
+
+def test_package_xml_leads_to_packages_and_to_their_users(editor, package, monkeypatch):
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    other = MANIFEST.replace("two", "three").replace("<name>one", "<name>two")
+    files = {"one/package.xml": MANIFEST, "two/package.xml": other, "two/msg/B.msg": "int8 x\n"}
+    folder = package({**files, "one/msg/A.msg": "two/B b\nshape_msgs/Plane plane\n"})
+    (folder / "package.xml").unlink()
+    one = editor(folder, capabilities=SHOWS_TEXTS)
+    uri = one.open(folder / "one/package.xml", language="xml")
+
+    def leads_to(line, character):
+        found = ask(one, lsp.TEXT_DOCUMENT_DEFINITION, lsp.DefinitionParams, uri, line, character)
+        return found and found.uri
+
+    assert leads_to(2, 10) == leads_to(2, 13) == (folder / "two/package.xml").as_uri()
+    assert leads_to(1, 8) == uri
+    assert leads_to(3, 18).startswith("idlc:/jazzy/shape_msgs/msg/")
+    assert leads_to(4, 12) is None
+    assert leads_to(2, 3) is None
+    context = lsp.ReferenceContext(include_declaration=True)
+    found = ask(one, lsp.TEXT_DOCUMENT_REFERENCES, lsp.ReferenceParams, uri, 2, 11, context=context)
+    assert [(each.uri.removeprefix(folder.as_uri()), each.range) for each in found] == [
+        ("/one/msg/A.msg", between(0, 0, 5)),
+        ("/one/package.xml", between(2, 10, 13)),
+        ("/two/package.xml", between(1, 8, 11)),
+    ]
+    one.change(uri, MANIFEST.replace("two", "shape_msgs"))
+    assert leads_to(2, 12).startswith("idlc:/jazzy/shape_msgs/msg/")
 
 
 def test_references_are_those_of_every_file(opened):

@@ -282,3 +282,26 @@ def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, 
     session.take(message["method"], message["params"])
     (found,) = diagnostics(session.workbench.world)[uri]
     assert found.code == "IDL201"
+
+
+@pytest.mark.parametrize("words", [[], ["--stdio"], ["--stdio", "--clientProcessId=7"]])
+def test_words_that_clients_add_cost_no_time(words):
+    code = (
+        "import sys; from idlc.cli.main import main; status = main(sys.argv[1:]);"
+        "sys.stderr.write(' '.join(sys.modules)); sys.exit(status)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "lsp", *words],
+        input=b"".join(map(frame, (beginning(), *END))),
+        capture_output=True,
+        timeout=PATIENCE,
+        check=True,
+    )
+    assert len(list(messages_in(done.stdout))) == 2
+    assert not {"click", "msgspec"} & set(done.stderr.decode().split())
+
+
+def test_words_of_clients_go_with_others():
+    words = ["lsp", "--stdio", "--clientProcessId", "7", "--check"]
+    done = subprocess.run([sys.executable, "-m", "idlc", *words], capture_output=True, check=True)
+    assert json.loads(done.stdout)["serverInfo"]["name"] == "idlc"

@@ -6,7 +6,10 @@ import subprocess
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.lsp.token_kinds import TYPES
+from idlc.lsp.features import lenses as features
+from idlc.lsp.protocol.parts import DocumentId, OfDocument
+from idlc.lsp.protocol.token_kinds import TYPES
+from idlc.lsp.workbench import Workbench
 from tests.support.editor import at, between
 
 STOP = """\
@@ -153,3 +156,107 @@ def test_types_lead_to_their_files(opened):
     (found,) = one.ask(lsp.TEXT_DOCUMENT_DOCUMENT_LINK, params)
     assert found.range == between(3, 0, 5)
     assert found.target.endswith("msg/Wheel.msg")
+
+
+MODES = """\
+uint8 MODE_SLOW=0
+uint8 MODE_FAST=2
+uint8 OTHER=2
+uint8 mode 2
+float64 speed 0.5
+int8[] gains [1, 2]
+string name 'abcdefghijklmnopqrstuvwxyzabcdefghijklmnopqrstuvwxyz'
+bool plain
+"""
+
+
+def test_a_lens_tells_defaults_and_which_constants_they_are(editor, package):
+    folder = package({"msg/Modes.msg": MODES, "srv/Go.srv": "int8 a\n---\n# text\nint8 b 3\n"})
+    one = editor(folder)
+    uri = one.open(folder / "msg/Modes.msg")
+    found = one.ask(lsp.TEXT_DOCUMENT_CODE_LENS, lsp.CodeLensParams(text_document=document(uri)))
+    last = one.ask(lsp.CODE_LENS_RESOLVE, found[-1])
+    assert last.range.start == at(3, 0)
+    assert last.command.title == (
+        "defaults: mode MODE_FAST, speed 0.5, gains [1, 2], "
+        "name 'abcdefghijklmnopqrstuvwxyzabcdefghijklm…"
+    )
+    uri = one.open(folder / "srv/Go.srv")
+    assert lenses(one, uri)[1:] == ["defaults: b 3"]
+    settings = lsp.DidChangeConfigurationParams(settings={"idlc": {"defaultLens": False}})
+    one.tell(lsp.WORKSPACE_DID_CHANGE_CONFIGURATION, settings)
+    assert len(lenses(one, uri)) == 1
+
+
+WATCHES = lsp.ClientCapabilities(
+    workspace=lsp.WorkspaceClientCapabilities(
+        code_lens=lsp.CodeLensWorkspaceClientCapabilities(refresh_support=True),
+        did_change_watched_files=lsp.DidChangeWatchedFilesClientCapabilities(
+            dynamic_registration=True, relative_pattern_support=True
+        ),
+    )
+)
+TABLE = """\
+[tool.idlc.breaking]
+against = "git:HEAD"
+[[tool.idlc.breaking.allow]]
+at = "demo/msg/Old.*"
+reason = "nobody has it"
+until = 2999-12-31
+"""
+
+
+@pytest.mark.parametrize("worktree", [False, True])
+def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
+    files = {"pyproject.toml": TABLE, "msg/Old.msg": "int8 x\n", "msg/New.msg": "int8 x\n"}
+    folder = package(files)
+    shutil.rmtree(folder / ".git")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "first")
+    if worktree:
+        other = folder.parent / "other"
+        git(folder, "worktree", "add", "-q", str(other))
+        folder = other
+    one = editor(folder, capabilities=WATCHES)
+    asked = one.answer_all()
+    uri, old = (one.open(folder / f"msg/{name}.msg", "int16 x\n") for name in ("New", "Old"))
+    assert lenses(one, old)[2] == "breaks nothing against git:HEAD"
+    assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
+    places = [each["globPattern"]["baseUri"] for each in watchers(asked)]
+    (folder / "msg/New.msg").write_text("int16 x\n")
+    git(folder, "commit", "-aqm", "second")
+    changed = lsp.FileEvent(uri=f"{places[-1]}/refs/heads/any", type=lsp.FileChangeType.Changed)
+    one.tell(
+        lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, lsp.DidChangeWatchedFilesParams(changes=[changed])
+    )
+    assert lenses(one, uri)[2] == "breaks nothing against git:HEAD"
+    assert lsp.WORKSPACE_CODE_LENS_REFRESH in [method for method, _ in asked]
+
+
+def watchers(asked):
+    """Return what the client was asked to watch last."""
+    (*_, params) = (params for method, params in asked if method == lsp.CLIENT_REGISTER_CAPABILITY)
+    return params.registrations[0].register_options["watchers"]
+
+
+def test_without_watches_it_looks_while_nothing_is_said(package):
+    folder = package({"pyproject.toml": TABLE, "msg/New.msg": "int8 x\n"})
+    shutil.rmtree(folder / ".git")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "first")
+    asked = []
+    client = {"workspace": {"codeLens": {"refreshSupport": True}}}
+    said = {"capabilities": client, "workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]}
+    bench = Workbench(said, lambda *_: None, lambda method, *_: asked.append(method))
+    document = OfDocument(DocumentId((folder / "msg/New.msg").as_uri()))
+    bench.idle()
+    for lens in features.lenses(bench.world, document):
+        features.resolve(bench.world, lens)
+    bench.idle()
+    assert asked == []
+    git(folder, "commit", "-qm", "second", "--allow-empty")
+    bench.idle()
+    bench.idle()
+    assert asked == ["workspace/codeLens/refresh"]

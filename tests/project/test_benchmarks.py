@@ -80,14 +80,19 @@ def test_the_kept_run_is_of_everything(tmp_path):
     assert set(PEERS) <= set(run.versions)
 
 
-def test_readers_of_recordings_can_be_measured():
-    command = [sys.executable, "-m", "benchmarks.recordings", "--quick"]
+def test_readers_of_recordings_can_be_measured(tmp_path):
+    path = tmp_path / "run.json"
+    words = ["recording zstd: imu", "--quick", "--rounds", "1", "--json", str(path)]
+    command = [sys.executable, "-m", "benchmarks", *words]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    head, _, row = done.stdout.splitlines()
-    readers = [cell.strip() for cell in head.strip("| ").split("|")]
-    assert {"idlc", "rosbags", "mcap-ros2-support"} <= {*readers}
-    name, *times = (cell.strip() for cell in row.strip("| ").split("|"))
-    assert name == "none Imu"
-    assert len(times) == len(readers)
-    assert all(float(time) > 0 for time in times)
+    run = results.load(path)
+    (found,) = run.results
+    assert {IDLC, "rosbags", "mcap-ros2", "copy", "decompression"} <= {*found.times}
+    assert all(times.median > 0 for times in found.times.values())
+    for who, times in found.times.items():
+        assert f"{who} {report.amount(times.median)}" in done.stdout or who == IDLC
+    heading, _, row, *_ = report.recordings_table(run).splitlines()
+    assert all(who in heading for who in found.times)
+    assert row.startswith("| recording zstd Imu | ")
+    assert not report.full_table(run).count("recording")

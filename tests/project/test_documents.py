@@ -14,7 +14,7 @@ import pytest
 from idlc.breaking.allow import Allowance
 from idlc.cli.main import main
 from idlc.diagnostics.codes import CODES
-from idlc.disk.pyproject import Config
+from idlc.disk.settings.pyproject import Config
 from tests.support import command_line_page, programs, refresh
 from tests.support.paths import DOCS, ROOT
 

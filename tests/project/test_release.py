@@ -1,5 +1,6 @@
 """RELEASING.md: the rehearsal passes on what is published, and notices what must not be."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -63,6 +64,7 @@ def tools(tmp_path_factory):
     return python
 
 
+@pytest.mark.long
 def test_the_rehearsal_passes_on_what_is_published(published, tools, tmp_path):
     tag = f"v{HERE.version}"
     words = ("-m", "release", "check", "--tag", tag, "--keep", tmp_path / "dist")
@@ -104,12 +106,20 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     assert project.text("CITATION.cff").count("date-released: 2031-01-02\n") == 1
     assert project.text("docs/ci.md").count("0.10.1") == 4
     assert HERE.version not in project.text("docs/ci.md").replace("0.10.1", "")
+    lock = json.loads(project.text("editors/vscode/package-lock.json"))
+    assert lock["version"] == lock["packages"][""]["version"] == "0.10.1"
+    manifest = json.loads(project.text("editors/vscode/package.json"))
+    assert manifest["version"] == "0.10.1"
+    assert manifest["repository"]["url"] == f"{REPOSITORY}.git"
 
 
 def test_no_address_is_invented():
     """Files name the repository where it is published, and as long as it is not, none."""
     for path in HERE.files():
-        if path.endswith((".md", ".yml", ".yaml", ".toml", ".cff")) and "golden/" not in path:
+        if (
+            path.endswith((".md", ".yml", ".yaml", ".toml", ".cff", ".json"))
+            and "golden/" not in path
+        ):
             found = re.findall(r"https://github\.com/[\w.-]+/idlc\b|OWNER/idlc", HERE.text(path))
             assert set(found) <= {HERE.repository}, path
 
@@ -119,6 +129,7 @@ def test_no_address_is_invented():
     [
         ("CHANGELOG.md", "\n## ", "\n## 9.9.9 (2030-01-01)\n\n## ", "of_versions", "begin with"),
         ("CITATION.cff", "\nversion: ", "\nversion: 9", "of_versions", "CITATION.cff is not"),
+        ("editors/vscode/package.json", '"version": "', '"version": "9', "of_versions", "not for"),
         (".github/workflows/ci.yml", '"3.13"', '"3.9"', "of_pythons", "tests Python 3.1"),
         ("pyproject.toml", " :: Python :: 3.13", " :: Python :: 3.9", "of_pythons", "classifiers"),
         ("action.yml", "@5fda", "@v5 # 5fda", "name_actions_by_hash", "action.yml uses actions/"),
@@ -197,6 +208,7 @@ def test_each_make_target_of_the_workflows_exists():
             assert re.search(rf"(?m)^{target}:", makefile), (path.name, target)
 
 
+@pytest.mark.long
 def test_installing_as_the_document_says(copied, tmp_path):
     """Both ways, pasted into a clone; what idlc imports is left out here, and so is the index."""
     text = (DOCS / "install.md").read_text(encoding="utf-8")

@@ -21,6 +21,8 @@ import sys
 from my_robot_controller.action import Countdown
 from my_robot_controller.msg import RobotCommand
 from my_robot_controller.srv import AddTwoInts
+
+pytestmark = pytest.mark.long
 command = RobotCommand(command_type=RobotCommand.MOVE, linear_velocity_x=0.5)
 assert RobotCommand.deserialize(command.serialize()) == command
 assert AddTwoInts.Request(a=1, b=2).serialize() == bytes.fromhex(

@@ -15,6 +15,7 @@ from pyarrow import parquet
 
 import idlc
 from idlc.cli.main import main
+from tests.support import recorded_text
 from tests.support import recordings as made
 
 MESSAGES = made.messages()
@@ -77,6 +78,39 @@ def test_options_choose_rows_and_columns(recording):
     assert found.to_pylist() == table(recording, "/imu", flat=False, datetimes=False).to_pylist()
 
 
+@pytest.mark.parametrize("words", [["drive_*.mcap"], ["drive_0.mcap", "drive_1.mcap"]])
+def test_several_recordings_are_read_as_one(words, here):
+    for number in range(2):
+        made.by_mcap(here / f"drive_{number}.mcap", MESSAGES[number * 30 : number * 30 + 30])
+    assert run(*words, "/imu", "-o", "a.parquet") == 0
+    found = parquet.read_table("a.parquet")["log_time"].cast("int64").to_pylist()
+    assert found == [one.log_time for one in MESSAGES if one.topic == "/imu"]
+
+
+def test_a_name_may_stand_for_topics_of_several_types(here, capfd):
+    text = "@ /x a_msgs/msg/A\nint8 a\n@ /x a_msgs/msg/B\nuint8 a\n@ /y a_msgs/msg/A\nint8 a\n"
+    recorded_text.write("rec.mcap", text, {"/x": 1, "/y": 2})
+    assert main(["show", "rec.mcap", "--format", "json"]) == 0
+    lines = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
+    assert [one["name"] for one in lines] == ["/x", "/x", "/y"]
+    assert lines[0]["hash"] == lines[2]["hash"] != lines[1]["hash"]
+    assert run("rec.mcap", "-o", "out/") == 1
+    said = capfd.readouterr().err
+    assert "`/x` has messages of several definitions, of a_msgs/msg/A, a_msgs/msg/B" in said
+    assert "/y: 2 messages → out/y.parquet" in said
+    assert [path.name for path in (here / "out").iterdir()] == ["y.parquet"]
+    assert run("rec.mcap", "/x", "/y", "-o", "other/") == 1
+    assert not (here / "other").exists()
+
+
+def test_a_folder_of_bags_is_none(here, capfd):
+    made.by_rosbags(here / "bags/first", MESSAGES, "db3")
+    assert run("bags", "/imu", "-o", "a.csv") == 1
+    assert "name a bag in it, such as `bags/first`" in capfd.readouterr().err
+    assert run("nothing_*.mcap", "-o", "a.csv") == 1
+    assert "`nothing_*.mcap` cannot be read" in capfd.readouterr().err
+
+
 def test_a_pipe_gets_the_stream_format(recording):
     command = [sys.executable, "-m", "idlc", "columns", str(recording), "/imu"]
     done = subprocess.run(command, capture_output=True, check=True)
@@ -95,7 +129,7 @@ def test_a_csv_file_has_lists_as_json_and_bytes_in_base64(recording, capfdbinary
     text = capfdbinary.readouterr().out.decode()
     rows = list(csv.DictReader(io.StringIO(text)))
     wanted = table(recording, "/camera/image").to_pylist()
-    assert [b64decode(json.loads(row["data"])) for row in rows] == [row["data"] for row in wanted]
+    assert [b64decode(row["data"]) for row in rows] == [row["data"] for row in wanted]
 
 
 def test_several_topics_go_to_a_folder_or_to_names_of_their_own(recording, here):

@@ -10,7 +10,7 @@ from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.scope import Scope
-from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, recorded_types
 from idlc.driver.recordings.versions import contradictions, versions
 from idlc.export.file_text import file_text
 from idlc.export.idl import idl
@@ -128,7 +128,7 @@ def test_the_first_of_two_definitions_counts_and_that_is_told():
 def types_of(*topics):
     report = Report()
     (version,) = versions(topics)
-    return RecordedTypes(version, Around(Scope(), Report()), Scope(), report), report
+    return recorded_types(version, Around(Scope(), Report()), Scope(), report), report
 
 
 def test_what_rosbags_writes_has_its_hash():
@@ -253,3 +253,42 @@ def test_a_db3_has_the_definition_of_a_service_by_the_service(tmp_path, capsys):
     db.close()
     assert main(["hash", str(path)]) == 0
     assert "a_srvs/srv/Ask_Event" in capsys.readouterr().out
+
+
+#: A definition with errors, and the hash of what it was once.
+BROKEN = "strin&g data\n"
+RIGHT = recorded_text.right_hash("std_msgs/msg/String")
+
+
+@pytest.mark.parametrize("encoding", ["ros2msg", "ros2idl"])
+@pytest.mark.parametrize(("hash_", "said"), [(RIGHT, "has the recorded hash"), (None, "by that")])
+def test_what_has_errors_is_what_is_known_here(encoding, hash_, said):
+    types, report = types_of(topic("std_msgs/msg/String", BROKEN, encoding, hash_))
+    assert types.hash(types.topics[0]) == RIGHT
+    assert not types.errors.had_errors
+    (told,) = report
+    assert told.code == "IDL652"
+    assert "errors in the definition of `std_msgs/msg/String`; what is known here" in told.message
+    assert said in told.message
+
+
+@pytest.mark.parametrize(
+    ("name", "hash_"),
+    [("std_msgs/msg/String", "RIHS01_" + "0" * 64), ("demo_msgs/msg/Own", None)],
+)
+def test_what_has_errors_and_was_something_else_is_an_error(name, hash_):
+    types, _ = types_of(topic(name, BROKEN, hash_=hash_))
+    assert types.hash(types.topics[0]) is None
+    (error,) = types.errors
+    assert error.where[0] == f"rec: topic /x: {name}.msg"
+
+
+def test_what_has_errors_within_others_is_what_is_known_here():
+    text = f"String s\n{LINE}MSG: std_msgs/String\n{{}}"
+    sound, broken = text.format("string data\n"), text.format(BROKEN)
+    (wanted,) = types_of(topic("std_msgs/msg/A", sound))[0].topics
+    right = types_of(topic("std_msgs/msg/A", sound))[0].hash(wanted)
+    for hash_, code in ((None, "IDL652"), (right, "IDL652"), ("RIHS01_1", "IDL201")):
+        types, report = types_of(topic("std_msgs/msg/A", broken, hash_=hash_))
+        assert [one.code for one in (*types.errors, *report)] == [code]
+        assert types.hash(types.topics[0]) == (right if code == "IDL652" else None)

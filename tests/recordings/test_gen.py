@@ -144,6 +144,18 @@ def test_topics_are_those_of_recordings(tmp_path, capsys):
     assert "is no recording" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("words", [["a.mcap"], ["std_msgs/msg/Header"], ["std_msgs", "a.mcap"]])
+def test_what_has_a_name_gets_no_other(words, here, capsys):
+    recorded_text.write("a.mcap", "@ /x a_msgs/msg/A\nint8 a\n")
+    assert main(["gen", *words, "-o", "out", "--package", "other"]) == 2
+    assert "--package is for files, and none was given" in capsys.readouterr().err
+    assert not (here / "out").exists()
+    (here / "msg").mkdir()
+    (here / "msg/B.msg").write_text("std_msgs/Header a\n", encoding="utf-8")
+    assert main(["gen", *words, "msg", "-o", "out", "--package", "other"]) == 0
+    assert (here / "out/other/msg/_b.py").exists()
+
+
 def test_nothing_is_written_of_a_recording_without_types(tmp_path, capsys):
     path = recorded_text.write(tmp_path / "a.mcap", "@ /x foxglove.Scene protobuf\nabc\n")
     assert main(["gen", str(path), "-o", str(tmp_path / "out")]) == 2

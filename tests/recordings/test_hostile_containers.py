@@ -70,7 +70,7 @@ def read(path, index):
     """Read all there is; return how many bytes of messages there are."""
     with open_recording(path, index=index) as container:
         found = [one for topic in container.topics for one in container.messages(topic, ALWAYS)]
-        return sum(int((one.stops - one.starts).sum()) for one in found)
+        return sum(len(view) for one in found for view in one.views())
 
 
 def test_mutated_containers_end_in_messages_or_in_an_error(tmp_path):

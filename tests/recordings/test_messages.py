@@ -10,6 +10,7 @@ from idlc.recordings import mcap_records
 from idlc.recordings.container import RecordingError, open_recording
 from idlc.recordings.messages import Window, joined
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
+from tests.support import mcap_mutations
 from tests.support import recordings as made
 
 #: Chunks with a few messages each.
@@ -17,7 +18,7 @@ SMALL = 3000
 
 
 def read(path, topic, window=None, **options):
-    """Return what is read of a topic, by way of messages of one buffer."""
+    """Return what is read of a topic, by way of all of them as one."""
     with open_recording(path, **options) as container:
         (found,) = (one for one in container.topics if one.name == topic)
         parts = list(container.messages(found, Window(*(window or ()))))
@@ -125,6 +126,37 @@ def test_a_truncated_file_has_its_first_messages(compression, tmp_path):
         assert len(found) >= before
         before = len(found)
     assert before == len(wanted)
+
+
+@pytest.mark.parametrize("more", [0, 5])
+def test_a_chunk_is_whole_though_its_indexes_are_cut_off(more, tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, chunk_size=SMALL)
+    whole, there = path.read_bytes(), 0
+    for one in mcap_mutations.records(whole[:-8], 8):
+        if one.op == mcap_mutations.CHUNK:
+            inside = mcap_mutations.in_chunk(one)
+            there += sum(record.op == mcap_mutations.MESSAGE for record in inside)
+        if one.op == mcap_mutations.MESSAGE_INDEX:
+            path.write_bytes(whole[: one.at + more])
+            with open_recording(path) as container:
+                counts = {found.name: found.count for found in container.topics}
+            assert sum(counts.values()) == there
+            for topic, count in counts.items():
+                assert read(path, topic) == recorded(topic)[:count]
+
+
+def test_an_index_that_leaves_messages_out_is_a_lie(tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES)
+    parts = mcap_mutations.records(path.read_bytes()[:-8], 8)
+    index = next(one for one in parts if one.op == mcap_mutations.MESSAGE_INDEX)
+    size = unpack_from("<I", index.content, 2)[0] - 16
+    index.content[2:] = pack("<I", size) + index.content[6 : 6 + size]
+    path.write_bytes(mcap_mutations.joined(parts, up_to_date=True))
+    with pytest.raises(RecordingError, match="20 messages of `/imu` are counted, and there are 19"):
+        read(path, "/imu")
+    assert read(path, "/imu", (None, made.START)) == []
+    assert read(path, "/imu", index=False) == recorded("/imu")
+    assert read(path, "/joints") == recorded("/joints")
 
 
 def test_what_a_recorder_has_not_written_back_is_read(tmp_path):

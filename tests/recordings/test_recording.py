@@ -1,18 +1,25 @@
 """Values of recordings: those that other readers find, as objects, columns and tables."""
 
+import inspect
+import io
 import pickle
+import pydoc
+import re
 import subprocess
 import sys
 from datetime import datetime, timedelta, timezone
 
+import mypy.api
 import numpy as np
 import pyarrow as pa
 import pytest
+from IPython.lib.pretty import pretty
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 import idlc
+from idlc.cli.main import main
 from idlc.recordings.container import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import recordings as made
@@ -95,7 +102,7 @@ def test_a_recording_is_a_mapping_of_topics(tmp_path):
         assert len(recording) == 3
         assert "/imu" in recording
         assert "/nothing" not in recording
-        assert "/imu  sensor_msgs/msg/Imu  20" in repr(recording)
+        assert "/joints        sensor_msgs/msg/JointState  20" in repr(recording)
         assert recording["/imu"].topic.count == len(list(recording["/imu"])) == 20
         with pytest.raises(KeyError, match=r"has no topic `/im` \(did you mean `/imu`\?\)"):
             recording["/im"]
@@ -107,6 +114,23 @@ def test_several_files_are_one_recording(tmp_path):
         assert [t for t, _ in recording["/imu"]] == [
             one.log_time for one in MESSAGES if one.topic == "/imu"
         ]
+
+
+def test_files_of_different_kinds_are_one_recording(tmp_path):
+    """Their messages are kept in different ways, which shows nowhere."""
+    bag = made.by_rosbags(tmp_path / "bag", MESSAGES[30:60], "db3")
+    other = made.by_mcap(tmp_path / "b.mcap", MESSAGES[60:], "zstd", chunk_size=3000)
+    paths = [made.by_mcap(tmp_path / "a.mcap", MESSAGES[:30]), bag, other]
+    with idlc.Recording(paths) as recording, idlc.Recording(bag) as rows:
+        for name, topic in recording.items():
+            values = [message.to_dict() for _, message in topic]
+            for columns in (topic.to_columns(), topic.to_arrow().to_pandas()):
+                times = [one.log_time for one in MESSAGES if one.topic == name]
+                assert np.asarray(columns["log_time"]).astype(np.int64).tolist() == times
+            found = topic.to_columns().to_list()
+            assert [{k: v for k, v in row.items() if k in values[0]} for row in found] == values
+            nothing = rows[name].between(0, 0)
+            assert len(nothing.to_columns()) == nothing.to_arrow().num_rows == 0
 
 
 @pytest.mark.parametrize("place", ["url", "fsspec file", "file object"])
@@ -128,6 +152,38 @@ def test_what_fsspec_opens_is_read(place, tmp_path):
             assert len(parts) >= 5
             tables = [part.to_arrow() for part in parts]
             assert pa.concat_tables(tables).equals(local["/imu"].to_arrow())
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("memory://nothing.mcap", "`memory://nothing.mcap` cannot be read: No such file"),
+        ("nosuch://a.mcap", "Protocol not known: nosuch"),
+        ("https://localhost:1/a.mcap", "`https://localhost:1/a.mcap` cannot be read: "),
+    ],
+)
+def test_what_fsspec_cannot_open_is_said(place, said, capsys):
+    with pytest.raises(RecordingError, match=re.escape(said)):
+        idlc.Recording(place)
+    assert main(["columns", place, "-o", "a.csv"]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_of_a_file_object_no_more_is_read_than_is_needed(tmp_path):
+    class Counted(io.FileIO):
+        done = 0
+
+        def read(self, size=-1):
+            found = super().read(size)
+            self.done += len(found)
+            return found
+
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES * 20, chunk_size=3000)
+    with Counted(path) as file, idlc.Recording(file) as recording:
+        opening = file.done
+        first, *_ = recording["/imu"].parts(1)
+        assert first.to_arrow().num_rows
+        assert file.done - opening < 10_000 < path.stat().st_size // 10
 
 
 def test_a_time_is_a_number_a_text_or_a_date(tmp_path):
@@ -311,6 +367,43 @@ def test_messages_can_be_pickled_for_another_process(tmp_path):
     code = f"import pickle; print(pickle.load(open({str(kept)!r}, 'rb')) is not None)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"
+
+
+def test_messages_show_the_names_of_generated_ones(tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", MESSAGES)
+    with idlc.Recording(path) as recording:
+        message = next(iter(recording["/imu"])).message
+        assert repr(recording).splitlines()[1:] == [
+            "/imu           sensor_msgs/msg/Imu         20",
+            "/joints        sensor_msgs/msg/JointState  20",
+            "/camera/image  sensor_msgs/msg/Image       20",
+        ]
+        assert repr(recording["/imu"]) == f"</imu of {path}, sensor_msgs/msg/Imu>"
+    assert repr(message).startswith("sensor_msgs.msg.Imu(header=std_msgs.msg.Header(stamp=builtin")
+    assert "loaded" not in repr(message)
+    assert "loaded" not in pretty(message)
+    assert inspect.getsource(type(message)).startswith("@_idlc.dataclass")
+    assert pickle.loads(pickle.dumps(message)) == message
+
+
+def test_help_and_type_checkers_see_what_is_there(tmp_path):
+    assert {"Recording", "load"} <= set(dir(idlc))
+    assert "class Recording" in pydoc.plain(pydoc.render_doc(idlc))
+    code = (
+        "from idlc import Recording, load\n"
+        "topic = Recording('a.mcap')['/x']\n"
+        "for pair in topic.messages(bytes):\n"
+        "    time, message = pair\n"
+        "    reveal_type((topic, time, message, pair.message))\n"
+        "reveal_type(load('a.mcap'))\n"
+    )
+    (tmp_path / "mypy.ini").write_text("[mypy-idlc.*]\nfollow_imports = silent\n", encoding="utf-8")
+    words = ["--strict", "--config-file", str(tmp_path / "mypy.ini"), "-c", code]
+    said, problems, status = mypy.api.run(words)
+    assert status == 0, said + problems
+    module = "idlc.driver.recordings"
+    assert f"[{module}.recording.RecordedTopic, int, bytes, bytes]" in said
+    assert f'"{module}.load.Loaded"' in said
 
 
 def test_idlc_itself_stays_cheap_to_import():

@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import pytest
 from rosidl_parser.definition import Message
 from rosidl_parser.parser import parse_idl_string
 
@@ -43,6 +44,7 @@ def test_check_finds_advice_but_no_errors(capsys):
         assert "error[" not in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_the_idl_is_what_rosidl_made_of_the_same_file():
     compared = 0
     for path in FILES:

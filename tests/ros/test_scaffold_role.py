@@ -12,6 +12,8 @@ import pytest
 from tests.support import programs
 from tests.support.paths import DOCS, ROOT
 
+pytestmark = pytest.mark.long
+
 GUIDE = DOCS / "contributing" / "add-a-role.md"
 
 

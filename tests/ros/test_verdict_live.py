@@ -25,7 +25,7 @@ FAMILIES = {
     "oddities": lambda: Oddities(SEED).cases(FILES * 3 // 10),
 }
 #: Each is made in parts, so that several processes can share the work; the files are the same.
-PARTS = 5
+PARTS = 10
 
 
 def known_texts() -> dict[str, list[str]]:
@@ -73,4 +73,4 @@ def test_rosidl_and_idlc_agree_on_invented_files(family, part, tmp_path):
             assert idl_view.read(outcome["idl"], name) == idl_view.read(text, name), text
     assert disagreements == []
     accepted = sum(outcome["stage"] is None for outcome in outcomes)
-    assert len(cases) * 0.3 < accepted < len(cases) * 0.7, "too one-sided to show much"
+    assert len(cases) * 0.2 < accepted < len(cases) * 0.8, "too one-sided to show much"

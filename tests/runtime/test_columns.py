@@ -160,6 +160,21 @@ def test_large_messages(msg):
     check(msg.Image, buffers_of(messages, rng, ["big"]), rng)
 
 
+def test_large_messages_with_small_ones_and_long_texts_among_them(msg, error):
+    rng = random.Random(4)
+    messages = messages_of(msg.Image, rng, 40, 5)
+    for message in messages:
+        message.header.frame_id = "x" * rng.choice([0, 3, 480, rng.randrange(470, 520), 900])
+        message.data = rng.randbytes(rng.choice([0, 1, 200_000, 450_000]))
+    raws = buffers_of(messages, rng)
+    assert sum(map(len, raws)) > 1 << 22
+    check(msg.Image, raws, rng)
+    small = min(range(40), key=lambda index: len(raws[index]))
+    for wrong in (raws[small][:17], raws[small][:25]):
+        with pytest.raises(error, match=rf"^\[{small}\]"):
+            msg.Image.to_columns([*raws[:small], wrong, *raws[small + 1 :]])
+
+
 @pytest.mark.parametrize("name", ["Joints", "Deep", "Deeper", "Wide"])
 def test_many_messages_of_a_few_layouts(folder, error, name):
     rng = random.Random(name)

@@ -1,6 +1,7 @@
 """What a generated class offers to who uses it."""
 
 import copy
+import ctypes
 import dataclasses
 import json
 import math
@@ -33,7 +34,10 @@ FILES = {
     "msg/Any.msg": "Point point\n",
     "msg/Text.msg": "Any any\nMessage[] messages\n",
     "msg/Message.msg": "float64[2] numbers\nstring text\n",
-    "msg/Many.msg": "float64[100] numbers\nbool[100] flags\n",
+    "msg/Many.msg": (
+        "float64[100] numbers\nbool[100] flags\nfloat64[] readings\nfloat32[] ranges\n"
+        "int64[] ticks\n"
+    ),
     "srv/Go.srv": "int32 a\n---\nPoint b\n",
     "action/Walk.action": "int32 steps\n---\nint32 done\n---\nPoint now\n",
 }
@@ -192,29 +196,79 @@ def test_equality_looks_at_every_element():
         hash(robot())
 
 
+@pytest.fixture(params=["ctypes", "no ctypes", "no memcmp"])
+def memory(request, monkeypatch):
+    """Compare memory as where ctypes is loaded, where it is not, and as on Windows."""
+    objects = sys.modules["robot_msgs._idlc.objects"]
+    monkeypatch.setattr(objects, "_found", None)
+    if request.param == "no ctypes":
+        monkeypatch.delitem(sys.modules, "ctypes")
+    elif request.param == "no memcmp":
+        monkeypatch.setattr(ctypes.PyDLL, "__getitem__", not_there)
+    yield
+    assert (objects._found is not None) == (request.param == "ctypes")
+
+
+def not_there(library, name):
+    raise AttributeError(name)
+
+
 @pytest.mark.parametrize("size", [1, 64, 65, 1 << 16, (1 << 16) + 1, 200_000])
 @pytest.mark.parametrize("at", [0, -1])
-def test_equality_of_arrays_of_every_size(size, at):
-    data = bytearray(size)
-    mine, other = robot(image=data), robot(image=data)
+@pytest.mark.parametrize(("kind", "field"), [("Robot", "image"), ("Many", "ticks")])
+def test_equality_of_arrays_of_every_size(kind, field, size, at):
+    kind = get(f"msg/{kind}")
+    data = [0] * size
+    mine, other = kind(**{field: data}), kind(**{field: data})
     assert mine == other
     data[at] = 1
-    assert mine != robot(image=data)
-    assert mine != robot(image=data[:-1])
-    assert robot(image=data) == robot(image=data)
+    assert mine != kind(**{field: data})
+    assert mine != kind(**{field: data[:-1]})
+    assert kind(**{field: data}) == kind(**{field: data})
+
+
+def test_equality_of_long_arrays_wherever_memory_is_compared(memory):
+    data = bytearray(300_000)
+    mine = robot(image=data)
+    assert mine == robot(image=data)
+    for at in (0, 65535, 65536, 299_999):
+        data[at] = 255
+        assert mine != robot(image=data)
+        data[at] = 0
+    assert mine == robot(image=data)
+    mine.image.append(1)  # nothing holds it
 
 
 @pytest.mark.parametrize(
-    ("kind", "field", "size"), [("Robot", "pose", 3), ("Many", "numbers", 100)]
+    ("kind", "field", "size"),
+    [
+        *(("Robot", "pose", 3), ("Many", "numbers", 100)),
+        *(("Many", field, size) for field in ("readings", "ranges") for size in (1, 64, 5000)),
+    ],
 )
 def test_equality_of_floats_in_arrays_is_that_of_floats(kind, field, size):
     kind = get(f"msg/{kind}")
     zeros = [0.0] * size
     assert kind(**{field: zeros}) == kind(**{field: [-0.0, *zeros[1:]]})
-    assert kind(**{field: zeros}) != kind(**{field: [*zeros[1:], 1e-300]})
+    assert kind(**{field: zeros}) != kind(**{field: [*zeros[1:], 1e-30]})
     assert kind(**{field: [*zeros[1:], math.nan]}) != kind(**{field: [*zeros[1:], math.nan]})
     every_second = np.zeros(2 * size)[::2]
     assert kind(**{field: every_second}) == kind(**{field: zeros})
+
+
+def test_equality_of_arrays_of_other_numbers_is_that_of_the_numbers():
+    kind = get("msg/Many")
+    mine, other = kind(), kind()
+    mine.readings, other.readings = array("d", [0.5, 2]), array("f", [0.5, 2])
+    assert mine == other
+    other.readings = array("f", [0.5, 3])
+    assert mine != other
+    mine.readings, other.readings = np.array([1.5, 2]), np.array([1.5, 2], dtype=np.float32)
+    assert mine == other
+    other.readings = array("d", [1.5, 2])
+    assert mine == other
+    other.readings = array("d", [1.5])
+    assert mine != other
 
 
 def test_copies_and_pickles_are_equal():

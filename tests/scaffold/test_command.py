@@ -44,7 +44,7 @@ def nothing_installed(monkeypatch):
     """Types come from the catalogue and no name from git, so that every machine writes the same."""
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
     monkeypatch.setenv("GIT_CONFIG_NOSYSTEM", "1")
-    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)

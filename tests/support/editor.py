@@ -22,7 +22,13 @@ PATIENCE = 60
 class Editor:
     """A client with a server of its own."""
 
-    def __init__(self, *folders: Path, capabilities: Any = None, options: Any = None) -> None:
+    def __init__(
+        self,
+        *folders: Path,
+        capabilities: Any = None,
+        options: Any = None,
+        command: tuple[str, ...] = (sys.executable, "-m", "idlc", "lsp"),
+    ) -> None:
         self.problems: dict[str, list[lsp.Diagnostic]] = {}
         self.versions: dict[str, int | None] = {}
         self.told: list[str] = []
@@ -32,7 +38,12 @@ class Editor:
         self._thread.start()
         self._client = BaseLanguageClient("tests", "1")
         self._listen()
-        command = (sys.executable, "-m", "idlc", "lsp")
+        # lsprotocol takes an action that has a command for nothing but that command
+        converter = self._client.protocol._converter
+        converter.register_structure_hook(
+            lsp.Command | lsp.CodeAction,
+            lambda given, _: converter.structure(given, lsp.CodeAction),
+        )
         environment = {**os.environ, "AMENT_PREFIX_PATH": ""}
         self._wait(self._client.start_io(*command, env=environment))
         self.process = self._client._server
@@ -111,6 +122,19 @@ class Editor:
         def _(params: lsp.ApplyWorkspaceEditParams) -> lsp.ApplyWorkspaceEditResult:
             taken.append(params.edit)
             return lsp.ApplyWorkspaceEditResult(applied=True)
+
+    def answer_all(self) -> list[tuple[str, Any]]:
+        """Return where everything that the server asks for from now on is noted."""
+        asked: list[tuple[str, Any]] = []
+
+        def note(method: str) -> None:
+            @self._client.feature(method)
+            def _(*params: Any) -> None:
+                asked.append((method, *params[:1]) if params else (method, None))
+
+        note(lsp.CLIENT_REGISTER_CAPABILITY)
+        note(lsp.WORKSPACE_CODE_LENS_REFRESH)
+        return asked
 
     def close(self, uri: str) -> None:
         """Close a document."""

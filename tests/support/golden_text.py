@@ -73,9 +73,9 @@ def only_rclpy(package: str) -> list[Path]:
 def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
     """Return what each expected section should hold, made independent of idlc's version."""
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("idlc.disk.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
     monkeypatch.delenv("ROS_DISTRO", raising=False)
-    monkeypatch.setattr("idlc.disk.environment.python_folders", only_rclpy)
+    monkeypatch.setattr("idlc.disk.machine.environment.python_folders", only_rclpy)
     for path, text in case.files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)

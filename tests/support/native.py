@@ -5,7 +5,7 @@ from pathlib import Path
 
 from idlc.diagnostics.report import Report
 from idlc.disk.find import look
-from idlc.disk.inputs import packages
+from idlc.disk.packages.inputs import packages
 from idlc.disk.scope import Scope
 from idlc.driver.stages import models_of
 from idlc.native.layouts import LAYOUTS

@@ -3,7 +3,7 @@
 from contextlib import contextmanager
 
 from idlc.breaking.graph import Endpoint
-from idlc.disk.graph import Answer
+from idlc.disk.machine.graph import Answer
 
 ROLES = {
     "publisher": ("topic", True),
@@ -65,9 +65,9 @@ def take_the_place(monkeypatch, graph):
         yield graph
 
     if graph is None:
-        monkeypatch.setattr("idlc.disk.graph.import_module", _missing)
+        monkeypatch.setattr("idlc.disk.machine.graph.import_module", _missing)
     else:
-        monkeypatch.setattr("idlc.disk.graph.joined", joined)
+        monkeypatch.setattr("idlc.disk.machine.graph.joined", joined)
 
 
 def _missing(name):

@@ -23,7 +23,10 @@ _NEXT = re.compile(r"^--- (MSG|IDL|SRV|ACTION) (\S+)$", re.MULTILINE)
 
 
 def write(path, text, messages=None):
-    """Write the MCAP file that a text describes; `messages` is how many there are by topic."""
+    """Write the MCAP file that a text describes; `messages` is how many there are by topic.
+
+    Each holds one byte, a zero.
+    """
     with Path(path).open("wb") as file:
         writer = Writer(file, chunk_size=1024)
         writer.start(profile="ros2", library="test")
@@ -39,7 +42,7 @@ def write(path, text, messages=None):
             metadata = {"topic_type_hash": hash_} if hash_ else {}
             channel = writer.register_channel(topic, "cdr", schema, metadata)
             for number in range((messages or {}).get(topic, 0)):
-                writer.add_message(channel, number, b"\0\1\0\0", number)
+                writer.add_message(channel, number, b"\0\1\0\0\0", number)
         writer.finish()
     return path
 

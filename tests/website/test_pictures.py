@@ -1,12 +1,14 @@
-"""The pictures in docs/pictures are what commands print."""
+"""The pictures in docs/pictures are what commands print, and what a program plots."""
 
 import re
 
 import pytest
+from matplotlib import image
 
 from tests.support import refresh
 from tests.support.paths import DOCS
 from website.pictures import SCENES, picture
+from website.plot import plotted, program
 
 FOLDER = DOCS / "pictures"
 
@@ -19,6 +21,22 @@ def test_a_picture_shows_what_is_printed(name):
         path.write_text(current, encoding="utf-8")
         refresh.refreshed()
     assert path.read_text(encoding="utf-8") == current
+
+
+def test_the_plot_is_what_the_program_makes(tmp_path):
+    made, path = plotted(tmp_path), FOLDER / "wheels.png"
+    assert made.name == path.name
+    if refresh.wanted("docs/pictures"):
+        path.write_bytes(made.read_bytes())
+        refresh.refreshed()
+    found, kept = image.imread(made), image.imread(path)
+    assert found.shape == kept.shape
+    # letters are not drawn alike by all versions
+    assert abs(found - kept).mean() < 0.02
+
+
+def test_the_plot_is_made_in_ten_lines():
+    assert len(program().splitlines()) <= 10
 
 
 def test_pictures_are_small_and_used_and_load_nothing():

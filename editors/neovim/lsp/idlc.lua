@@ -5,4 +5,6 @@ return {
   -- the whole workspace if it is a repository, so that users in other packages are found
   root_markers = { '.git', 'package.xml' },
   settings = { idlc = {} },
+  -- what is built into the server opens as a document that it has the text of: see plugin/idlc.lua
+  capabilities = { workspace = { textDocumentContent = { dynamicRegistration = false } } },
 }

@@ -1,7 +1,7 @@
 /** The server's life: found, started, stopped, started again; and what is told of it. */
 
 import * as vscode from "vscode";
-import { LanguageClient, State } from "vscode-languageclient/node";
+import { LanguageClient, RenameRequest, State } from "vscode-languageclient/node";
 import { find, setting, words, type Found } from "./find";
 
 /** What is synchronized: interfaces, and the files that say what they belong to. */
@@ -75,6 +75,8 @@ export class Server {
       documentSelector: DOCUMENTS,
       outputChannel: this.log,
       middleware: {
+        provideRenameEdits: (document, position, newName) =>
+          this.renamed(document, position, newName),
         workspace: {
           // a server that is about to be stopped needs no news of settings
           didChangeConfiguration: async (sections, next) => {
@@ -95,6 +97,38 @@ export class Server {
     });
     this.ending = false;
     await this.client.start();
+  }
+
+  /**
+   * Return the edits of a rename, once the user knows what it breaks.
+   *
+   * VS Code would show them with all boxes open, and not the words of the server.
+   */
+  private async renamed(
+    document: vscode.TextDocument,
+    position: vscode.Position,
+    newName: string,
+  ): Promise<vscode.WorkspaceEdit | undefined> {
+    const client = this.client;
+    if (client === undefined) {
+      return undefined;
+    }
+    const edit = await client.sendRequest(RenameRequest.type, {
+      textDocument: client.code2ProtocolConverter.asTextDocumentIdentifier(document),
+      position: client.code2ProtocolConverter.asPosition(position),
+      newName,
+    });
+    for (const note of Object.values(edit?.changeAnnotations ?? {})) {
+      if (note.needsConfirmation) {
+        const options = { modal: true, detail: note.description ?? "" };
+        const chosen = await vscode.window.showWarningMessage(`${note.label}?`, options, "Rename");
+        if (chosen === undefined) {
+          return undefined;
+        }
+        note.needsConfirmation = false;
+      }
+    }
+    return client.protocol2CodeConverter.asWorkspaceEdit(edit);
   }
 
   private show(

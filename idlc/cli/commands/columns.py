@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from idlc.cli import completion
+from idlc.cli import completion, options
 
 EPILOG = """\
 Example:
@@ -55,22 +55,34 @@ Example:
     help="Make Time and Duration one column each.",
 )
 @click.option("--check", is_flag=True, help="Compare the checksums of the recording.")
+@click.option(
+    "--index/--no-index",
+    "use_index",
+    default=True,
+    show_default=True,
+    help="Use the indexes of MCAP files.",
+)
+@options.include
 @click.option("--force", is_flag=True, help="Replace files that exist.")
 def command(wanted: str, fields: str | None, **given: Any) -> int:
     """Write topics of a recording as columns, for pandas, DuckDB and others.
 
-    REC is an .mcap or .db3 file, or the folder of a bag. Without TOPIC, all topics are written.
+    REC is an .mcap or .db3 file, or the folder of a bag; several, or a pattern such as
+    'drive_*.mcap', are read as one. Without TOPIC, all topics are written.
     Each row has the time when a message was recorded, and a column for each of its fields.
     """
     from idlc.cli import output, progress
     from idlc.diagnostics.report import Report
     from idlc.driver.recordings.columns import ColumnsOptions, columns
+    from idlc.recordings.find import divided, expanded
 
     report = Report()
     names = None if fields is None else tuple(one.strip() for one in fields.split(","))
-    options = ColumnsOptions(wanted, fields=names, **given)
+    recordings, topics = divided(given.pop("topics"))
+    paths = (*expanded(wanted), *recordings)
+    asked = ColumnsOptions(paths or (wanted,), tuple(topics), fields=names, **given)
     with progress.shown(sys.stderr) as tell:
-        written = columns(options, report, tell)
+        written = columns(asked, report, tell)
     for one in written:
         sys.stderr.write(f"{one.topic}: {one.rows:,} messages → {one.path}\n")
     output.show(report, "text", sys.stderr)

@@ -32,8 +32,8 @@ def command(wanted: str, package: str | None, include: tuple[str, ...], distro: 
 
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver.query import describe
 
     report = Report()

@@ -40,8 +40,8 @@ def command(
     from idlc.cli import output
     from idlc.diagnostics.formats.terminal import counted
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver.docs import docs
 
     report = Report()

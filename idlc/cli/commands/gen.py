@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import click
@@ -67,25 +68,22 @@ def command(style: str, watch: bool, **given: Any) -> int:
     """
     from idlc.cli import gen_run, output
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
-    from idlc.driver.generate.gen import GenOptions
+    from idlc.disk.settings import pyproject
+    from idlc.driver.generate.gen import GenOptions, with_settings
 
     report = Report()
     settings = pyproject.load(report)
     if report.had_errors:
         gen_run.refuse(report, style)
         return output.status(report)
+    package = given["package"]
     words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
-    wanted = gen_run.completed(GenOptions(**given, scope=scope(settings, *words)), settings)
+    wanted = with_settings(GenOptions(**given, scope=scope(settings, *words)), settings)
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    if wanted.topics:
-        from idlc.recordings.find import divided
-
-        if not divided(wanted.paths)[0]:
-            raise click.UsageError("--topic is for recordings, and none was given")
+    _refuse_in_vain(wanted.paths, package, wanted.topics)
     if wanted.check and (watch or wanted.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
@@ -97,3 +95,18 @@ def command(style: str, watch: bool, **given: Any) -> int:
 
         return run_again(wanted, style)
     return gen_run.once(wanted, style)
+
+
+def _refuse_in_vain(paths: Sequence[str], package: str | None, topics: Sequence[str]) -> None:
+    """Refuse options that mean nothing for what was given."""
+    from idlc.disk.find import is_path
+    from idlc.recordings.find import divided
+
+    recordings, others = divided(paths) if package or topics else ((), ())
+    if topics and not recordings:
+        raise click.UsageError("--topic is for recordings, and none was given")
+    if package and not any(map(is_path, others)):
+        what = "what was recorded" if recordings else "what is installed"
+        raise click.UsageError(
+            f"--package is for files, and none was given; {what} keeps the name that messages have"
+        )

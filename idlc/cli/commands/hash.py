@@ -42,8 +42,8 @@ def command(
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver.query import hashes
 
     report = Report()

@@ -33,8 +33,8 @@ def command(
     from idlc.diagnostics.formats.terminal import counted
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.visible import one_line
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver import named_types
 
     report = Report()

@@ -19,6 +19,12 @@ Example:
 @click.option(
     "--stdio", is_flag=True, expose_value=False, help="Many editors add it; it is so anyway."
 )
+@click.option(
+    "--clientProcessId",
+    metavar="ID",
+    expose_value=False,
+    help="Some editors add it; they say the same when they begin.",
+)
 def command(check: bool) -> int:
     """Serve an editor, which starts this and talks to it over standard input and output.
 
@@ -28,7 +34,7 @@ def command(check: bool) -> int:
     if check:
         import json
 
-        from idlc.lsp.capabilities import answer
+        from idlc.lsp.protocol.capabilities import answer
 
         sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
         return 0

@@ -53,8 +53,8 @@ def command(
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.disk import pyproject
     from idlc.disk.scope import scope
+    from idlc.disk.settings import pyproject
     from idlc.driver.show import show
     from idlc.recordings.find import is_recording
 

@@ -17,11 +17,11 @@ def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
 
 def _command(one: Diagnostic) -> str:
     slug = CODES[one.code].slug if one.code in CODES else ""
-    facts = {"file": one.where[0], **_region(one), "title": f"{one.code} {slug}".strip()}
+    facts = {"file": one.file, **_region(one), "title": f"{one.code} {slug}".strip()}
     listed = ",".join(
         f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
     )
-    parts = (one.message, one.breaks, one.holds_for, one.hint)
+    parts = (one.message, one.breaks, one.holds_for, one.hint, one.within)
     text = "\n".join(one_line(part) for part in parts if part)
     return f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
 
@@ -32,7 +32,7 @@ def notice(title: str, text: str) -> str:
 
 
 def _region(one: Diagnostic) -> dict[str, int]:
-    if one.span is None:
+    if one.span is None or one.within:
         return {}
     line, column = one.span.source.position(one.span.start)
     end_line, end_column = one.span.source.position(one.span.end)

@@ -17,14 +17,16 @@ def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
 
 
 def _issue(one: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
-    line = one.span.source.position(one.span.start)[0] if one.span else 1
+    line = one.span.source.position(one.span.start)[0] if one.span and not one.within else 1
     return {
         "type": "issue",
         "check_name": one.code,
-        "description": "; ".join(filter(None, (one.message, one.breaks, one.holds_for))),
+        "description": "; ".join(
+            filter(None, (one.message, one.breaks, one.holds_for, one.within))
+        ),
         "severity": "major" if one.severity is Severity.ERROR else "minor",
         "fingerprint": fingerprint(one, seen),
-        "location": {"path": one.where[0] or ".", "lines": {"begin": line}},
+        "location": {"path": one.file or ".", "lines": {"begin": line}},
     }
 
 
@@ -33,6 +35,6 @@ def fingerprint(one: Diagnostic, seen: dict[str, int]) -> str:
 
     `seen` counts those that are alike but for their place.
     """
-    key = "\0".join((one.code, one.where[0], one.message))
+    key = "\0".join((one.code, one.file, one.message))
     number = seen[key] = seen.get(key, 0) + 1
     return hashlib.sha256(f"{key}\0{number}".encode("utf-8", "replace")).hexdigest()[:32]

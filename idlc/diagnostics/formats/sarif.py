@@ -59,7 +59,7 @@ def _level(severity: Severity) -> str:
 
 
 def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
-    text = "; ".join(filter(None, (one.message, one.breaks, one.holds_for, one.hint)))
+    text = "; ".join(filter(None, (one.message, one.breaks, one.holds_for, one.hint, one.within)))
     result: dict[str, object] = {
         "ruleId": one.code,
         "ruleIndex": rule,
@@ -67,11 +67,11 @@ def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, objec
         "message": {"text": text},
         "partialFingerprints": {"idlc/v1": fingerprint(one, seen)},
     }
-    if one.where[0]:
-        result["locations"] = [_location(one.span, one.where[0])]
+    if one.file:
+        result["locations"] = [_location(one.span, one.file)]
     if one.labels:
         result["relatedLocations"] = [
-            {**_location(label.span, label.span.source.path), "message": {"text": label.text}}
+            {**_location(label.span, label.span.source.file), "message": {"text": label.text}}
             for label in one.labels
         ]
     if one.edits:
@@ -81,7 +81,7 @@ def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, objec
 
 def _location(span: Span | None, path: str) -> dict[str, object]:
     place: dict[str, object] = {"artifactLocation": _artifact(path)}
-    if span is not None:
+    if span is not None and span.source.path == path:
         place["region"] = _region(span)
     return {"physicalLocation": place}
 

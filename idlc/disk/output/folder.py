@@ -10,8 +10,8 @@ from pathlib import Path
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
-from idlc.disk import environment
 from idlc.disk.library import Library
+from idlc.disk.machine import environment
 from idlc.disk.output import transaction, up_to_date
 from idlc.disk.output.folder_lock import alone
 from idlc.disk.output.lock_file import FILE, Lock, digest, encode, load

@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.disk import environment
-from idlc.disk.enclosing_package import manifest
 from idlc.disk.library import Library
+from idlc.disk.machine import environment
 from idlc.disk.output import transaction
 from idlc.disk.output.folder import Target
 from idlc.disk.output.folder_lock import alone
 from idlc.disk.output.tree import Tree
 from idlc.disk.output.write_plan import Change, Plan
+from idlc.disk.packages.enclosing import manifest
 from idlc.disk.read import read_bytes, shown
 
 #: How the files begin by which shells learn of a prefix, and which all packages in it share.

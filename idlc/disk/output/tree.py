@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.disk.read import kind_of, reason
+from idlc.disk.read import content, kind_of, reason
 
 #: A path of a file that idlc may have written below a folder: a few plain names.
 _OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
@@ -45,7 +45,7 @@ class Tree:
         try:
             status = os.lstat(here)
             if stat.S_ISREG(status.st_mode):
-                return _content(here, status.st_size)
+                return content(here, status.st_size)
             return Obstacle(_is(path, status.st_mode))
         except FileNotFoundError:
             return None
@@ -79,24 +79,12 @@ class Tree:
 
     def _look(self, path: str) -> Obstacle | bool:
         try:
-            mode = Path(f"{self._root}/{path}").lstat().st_mode
+            mode = os.lstat(f"{self._root}/{path}").st_mode
         except FileNotFoundError:
             return False
         except OSError as error:
             return Obstacle(f"`{path}` cannot be read: {reason(error)}")
         return True if stat.S_ISDIR(mode) else Obstacle(_is(path, mode))
-
-
-def _content(path: str, size: int) -> bytes:
-    """Return a file's content; without the layers above the system, which take half of the time."""
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
-    try:
-        data = os.read(handle, size + 1)
-        while len(data) != size and (more := os.read(handle, 1 << 20)):
-            data += more
-        return data
-    finally:
-        os.close(handle)
 
 
 def _is(path: str, mode: int) -> str:

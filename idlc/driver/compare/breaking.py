@@ -21,10 +21,10 @@ from idlc.breaking.version import part_to_raise, raised
 from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import inputs
-from idlc.disk.enclosing_package import manifest, statements
 from idlc.disk.find import InterfaceFile, find, look, nothing_in
 from idlc.disk.output import lock_file
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import manifest, statements
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out, is_revision
 from idlc.disk.scope import Scope
@@ -107,7 +107,8 @@ def _against(
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], report) as revision:
-            return None if revision is None else _compare(options, given, revision, report)
+            found = revision and _compare(options, given, revision, report)
+        return found and found.placed(f"{options.against}:")
     if options.against.endswith(lock_file.FILE):
         return _compare_with_lock(options, given, report)
     if is_revision(options.against, options.paths[0]):

@@ -8,8 +8,8 @@ from idlc.breaking.packages import Comparison, compare, together
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
 from idlc.disk.library import Library
+from idlc.disk.packages import inputs
 from idlc.disk.scope import Scope
 from idlc.driver.stages import Compiler, compile_package, library_for, stage
 from idlc.model import catalog, derive, ir

@@ -22,10 +22,10 @@ from idlc.breaking.graph import (
 from idlc.checks.size import oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
-from idlc.disk import graph as running
-from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
 from idlc.disk.library import Library
+from idlc.disk.machine import graph as running
+from idlc.disk.packages import inputs
 from idlc.disk.scope import Scope
 from idlc.driver.compare.breaking import BreakingOptions, not_allowed
 from idlc.driver.stages import Compiler, models_of, stage

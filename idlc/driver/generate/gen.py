@@ -7,16 +7,18 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.disk import inputs
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
-from idlc.disk.requested import borrowed, completed, targets, wanted
+from idlc.disk.packages import inputs
+from idlc.disk.packages.requested import borrowed, completed, targets, wanted
 from idlc.disk.scope import Scope
+from idlc.disk.settings.pyproject import Config
 from idlc.driver import named_types
 from idlc.driver.generate.result import Generated, generated, up_to_date, with_needs
 from idlc.driver.generate.vendored import planned
 from idlc.driver.stages import Compiler, library_for
 from idlc.model import ir
+from idlc.model.distro import Distro
 from idlc.recordings.find import divided
 from idlc.syntax.tree import OPTIONAL
 
@@ -35,6 +37,15 @@ class GenOptions(NamedTuple):
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
+
+
+def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
+    """Return what was typed, with what pyproject.toml says where nothing was."""
+    return wanted._replace(
+        paths=wanted.paths or settings.paths,
+        out=wanted.out or ("" if wanted.ament else settings.out or ""),
+        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+    )
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
@@ -124,14 +135,14 @@ def _made(
     report: Report,
 ) -> tuple[Generated, ...]:
     library = library_for(tuple(wanted.values()), options.scope, report, texts)
-    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), options)):
+    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), library.distro)):
         current = [
             up_to_date(target, given.digests, library, options.vendor_deps)
             for target, given in wanted.items()
         ]
         if all(current):
             done = [one for each in current for one in each]
-            return with_needs(done, wanted, options.scope.distro, report)
+            return with_needs(done, wanted, library.distro, report)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -148,11 +159,11 @@ def _made(
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     targets = wanted if packages else ()
-    return with_needs(map(generated, packages), targets, options.scope.distro, report)
+    return with_needs(map(generated, packages), targets, library.distro, report)
 
 
-def _may_be_refused(given: Iterable[inputs.Inputs], options: GenOptions) -> bool:
+def _may_be_refused(given: Iterable[inputs.Inputs], distro: Distro) -> bool:
     """Return whether files that one distribution accepted may be an error for this one."""
-    if options.scope.distro.reads_optional:
+    if distro.reads_optional:
         return False
     return any(OPTIONAL.encode() in file.data for one in given for file in one.files)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from idlc.disk import environment
-from idlc.disk.distribution import Distribution, distribution
+from idlc.disk.machine import environment
+from idlc.disk.machine.distribution import Distribution, distribution
 from idlc.driver.stages import stage
 
 if TYPE_CHECKING:

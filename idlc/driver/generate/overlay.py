@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from idlc.disk.distribution import distribution
+from idlc.disk.machine.distribution import distribution
 from idlc.disk.output.folder import Target
 from idlc.disk.output.overlay import Overlay
 from idlc.driver.generate.libraries import libraries_of

@@ -51,7 +51,7 @@ def package_of(
     `vendored` are the packages that are written because of it, where that was asked for.
     """
     from idlc.checks.size import oversized
-    from idlc.disk import template_cache
+    from idlc.disk.cache import templates as template_cache
     from idlc.emit.render import render_package
 
     refused = list(oversized(model))

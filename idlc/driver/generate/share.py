@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report
-from idlc.disk.environment import INDEX
+from idlc.disk.machine.environment import INDEX
 from idlc.driver.generate.libraries import Libraries
 from idlc.export.file_text import file_text
 from idlc.export.idl import idl

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report, Severity
-from idlc.disk import inputs
 from idlc.disk.output.folder import Target
-from idlc.disk.package_names import accept_name
+from idlc.disk.packages import inputs
+from idlc.disk.packages.names import accept_name
 from idlc.driver.generate.package import Package, as_inputs, package_of
 from idlc.driver.stages import Compiler
 from idlc.model import derive

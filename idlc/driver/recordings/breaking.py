@@ -9,10 +9,11 @@ from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.packages import compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk import inputs
 from idlc.disk.find import look, nothing_in
+from idlc.disk.packages import inputs
+from idlc.disk.read import absolute, shown
 from idlc.driver.compare.breaking import BreakingOptions, not_allowed, sound_ones
-from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.types import NAMED, Around, recorded_types
 from idlc.driver.recordings.versions import topics_of, versions
 from idlc.driver.stages import stage
 from idlc.model import ir
@@ -51,13 +52,13 @@ def compare_with_recordings(
     changes: dict[object, Change] = {}
     seen: set[ir.TypeName] = set()
     for version in versions(topics):
-        types = RecordedTypes(version, here.around, options.scope, report)
+        types = recorded_types(version, here.around, options.scope, report)
         models = types.models.values()
         report.extend(types.errors)
         for old, new in here.pairs(models, types.texts):
             seen |= {one.name for one in old.own}
             with stage("compare", old.package):
-                new_ones = compare(old, new).changes
+                new_ones = here.placed(compare(old, new).changes, old.package)
             changes = {**{(one.subject, one.message): one for one in new_ones}, **changes}
     here.tell(report)
     if given and not seen:
@@ -94,6 +95,17 @@ class _Here:
             else:
                 continue
             yield old.only(_names(new)), new.only(_names(old))
+
+    def placed(self, changes: Iterable[Change], package: str) -> list[Change]:
+        """Return changes, those of what was removed with the place where it would be."""
+        given = self._given.get(package)
+        home = shown(absolute(given.home)) if given else ""
+        return [
+            one._replace(place=f"{home}/{one.path.rpartition(f'{package}/')[2]}")
+            if given and not one.span
+            else one
+            for one in changes
+        ]
 
     def tell(self, report: Report) -> None:
         """Note what could not be compared."""

@@ -6,13 +6,14 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
-from idlc.driver.recordings.load import OtherDefinitionWarning
+from idlc.diagnostics.report import Report, first_few
+from idlc.driver.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.driver.recordings.recording import RecordedTopic, Recording, UnknownTopicError
+from idlc.driver.recordings.types import NAMED
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
 
@@ -22,10 +23,15 @@ if TYPE_CHECKING:
 #: What stands in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
+BORROWED = "see to it that it is what was recorded, or point -I to it"
 
 
 class UnknownFieldError(Exception):
-    """A type has no such field."""
+    """The type of a topic has no such field."""
+
+    def __init__(self, message: str, topic: str) -> None:
+        super().__init__(message)
+        self.topic = topic
 
 
 #: Told how many messages of a topic are done.
@@ -33,9 +39,9 @@ Progress = Callable[[str, int, int], None]
 
 
 class ColumnsOptions(NamedTuple):
-    """What `idlc columns` was asked to do."""
+    """What `idlc columns` was asked to do; several recordings are read as one."""
 
-    recording: str
+    recordings: tuple[str, ...]
     topics: tuple[str, ...] = ()
     out: str = STDOUT
     style: str | None = None
@@ -45,7 +51,9 @@ class ColumnsOptions(NamedTuple):
     nested: bool = False
     datetimes: bool = True
     check: bool = False
+    use_index: bool = True
     force: bool = False
+    include: tuple[str, ...] = ()
 
 
 class Written(NamedTuple):
@@ -70,7 +78,16 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
     A topic that cannot be read does not keep others from being written.
     """
     done: list[Written] = []
-    with _problems(options, report), Recording(options.recording, check=options.check) as recording:
+    paths, check, include = options.recordings, options.check, options.include
+    with (
+        _problems(options, report),
+        Recording(
+            paths[0] if len(paths) == 1 else paths,
+            index=options.use_index,
+            check=check,
+            include=include,
+        ) as recording,
+    ):
         report.notes += recording.notes
         with _warnings(report):
             for job in _jobs(recording, options, report):
@@ -87,38 +104,49 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
     except UnknownTopicError as error:
         report.add(codes.NO_SUCH_TOPIC.of("", error.message, hint=error.hint))
     except UnknownFieldError as error:
-        hint = f"`idlc show {options.recording} TOPIC` lists the fields"
+        hint = f"`idlc show {options.recordings[0]} {error.topic}` lists the fields"
         report.add(codes.NO_SUCH_TYPE.of("", str(error), hint=hint))
     except RecordingError as error:
-        where = options.recording
+        where = ", ".join(options.recordings)
         report.add(codes.UNREADABLE_RECORDING.of(where, error.message, hint=error.hint))
 
 
 @contextmanager
 def _warnings(report: Report) -> Iterator[None]:
-    """Report IDL654 for definitions that are not those of what was recorded."""
+    """Report IDL652 and IDL654 for definitions that are not there, or of something else."""
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         yield
-    for one in found:
-        if issubclass(one.category, OtherDefinitionWarning):
-            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(one.message)))
+    missing: dict[str, list[str]] = {}
+    for message in (one.message for one in found):
+        if isinstance(message, OtherDefinitionWarning):
+            report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
+        if isinstance(message, MissingDefinitionWarning):
+            missing.setdefault(message.message, []).append(f"`{message.topic}`")
+    for problem, topics in missing.items():
+        text = f"{first_few(topics, NAMED)}: {problem}"
+        report.add(codes.MISSING_DEFINITION.of("", text, hint=BORROWED))
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:
     """Return what there is to do; empty if it cannot be done."""
-    names = options.topics or tuple(recording)
-    topics = [recording[name].between(options.start, options.end) for name in dict.fromkeys(names)]
+    names = tuple(dict.fromkeys(options.topics or recording))
+    topics = []
+    for name in names:
+        # what was not asked for by its name does not keep others from being written
+        with nullcontext() if options.topics else _problems(options, report):
+            topics.append(recording[name].between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
     problem = _problem(jobs, options)
     if problem:
         message, hint = problem
         report.add(codes.CANNOT_WRITE.of("", message, hint=hint))
         return ()
-    taken = [job.path for job in jobs if job.path != STDOUT and export.exists(job.path)]
-    for path in [] if options.force else taken:
+    paths = [] if options.force else [job.path for job in jobs if job.path != STDOUT]
+    taken = [path for path in paths if export.exists(path)]
+    for path in taken:
         report.add(codes.EXISTING_FILE.of(path, f"`{path}` exists", hint="--force replaces it"))
-    return () if report.had_errors else jobs
+    return () if taken else jobs
 
 
 def _job(topic: RecordedTopic, options: ColumnsOptions, many: bool) -> Job:
@@ -165,7 +193,7 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
     try:
         reader = job.topic.to_reader(**wanted)
     except ValueError as error:
-        raise UnknownFieldError(str(error)) from None
+        raise UnknownFieldError(str(error), name) from None
     counted = _Counted(reader, name, job.topic.topic.count, progress)
     if job.path == STDOUT:
         export.write(counted.batches(), reader.schema, sys.stdout.buffer, job.style)

@@ -10,13 +10,14 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import environment, inputs
 from idlc.disk.library import Library
+from idlc.disk.machine import environment
+from idlc.disk.packages import inputs
+from idlc.disk.packages.requested import borrowed
 from idlc.disk.read import absolute
-from idlc.disk.requested import borrowed
 from idlc.driver.generate.gen import GenOptions
 from idlc.driver.recordings.models import check_versions, contradicted
-from idlc.driver.recordings.types import NAMED, Around, RecordedTypes
+from idlc.driver.recordings.types import NAMED, Around, recorded_types
 from idlc.driver.recordings.versions import topics_of, versions
 from idlc.model import ir
 
@@ -35,7 +36,7 @@ def recorded_packages(
     check_versions(found, report)
     if report.had_errors or not found:
         return [], {}
-    types = RecordedTypes(found[0], Around(options.scope, report), options.scope, report)
+    types = recorded_types(found[0], Around(options.scope, report), options.scope, report)
     report.extend(contradicted(types))
     names = types.names
     if options.ament:

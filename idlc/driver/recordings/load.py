@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc import __version__
 from idlc.diagnostics.report import Report
-from idlc.disk import loaded_cache as cache
+from idlc.disk.cache import loaded as cache
 from idlc.emit.pynames import class_
 from idlc.model import ir
 from idlc.recordings.errors import RecordingError
@@ -33,6 +33,11 @@ import idlc
 _spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
 __path__ += _spec.submodule_search_locations
 exec(_spec.loader.get_code(_spec.name))
+
+from . import objects
+
+# messages show names as those of generated packages do
+objects.HIDDEN = __name__.rsplit(".", 2)[0] + "."
 '''
 
 
@@ -90,10 +95,10 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     return Loaded(f"{LOADED}.{name}", models, asked)
 
 
-def class_of(topic: Topic) -> Any:
+def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return the class of a topic's messages, compiled from what was recorded.
 
-    Warns if that is not what the topic's publisher said that it is.
+    Warns if something else had to be used, or if it is not what the topic's publisher said it is.
     """
     schema, key = topic.schema, ""
     if schema:
@@ -101,9 +106,11 @@ def class_of(topic: Topic) -> Any:
     if not (key and cache.has(key)):
         from idlc.driver.recordings.loading import topic_models
 
-        models, is_recorded = topic_models(topic)
+        models, told = topic_models(topic, include)
+        for one in told:
+            warnings.warn(MissingDefinitionWarning(topic.name, one.message), stacklevel=2)
         # what was borrowed from around here may be another thing tomorrow
-        key = _kept(models, key if is_recorded else "")
+        key = _kept(models, "" if list(told) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
     if topic.hash not in (None, _type_of(kind).hash):
         message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
@@ -115,7 +122,19 @@ class OtherDefinitionWarning(UserWarning):
     """The definition in a recording has another hash than that which the publisher announced."""
 
 
-def accepted(kind: Any, topic: Topic) -> Any:
+class MissingDefinitionWarning(UserWarning):
+    """A recording does not define a type in it; what is known here by its name is used."""
+
+    def __init__(self, topic: str, message: str) -> None:
+        super().__init__(topic, message)
+        self.topic = topic
+        self.message = message
+
+    def __str__(self) -> str:
+        return f"`{self.topic}`: {self.message}"
+
+
+def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return a class that a program gave; raise RecordingError if messages are of another type."""
     try:
         given = _type_of(kind)
@@ -127,7 +146,7 @@ def accepted(kind: Any, topic: Topic) -> Any:
     if given.hash != topic.hash:
         from idlc.driver.recordings.loading import recorded_hash
 
-        found = recorded_hash(topic)
+        found = recorded_hash(topic, include)
         if given.hash != found:
             raise RecordingError(
                 f"{given.name} was another type when `{topic.name}` was recorded: its hash is "

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report, Severity
 from idlc.disk.find import is_path
-from idlc.disk.pyproject import Config
-from idlc.disk.requested import wanted
+from idlc.disk.packages.requested import wanted
 from idlc.disk.scope import Scope, scope
+from idlc.disk.settings.pyproject import Config
 from idlc.driver import named_types
-from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes, recorded_types
 from idlc.driver.recordings.versions import read, versions
 from idlc.driver.stages import Compiler, library_for, sources_of
 from idlc.recordings.definitions import recorded
@@ -66,31 +66,32 @@ def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list
 
         check_versions(found, report)
         return {}, []
-    types = RecordedTypes(found[0], Around(where, report), where, Report())
+    types = recorded_types(found[0], Around(where, report), where, Report())
     models = types.models
     report.extend(types.errors)
     return models, sorted({one.interface for one in types.topics})
 
 
-def topic_models(topic: Topic) -> tuple[Models, bool]:
-    """Return the models of a topic's type, and whether all of it was recorded."""
-    types, told = _types(topic)
-    if not types.topics or types.errors:
-        first = next(iter([*types.errors, *told]), None)
+def topic_models(topic: Topic, include: tuple[str, ...]) -> tuple[Models, Report]:
+    """Return the models of a topic's type, and what there is to say if not all was recorded."""
+    types, told = _types(topic, include)
+    if not types.topics or types.errors or told.had_errors:
+        first = min([*types.errors, *told], key=lambda one: one.severity, default=None)
         why = first.message if first else "its type is not known"
+        why = why.removeprefix(f"`{topic.name}` is left out: ")
         raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
-    return types.models, not list(told)
+    return types.models, told
 
 
-def recorded_hash(topic: Topic) -> str | None:
+def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
     """Return the hash of a topic's type by its definition, or `None` if there is none."""
-    types, _ = _types(topic)
+    types, _ = _types(topic, include)
     return next((types.hash(one) for one in types.topics), None)
 
 
-def _types(topic: Topic) -> tuple[RecordedTypes, Report]:
-    where, told = Scope(), Report()
+def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
+    where, told = Scope(include=include), Report()
     (version,) = versions([recorded(topic, topic.name)])
-    types = RecordedTypes(version, Around(where, told), where, told)
+    types = recorded_types(version, Around(where, told), where, told)
     assert types.models is not None  # its errors are known from then on
     return types, told

@@ -9,7 +9,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report
 from idlc.diagnostics.source import Span
 from idlc.disk.scope import Scope
-from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, RecordedTypes, recorded_types
 from idlc.driver.recordings.versions import Version, contradictions, read, versions
 from idlc.driver.stages import derived_names
 
@@ -25,7 +25,7 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
         found = versions(recording.topics) if recording else []
         check_versions(found, report)
         for version in found:
-            types = RecordedTypes(version, around, scope, report)
+            types = recorded_types(version, around, scope, report)
             report.extend(contradicted(types))
             report.extend(types.errors)
 
@@ -52,6 +52,7 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
                 f"{one.recorded.recording}: topic {topic.name}",
                 f"the definition of `{one.name}` is not that of what was recorded",
                 hint="the recorder found another version of its files than the publisher used",
+                place=one.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )
 
@@ -64,7 +65,7 @@ def recorded_models(
     for path in paths:
         recording = read(path, report)
         for version in versions(recording.topics) if recording else ():
-            types = RecordedTypes(version, around, scope, report)
+            types = recorded_types(version, around, scope, report)
             for model in types.models.values():
                 yield model, [name for one in model.own for name in derived_names(one)]
             report.extend(types.errors)

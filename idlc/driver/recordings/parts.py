@@ -29,15 +29,16 @@ class Part(Selection):
         ids: tuple[int, ...],
         pieces: tuple[Any, ...],
         window: Window,
+        include: tuple[str, ...] = (),
     ) -> None:
-        super().__init__(topic)
+        super().__init__(topic, include)
         self.place = place
         self.ids = ids
         self.pieces = pieces
         self.window = window
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Part, (self.topic, self.place, self.ids, self.pieces, self.window)
+        return Part, (self.topic, self.place, self.ids, self.pieces, self.window, self.include)
 
     def __repr__(self) -> str:
         return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
@@ -48,7 +49,9 @@ class Part(Selection):
             yield from file.messages(self.ids, self.pieces, self.window)
 
 
-def divided(container: Container, topic: Topic, window: Window, size: int) -> Iterator[Part]:
+def divided(
+    container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
+) -> Iterator[Part]:
     """Yield the parts of a topic, each of about `size` bytes of a file."""
     for file, ids in container.ids_of(topic):
         if isinstance(file, McapFile):
@@ -56,7 +59,7 @@ def divided(container: Container, topic: Topic, window: Window, size: int) -> It
         else:
             found = _rows(file, size)
         for pieces in found:
-            yield Part(topic, file.place, tuple(ids), pieces, window)
+            yield Part(topic, file.place, tuple(ids), pieces, window, include)
 
 
 def _chunks(file: McapFile, ids: list[int], window: Window, size: int) -> Iterator[tuple[Any, ...]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from idlc.driver.recordings.parts import Part, divided
@@ -22,10 +22,19 @@ class Recording(Mapping[str, "RecordedTopic"]):
     `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
     recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
     unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
-    compares checksums.
+    compares checksums. `include` are folders in which types are looked for that the recording does
+    not define, as those of ROS 2 Humble do not.
     """
 
-    def __init__(self, path: Any, *, index: bool = True, check: bool = False) -> None:
+    def __init__(
+        self,
+        path: Any,
+        *,
+        index: bool = True,
+        check: bool = False,
+        include: Iterable[str] = (),
+    ) -> None:
+        self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
 
     @property
@@ -48,7 +57,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
         if len(found) > 1:
             kinds = ", ".join(sorted({one.type for one in found}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        return RecordedTopic(self._container, found[0])
+        return RecordedTopic(self._container, found[0], include=self._include)
 
     def __iter__(self) -> Iterator[str]:
         return iter(dict.fromkeys(topic.name for topic in self.topics))
@@ -57,8 +66,10 @@ class Recording(Mapping[str, "RecordedTopic"]):
         return len({topic.name for topic in self.topics})
 
     def __repr__(self) -> str:
-        lines = [f"  {one.name}  {one.type}  {one.count:,}" for one in self.topics]
-        return "\n".join([f"<Recording {self._container.name}", *lines]) + ">"
+        rows = [(one.name, one.type, f"{one.count:,}") for one in self.topics]
+        name, kind, count = (max((len(row[at]) for row in rows), default=0) for at in range(3))
+        lines = [f"{row[0]:{name}}  {row[1]:{kind}}  {row[2]:>{count}}" for row in rows]
+        return "\n".join([f"<Recording {self._container.name}>", *lines])
 
     def close(self) -> None:
         """Close the files. Columns and messages that were made stay as they are."""
@@ -80,10 +91,19 @@ class UnknownTopicError(RecordingError, KeyError):
 class RecordedTopic(Selection):
     """The messages of one topic of an open recording."""
 
-    def __init__(self, container: Container, topic: Topic, window: Window = ALWAYS) -> None:
-        super().__init__(topic)
+    def __init__(
+        self,
+        container: Container,
+        topic: Topic,
+        window: Window = ALWAYS,
+        include: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(topic, include)
         self._container = container
         self._window = window
+
+    def __repr__(self) -> str:
+        return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
 
     def between(self, start: Any = None, end: Any = None) -> RecordedTopic:
         """Return those of a time: from `start`, until before `end`.
@@ -95,7 +115,8 @@ class RecordedTopic(Selection):
         first, last = (
             None if one is None else moment(one, self._container.start) for one in (start, end)
         )
-        return RecordedTopic(self._container, self.topic, self._window.narrowed(first, last))
+        window = self._window.narrowed(first, last)
+        return RecordedTopic(self._container, self.topic, window, self.include)
 
     def batches(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
@@ -106,4 +127,4 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        return list(divided(self._container, self.topic, self._window, size))
+        return list(divided(self._container, self.topic, self._window, size, self.include))

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 from idlc.recordings.compression import missing
 from idlc.recordings.container import Topic
@@ -16,6 +16,7 @@ from idlc.recordings.messages import Messages, joined
 if TYPE_CHECKING:
     import pyarrow as pa
 
+Kind = TypeVar("Kind")
 #: How ROS 2 writes messages.
 CDR = "cdr"
 #: How errors name a message of many, and what is in it.
@@ -24,22 +25,36 @@ _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
 TIMES = ("log_time", "publish_time")
 
 
-class Stamped(NamedTuple):
-    """A message, and when it was recorded, in nanoseconds."""
+if TYPE_CHECKING:
 
-    log_time: int
-    message: Any
+    class Stamped(tuple[int, Kind]):
+        """What type checkers see: named tuples can be generic from Python 3.11 on."""
+
+        log_time: int
+        message: Kind
+
+        def __new__(cls, log_time: int, message: Kind) -> Stamped[Kind]: ...  # noqa: D102
+
+else:
+
+    class Stamped(NamedTuple):
+        """A message, and when it was recorded, in nanoseconds."""
+
+        log_time: int
+        message: Any
 
 
 class Selection:
     """Messages of one topic.
 
     They are of the type that was recorded, compiled when it is first needed, unless a class that
-    idlc generated is given; that must be of the same type as the recorded one.
+    idlc generated is given; that must be of the same type as the recorded one. `include` are
+    folders in which types are looked for that the recording does not define.
     """
 
-    def __init__(self, topic: Topic) -> None:
+    def __init__(self, topic: Topic, include: tuple[str, ...] = ()) -> None:
         self.topic = topic
+        self.include = include
 
     def batches(self) -> Iterator[Messages]:
         """Yield the messages as they are recorded, many at a time."""
@@ -50,7 +65,7 @@ class Selection:
         """The class of the messages, compiled from what was recorded."""
         from idlc.driver.recordings.load import class_of
 
-        return class_of(self.topic)
+        return class_of(self.topic, self.include)
 
     def _kind(self, given: Any) -> Any:
         """Return the class to read with: what was recorded, or one of the same type."""
@@ -61,12 +76,18 @@ class Selection:
             return self.kind
         from idlc.driver.recordings.load import accepted
 
-        return accepted(given, self.topic)
+        return accepted(given, self.topic, self.include)
 
-    def __iter__(self) -> Iterator[Stamped]:
+    def __iter__(self) -> Iterator[Stamped[Any]]:
         return self.messages()
 
-    def messages(self, kind: Any = None) -> Iterator[Stamped]:
+    @overload
+    def messages(self, kind: None = None) -> Iterator[Stamped[Any]]: ...
+
+    @overload
+    def messages(self, kind: type[Kind]) -> Iterator[Stamped[Kind]]: ...
+
+    def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
         """Yield each message with its time, in the order in which they were recorded."""
         kind, done = self._kind(kind), 0
         for batch in self.batches():

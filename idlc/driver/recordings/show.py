@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.disk.scope import Scope
-from idlc.driver.recordings.types import Around, RecordedTypes
+from idlc.driver.recordings.types import Around, recorded_types
 from idlc.driver.recordings.versions import read, topics_of, versions
 from idlc.driver.show import shown
 from idlc.driver.stages import stage
@@ -36,10 +36,11 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     around = Around(scope, report)
     found = []
     for version in versions(recording.topics) if recording else ():
-        types = RecordedTypes(version, around, scope, Report())
+        types = recorded_types(version, around, scope, Report())
         own = (one for one in types.topics if one.interface in types.texts)
-        hashes = {one.recorded.topic.name: types.hash(one) for one in own}
-        found += [_facts(one, hashes.get(one.topic.name), around) for one in version.topics]
+        # a name may stand for several topics, of different types
+        hashes = {id(one.recorded): types.hash(one) for one in own}
+        found += [_facts(one, hashes.get(id(one)), around) for one in version.topics]
     return sorted(found, key=lambda one: (one.name, one.type_name))
 
 
@@ -61,7 +62,7 @@ def definitions(
     found = topics_of([path], wanted, report)
     around = Around(scope, report)
     for version in versions(found or ()):
-        types = RecordedTypes(version, around, scope, report)
+        types = recorded_types(version, around, scope, report)
         for name in dict.fromkeys(one.interface for one in types.topics):
             model = types.models[name.package]
             if name in model.interfaces:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,20 +11,20 @@ from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.diagnostics.source import Source
-from idlc.disk import nearby
 from idlc.disk.library import Library
+from idlc.disk.packages import nearby
 from idlc.disk.scope import Scope
 from idlc.driver.recordings.versions import Version
 from idlc.driver.stages import Compiler
 from idlc.model import derive, ir
 from idlc.model.describe import Describer
 from idlc.model.link import Model
-from idlc.model.lowering.file import lower
 from idlc.recordings.definitions import ENCODINGS, Recorded
-from idlc.syntax.parse import parse_any
 
 #: Names that are told in a sentence.
 NAMED = 5
+#: Why a definition is not the recording's.
+ABSENT, UNREADABLE = "there is no definition of", "there are errors in the definition of"
 
 
 class Typed(NamedTuple):
@@ -63,14 +64,41 @@ def has(model: Model, name: ir.TypeName) -> bool:
     return name in model.messages or name in model.interfaces
 
 
+def recorded_types(version: Version, around: Around, scope: Scope, report: Report) -> RecordedTypes:
+    """Return what the topics of a version mean; reports IDL652 for what it does not define.
+
+    What is known here stands in for definitions that have errors, unless a recorded hash says that
+    something else was recorded. Then these are in `errors`.
+    """
+    told, others = Report(), Report()
+    types = RecordedTypes(version, around, scope, told)
+    broken = {name for name in types.broken if around.library.source(name) is not None}
+    if broken:
+        trial = RecordedTypes(version, around, scope, others, broken)
+        if trial.may_stand_in(version.topics, broken):
+            types, told = trial, others
+    report.extend(told)
+    return types
+
+
 class RecordedTypes:
     """What the topics of a version mean, and all that these types refer to."""
 
-    def __init__(self, version: Version, around: Around, scope: Scope, report: Report) -> None:
-        """Look the types up; reports IDL652 for what the recording does not define."""
-        library = around.library
-        texts = {name: one for name, one in version.texts.items() if _counts(name, one, library)}
-        texts |= _empty_ones(version.topics, texts)
+    def __init__(
+        self,
+        version: Version,
+        around: Around,
+        scope: Scope,
+        report: Report,
+        broken: Container[ir.TypeName] = (),
+    ) -> None:
+        """Look the types up; reports IDL652 for what the recording does not define.
+
+        Definitions that are `broken` are none.
+        """
+        self._broken = broken
+        texts = {name: one for name, one in version.texts.items() if name not in broken}
+        texts |= _empty_ones(version.topics, texts, around)
         self.library = Library(
             scope.include, Report(), own=nearby.near(), distro=scope.distro, texts=texts
         )
@@ -94,19 +122,30 @@ class RecordedTypes:
         return found
 
     def _doubts(self) -> Iterator[Diagnostic]:
-        """Yield IDL652 for definitions that are not the recording's, and that no hash confirms."""
-        doubtful: dict[str, set[ir.TypeName]] = {}
+        """Yield IDL652 for definitions that are not the recording's.
+
+        If none is there, and the recorded hash confirms the other, nothing is to be said.
+        """
+        doubtful: dict[tuple[str, str, bool], set[ir.TypeName]] = {}
         for one in self.topics:
-            missing = _explicit([one.interface], self.interfaces) - self.texts.keys()
-            if missing and one.recorded.topic.hash != self.hash(one):
-                doubtful.setdefault(one.recorded.recording, set()).update(missing)
-        for recording, found in doubtful.items():
+            missing = self.names_of(one) - self.texts.keys()
+            sure = bool(missing) and one.recorded.topic.hash == self.hash(one)
+            for name in missing:
+                why = UNREADABLE if name in self._broken else ABSENT
+                if why == UNREADABLE or not sure:
+                    doubtful.setdefault((one.recorded.recording, why, sure), set()).add(name)
+        for (recording, why, sure), found in doubtful.items():
             names = first_few((f"`{name}`" for name in sorted(found)), NAMED)
+            which = "has the recorded hash and" if sure else "by that name"
             yield codes.MISSING_DEFINITION.of(
                 recording,
-                f"there is no definition of {names}; what is known here by that name is used",
-                hint="see to it that it is what was recorded, or point -I to what is",
+                f"{why} {names}; what is known here {which} is used",
+                hint=None if sure else "see to it that it is what was recorded, or point -I to it",
             )
+
+    def names_of(self, topic: Typed) -> set[ir.TypeName]:
+        """Return the interfaces that a topic's type is made of."""
+        return _explicit([topic.interface], self.interfaces)
 
     @cached_property
     def models(self) -> dict[str, Model]:
@@ -126,31 +165,47 @@ class RecordedTypes:
         broken = {one.where[0] for one in self.errors}
         return {name: one.sound(broken) for name, one in models.items()} if broken else models
 
+    @property
+    def broken(self) -> set[ir.TypeName]:
+        """The definitions of the recording that have errors."""
+        assert self.models is not None  # its errors are known from then on
+        wrong = {one.where[0] for one in self.errors}
+        return {name for name, one in self.texts.items() if one.path in wrong}
+
+    def may_stand_in(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
+        """Return whether no recorded hash says that broken definitions were others than here."""
+        typed = {id(one.recorded): one for one in self.topics}
+        for one in topics:
+            found = typed.get(id(one))
+            if found is None and one.interface in broken:
+                return False
+            if found is None or not one.topic.hash or broken.isdisjoint(self.names_of(found)):
+                continue
+            if self.hash(found) != one.topic.hash:
+                return False
+        return True
+
     def hash(self, topic: Typed) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
         model = self.models[topic.name.package]
         return model.describer.hash(str(topic.name)) if has(model, topic.name) else None
 
 
-def _counts(name: ir.TypeName, source: Source, around: Library) -> bool:
-    """Return whether a definition is used: not if it is IDL that only others read."""
-    if not source.is_idl or around.source(name) is None:
-        return True
-    report = Report()
-    lower(parse_any(source), name, report)
-    return not report.had_errors
-
-
 def _empty_ones(
-    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source]
+    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source], around: Around
 ) -> Iterator[tuple[ir.TypeName, Source]]:
-    """Yield the messages whose definitions are empty because they are, as their hashes say."""
+    """Yield the messages whose definitions are empty because they are.
+
+    Their hashes say so, or where none was recorded, what is known here.
+    """
     for topic in topics:
         name, recorded = topic.interface, topic.topic.hash
         if name is None or name.kind != "msg" or name in texts:
             continue
-        if Describer({name: ir.Message(name=name)}).hash(str(name)) == recorded:
-            yield name, Source(f"{topic.recording}: topic {topic.topic.name}: {name}.msg", "")
+        empty = Describer({name: ir.Message(name=name)}).hash(str(name))
+        if (recorded or around.hash(name, name)) == empty:
+            path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
+            yield name, Source(path, "", topic.recording)
 
 
 def _typed(

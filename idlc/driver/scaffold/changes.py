@@ -8,12 +8,13 @@ from typing import NamedTuple
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject, template_cache, user_templates
-from idlc.disk.enclosing_package import declared_name, manifest
+from idlc.disk.cache import templates as template_cache
 from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
+from idlc.disk.packages.enclosing import declared_name, manifest
 from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject, user_templates
 from idlc.driver.stages import stage
 from idlc.scaffold.edits.outcome import Edited, Outcome
 from idlc.scaffold.template_problems import BrokenTemplateError

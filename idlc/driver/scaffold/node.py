@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from idlc.diagnostics.report import Report
-from idlc.disk.distribution import distribution
-from idlc.disk.environment import python_folders
+from idlc.disk.machine.distribution import distribution
+from idlc.disk.machine.environment import python_folders
 from idlc.disk.output.project import Project
 from idlc.driver.scaffold.changes import (
     Result,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject
 from idlc.disk.output.project import Project
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject
 from idlc.driver.scaffold.changes import Result, Settings, rendering, templates, write
 from idlc.model import catalog, ir
 from idlc.scaffold import new_package

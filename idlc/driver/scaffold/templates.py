@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
-from idlc.disk import pyproject, user_templates
 from idlc.disk.output.project import Project
+from idlc.disk.settings import pyproject, user_templates
 from idlc.driver.scaffold.changes import Result, Settings, write
 from idlc.scaffold.templates import ENDING, copy, folders, names
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from idlc.emit.codec import wire_plan
 from idlc.emit.codec.constants import Tables
@@ -129,6 +130,7 @@ class Framing(Emitter):
             self.body.append(Note(target, value, positions(value)))
 
 
+@lru_cache(maxsize=1024)  # few are different
 def positions(expression: str) -> frozenset[str]:
     """Return the variables in an expression that hold positions."""
     return frozenset(_POSITIONS.findall(expression))
@@ -136,9 +138,11 @@ def positions(expression: str) -> frozenset[str]:
 
 def without_parentheses(value: str) -> str:
     """Return an expression without parentheses around all of it."""
+    if not value.startswith("("):
+        return value
     depth = 0
     for place, character in enumerate(value):
         depth += (character == "(") - (character == ")")
         if depth == 0 and place < len(value) - 1:
             return value
-    return value[1:-1] if value.startswith("(") else value
+    return value[1:-1]

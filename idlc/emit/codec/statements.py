@@ -101,17 +101,18 @@ def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
     result: list[str] = []
     for statement in body:
         match statement:
-            case Line(value, ""):
-                result += lines(value, indent)
             case Line(value, target, operator):
-                result += assign(target, value, indent, operator)
+                if target:
+                    result += assign(target, value, indent, operator)
+                else:
+                    result += lines(value, indent)
+            case Block(head, inner):
+                result.append(" " * indent + head)
+                result += text_of(inner, indent + 4)
             case Note(target, value):
                 result += assign(target, value, indent)
             case Put(part):
                 result += lines(Group("put", (part,)), indent)
-            case Block(head, inner):
-                result.append(" " * indent + head)
-                result += text_of(inner, indent + 4)
     return result
 
 

@@ -14,11 +14,13 @@ from idlc.diagnostics.source import Span
 from idlc.driver.check import tidied
 from idlc.driver.workspace import State
 from idlc.lsp.edits import differences, of_documents, workspace_edit
-from idlc.lsp.protocol import AskedActions, Part, Range
+from idlc.lsp.features import generated
+from idlc.lsp.protocol.capabilities import UPDATE_KIND
+from idlc.lsp.protocol.parts import AskedActions, Part, Range
 from idlc.lsp.publish import Shown, problems, shown
 from idlc.lsp.world import World
 
-_FIX, _FIX_ALL = "quickfix", "source.fixAll.idlc"
+_FIX, _FIX_ALL, _UPDATE = "quickfix", "source.fixAll.idlc", UPDATE_KIND
 #: Hints that name what could stand there instead.
 _MEANT = re.compile(r"(?:did you mean|write|use) `")
 #: Of the names in a hint, so many are tried.
@@ -30,9 +32,10 @@ class Action(Part, frozen=True):
 
     title: str
     kind: str
-    edit: dict[str, object]
+    edit: dict[str, object] | None = None
     diagnostics: tuple[Shown, ...] = ()
     is_preferred: bool = False
+    command: dict[str, object] | None = None
 
 
 class Guilty(NamedTuple):
@@ -65,6 +68,9 @@ def actions(world: World, asked: AskedActions) -> list[Action]:
                 found += _about(one)
     if _wanted(_FIX_ALL, asked.context.only) and path is not None:
         found += _everything(all_, asked.text_document.uri, world)
+    if _wanted(_UPDATE, asked.context.only):
+        command = generated.command(world, asked.text_document.uri)
+        found += [Action(str(command["title"]), _UPDATE, command=command)] if command else []
     return found
 
 

@@ -1,23 +1,24 @@
-"""Commands, which edit files by way of the editor."""
+"""Commands, which an editor sends when its user chose one of them."""
 
 from __future__ import annotations
 
-from idlc.lsp.capabilities import ADD_DEPENDENCY
 from idlc.lsp.edits import workspace_edit
-from idlc.lsp.errors import INVALID_PARAMS, RequestError
-from idlc.lsp.protocol import Command
+from idlc.lsp.features import generated
+from idlc.lsp.protocol import capabilities
+from idlc.lsp.protocol.errors import INVALID_PARAMS, RequestError
+from idlc.lsp.protocol.parts import Command
 from idlc.lsp.world import World
 
 
 def execute(world: World, asked: Command) -> None:
     """Carry a command out."""
-    if asked.command != ADD_DEPENDENCY:
-        raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}`")
-    match asked.arguments:
-        case [str(uri), str(package)]:
+    match asked.command, *asked.arguments:
+        case capabilities.ADD_DEPENDENCY, str(uri), str(package):
             _declare(world, uri, package)
+        case capabilities.UPDATE_GENERATED, str(uri):
+            generated.update(world, uri)
         case _:
-            raise RequestError(INVALID_PARAMS, "a document and a package are needed")
+            raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}` for these")
 
 
 def _declare(world: World, uri: str, package: str) -> None:

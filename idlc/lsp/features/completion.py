@@ -6,18 +6,18 @@ Only the line and the lists of what there is are looked at, so that it comes whi
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
 from idlc.diagnostics.codes import CODES
 from idlc.diagnostics.report import Severity
-from idlc.lsp import dependencies, suggestions
 from idlc.lsp.documents import Document
-from idlc.lsp.positions import in_lines, lines_of, units
+from idlc.lsp.features import dependencies, suggestions
 from idlc.lsp.projects import Project
-from idlc.lsp.protocol import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.protocol.parts import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.protocol.positions import in_lines, lines_of, units
 from idlc.lsp.world import World
 from idlc.model import ir
 from idlc.model.lowering.types import STRINGS
@@ -88,14 +88,15 @@ def complete(world: World, asked: AtPosition) -> Items:
     line, at = in_lines(lines, asked.position, world.encoding)
     typed = Typed(document, path, project, line, lines[line][:at], world.encoding, {})
     items = tuple(_items(typed, world))
-    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, typed)))
+    starts = {one.text_edit.range.start.character for one in items}
+    words = {start: typed.after(start).lower() for start in starts}
+    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, words)))
 
 
-def _fits(item: Item, typed: Typed) -> bool:
+def _fits(item: Item, words: Mapping[int, str]) -> bool:
     """Return whether what an item replaces has its letters in that order; not all editors look."""
-    start = item.text_edit.range.start.character
     letters = iter((item.filter_text or item.label).lower())
-    return all(one in letters for one in typed.after(start).lower())
+    return all(one in letters for one in words[item.text_edit.range.start.character])
 
 
 def _items(typed: Typed, world: World) -> Iterator[Item]:

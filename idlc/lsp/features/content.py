@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from idlc.lsp.errors import INVALID_PARAMS, RequestError
-from idlc.lsp.protocol import AskedContent
+from idlc.lsp.protocol.errors import INVALID_PARAMS, RequestError
+from idlc.lsp.protocol.parts import AskedContent
 from idlc.lsp.world import World
 from idlc.model import catalog, ir
 from idlc.model.distro import BY_NAME

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from idlc.export.byte_layout import layout
 from idlc.lsp.elements import elements
-from idlc.lsp.protocol import OfRange, Part, Position
+from idlc.lsp.protocol.parts import OfRange, Part, Position
 from idlc.lsp.world import World
 
 

@@ -8,7 +8,7 @@ from idlc.driver.workspace import State
 from idlc.export.byte_layout import Extent, Placed, layout
 from idlc.export.outline import outline
 from idlc.lsp.elements import Element, section_names, spot
-from idlc.lsp.protocol import AtPosition, Markup, Part, Range
+from idlc.lsp.protocol.parts import AtPosition, Markup, Part, Range
 from idlc.lsp.world import World
 from idlc.model import derive, ir
 from idlc.model.link import Model

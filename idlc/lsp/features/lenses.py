@@ -1,15 +1,28 @@
-"""Texts above a file: its hash, who uses it, and what its changes break."""
+"""Texts above lines: hash, users and defaults of a file, and what its changes break."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 from idlc.breaking.change import LEVELS
 from idlc.breaking.packages import compare
-from idlc.lsp.features.navigation import users
-from idlc.lsp.protocol import Action, Lens, OfDocument, Position, Range
+from idlc.diagnostics.report import first_few
+from idlc.lsp.protocol.parts import Action, Lens, OfDocument, Position, Range
+from idlc.lsp.users import users
 from idlc.lsp.world import Known, World
+from idlc.model import derive, ir
+from idlc.model.spelling import spell_value
+
+if TYPE_CHECKING:
+    from idlc.driver.compare.earlier import Earlier
 
 _TOP = Range(Position(0, 0), Position(0, 0))
 _HASH, _USERS, _BREAKS = "hash", "users", "breaks"
+#: Defaults that a lens tells.
+MOST_DEFAULTS = 5
+#: Letters of a default that it tells.
+MOST_LETTERS = 40
 
 
 def lenses(world: World, asked: OfDocument) -> list[Lens]:
@@ -19,14 +32,40 @@ def lenses(world: World, asked: OfDocument) -> list[Lens]:
         return []
     kinds = [_HASH] if known.state.library.distro.has_hashes else []
     kinds += [_USERS] if known.interface.name.kind == "msg" else []
-    kinds += [_BREAKS] if world.settings.against else []
-    return [Lens(_TOP, data=[asked.text_document.uri, kind]) for kind in kinds]
+    kinds += [_BREAKS] if _earlier(known, world) else []
+    found = [Lens(_TOP, data=[asked.text_document.uri, kind]) for kind in kinds]
+    return [*found, *(_defaults(known, world) if world.settings.default_lens else ())]
 
 
 def resolve(world: World, asked: Lens) -> Lens:
     """Return a lens with what it says."""
+    if asked.command is not None:
+        return asked
     uri, kind = asked.data
     return Lens(asked.range, Action(_text(world, uri, kind), ""), asked.data)
+
+
+def _defaults(known: Known, world: World) -> Iterator[Lens]:
+    """Yield a lens above the first default of each section, which tells all of them."""
+    for section in derive.sections(known.interface):
+        given = [one for one in section.fields if one.default and one.name_span]
+        if given:
+            texts = (_default(one, section) for one in given)
+            assert given[0].name_span is not None
+            place = world.range(given[0].name_span).start
+            says = Action(f"defaults: {first_few(texts, MOST_DEFAULTS)}", "")
+            yield Lens(Range(Position(place.line, 0), Position(place.line, 0)), says)
+
+
+def _default(field: ir.Field, section: ir.Message) -> str:
+    """Return a field with its default, and which constant that is if it can be only one."""
+    assert field.default is not None
+    value = field.default.value
+    same = [one for one in section.constants if (one.type, one.value) == (field.type, value)]
+    own = [one for one in same if one.name.lower().startswith(f"{field.name}_")]
+    named = own or same
+    text = named[0].name if len(named) == 1 else spell_value(value)
+    return f"{field.name} {text if len(text) <= MOST_LETTERS else text[:MOST_LETTERS] + '…'}"
 
 
 def _text(world: World, uri: str, kind: str) -> str:
@@ -43,22 +82,29 @@ def _text(world: World, uri: str, kind: str) -> str:
     return model.describer.hash(str(name)) if model else "no type hash: there are errors"
 
 
+def _earlier(known: Known, world: World) -> Earlier | None:
+    """Return what a file's folder is compared with, if settings name something."""
+    project = world.projects.of(known.state.path_of(known.source))
+    found = project.workspace.earlier(world.settings.against) if project else None
+    return found if found and found.name else None
+
+
 def _what_breaks(known: Known, world: World) -> str:
     """Return what the changes of a file break against the version of the settings."""
-    against, interface = world.settings.against, known.interface
+    interface, earlier = known.interface, _earlier(known, world)
     project = world.projects.of(known.state.path_of(known.source))
-    before = project.workspace.earlier(against).get(interface.name.package) if project else None
+    if earlier is None or project is None:
+        return ""
+    world.follow_git(project.folder, earlier.repository)
+    before = project.workspace.before(world.settings.against).get(interface.name.package)
     after = known.state.model_of(interface)
     if before is None or after is None or interface.name not in before.interfaces:
-        return f"nothing to compare with in {against}" if after else ""
+        return f"nothing to compare with in {earlier.name}" if after else ""
     name = {interface.name}
-    broken = {
-        level
-        for change in compare(before.only(name), after.only(name)).changes
-        for level in change.levels
-    }
+    changes = compare(before.only(name), after.only(name)).changes
+    broken = {level for change in earlier.not_allowed(changes) for level in change.levels}
     if not broken:
-        return f"breaks nothing against {against}"
+        return f"breaks nothing against {earlier.name}"
     count = len({state.path_of(span.source) for state, span in users(interface.name, world)})
     levels = ", ".join(level for level in LEVELS if level in broken)
-    return f"breaks: {levels} for {count} user{'s' * (count != 1)} against {against}"
+    return f"breaks: {levels} for {count} user{'s' * (count != 1)} against {earlier.name}"

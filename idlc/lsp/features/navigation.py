@@ -6,12 +6,14 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from idlc.diagnostics.source import Span
+from idlc.diagnostics.source import Source, Span
 from idlc.driver.workspace import State
 from idlc.lsp.elements import Element, elements, spot
-from idlc.lsp.protocol import AskedReferences, AtPosition, Location, Part, Range
+from idlc.lsp.features import manifest
+from idlc.lsp.protocol.parts import AskedReferences, AtPosition, Location, Part, Range
+from idlc.lsp.users import users
 from idlc.lsp.world import Known, World
-from idlc.model import derive, ir
+from idlc.model import ir
 
 _READ, _WRITE = 2, 3
 
@@ -47,6 +49,8 @@ def thing(world: World, asked: AtPosition) -> Thing | None:
 
 def definition(world: World, asked: AtPosition) -> Location | None:
     """Return where the thing at a position is defined."""
+    if package := manifest.named(world, asked):
+        return manifest.definition(package, world)
     found = thing(world, asked)
     if found is None:
         return None
@@ -66,16 +70,23 @@ def type_definition(world: World, asked: AtPosition) -> Location | None:
 
 def top(name: ir.TypeName, state: State, world: World) -> Location | None:
     """Return the beginning of the file of an interface."""
+    source = text_of(name, state)
+    return world.location(Span(source, 0, 0), state) if source else None
+
+
+def text_of(name: ir.TypeName, state: State) -> Source | None:
+    """Return the text that defines an interface."""
     for model in state.models.values():
         interface = model.interfaces.get(name)
         if interface is not None and interface.source is not None:
-            return world.location(Span(interface.source, 0, 0), state)
-    source = state.source(name)
-    return world.location(Span(source, 0, 0), state) if source else None
+            return interface.source
+    return state.source(name)
 
 
 def references(world: World, asked: AskedReferences) -> list[Location]:
     """Return where the thing at a position is used, in all folders, and where it is defined."""
+    if package := manifest.named(world, asked):
+        return manifest.references(package, asked, world)
     found = thing(world, asked)
     if found is None:
         return []
@@ -92,19 +103,6 @@ def references(world: World, asked: AskedReferences) -> list[Location]:
     span = project.workspace.declaration(path, found.name.package) if project else None
     used += [world.location(span, state)] if span else []
     return list(dict.fromkeys((*declared, *used)))
-
-
-def users(name: ir.TypeName, world: World) -> Iterator[tuple[State, Span]]:
-    """Yield where fields name a message in their types."""
-    for project in world.projects.all():
-        state = project.state(world.documents)
-        for model in state.models.values() if state else ():
-            for interface in model.own:
-                for section in derive.sections(interface):
-                    for field, target in section.holders:
-                        if target == name and field.type_span is not None:
-                            assert state is not None
-                            yield state, field.type_span
 
 
 def mentions(element: Element, known: Known) -> Iterator[Span]:

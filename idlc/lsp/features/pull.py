@@ -6,7 +6,7 @@ from zlib import crc32
 
 import msgspec
 
-from idlc.lsp.protocol import AskedWorkspace, OfDocument
+from idlc.lsp.protocol.parts import AskedWorkspace, OfDocument
 from idlc.lsp.publish import Shown, diagnostics
 from idlc.lsp.world import World
 

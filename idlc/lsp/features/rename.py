@@ -15,11 +15,12 @@ from idlc.diagnostics.report import Edit, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.disk.read import is_file
 from idlc.driver.workspace import State
-from idlc.lsp import uris
 from idlc.lsp.elements import Element, spot
-from idlc.lsp.errors import REQUEST_FAILED, RequestError
-from idlc.lsp.features.navigation import mentions, users
-from idlc.lsp.protocol import AskedFileRenames, AskedRename, AtPosition, Part, Range, TextEdit
+from idlc.lsp.features.navigation import mentions
+from idlc.lsp.protocol import uris
+from idlc.lsp.protocol.errors import REQUEST_FAILED, RequestError
+from idlc.lsp.protocol.parts import AskedFileRenames, AskedRename, AtPosition, Part, Range, TextEdit
+from idlc.lsp.users import users
 from idlc.lsp.world import Known, World
 from idlc.model import ir, names
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from idlc.diagnostics.source import Span
 from idlc.lsp.elements import elements
-from idlc.lsp.features.navigation import top
+from idlc.lsp.features.navigation import text_of
 from idlc.lsp.features.symbols import sections
-from idlc.lsp.protocol import AtPositions, OfDocument, Part, Range
-from idlc.lsp.world import Known, World
+from idlc.lsp.protocol.parts import AtPositions, OfDocument, Part, Range
+from idlc.lsp.world import CONTENT, Known, World, is_built_in
 from idlc.syntax.parse import parse
 
 
@@ -97,9 +97,12 @@ def selections(world: World, asked: AtPositions) -> list[Selection]:
 def links(world: World, asked: OfDocument) -> list[Link]:
     """Return the types of a file that lead to other files."""
     known = world.known(asked.text_document.uri)
+    shows_texts = world.supports("workspace", CONTENT)
     found = []
     for one in elements(known.source, known.interface) if known else ():
-        place = top(one.target, known.state, world) if one.target and known else None
-        if place is not None:
-            found.append(Link(world.range(one.type), place.uri, f"open {one.target}"))
+        source = text_of(one.target, known.state) if one.target and known else None
+        # a file of the cache is only made when somebody goes there
+        if source is not None and known and (shows_texts or not is_built_in(source)):
+            uri = world.location(Span(source, 0, 0), known.state).uri
+            found.append(Link(world.range(one.type), uri, f"open {one.target}"))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from idlc.diagnostics.source import Span
 from idlc.lsp.elements import Element, elements, section_names
-from idlc.lsp.protocol import AskedSymbols, Location, OfDocument, Part, Range
+from idlc.lsp.protocol.parts import AskedSymbols, Location, OfDocument, Part, Range
 from idlc.lsp.world import Known, World
 from idlc.model import ir
 from idlc.model.spelling import spell

@@ -9,8 +9,8 @@ from idlc.diagnostics.source import Span
 from idlc.lsp.elements import Element, elements
 from idlc.lsp.features.navigation import comments
 from idlc.lsp.features.symbols import sections
-from idlc.lsp.protocol import OfDocument, OfRange, Position
-from idlc.lsp.token_kinds import MODIFIERS, TYPES
+from idlc.lsp.protocol.parts import OfDocument, OfRange, Position
+from idlc.lsp.protocol.token_kinds import MODIFIERS, TYPES
 from idlc.lsp.world import Known, World
 from idlc.model import ir
 from idlc.model.lowering.types import STRINGS

@@ -8,7 +8,7 @@
  */
 
 import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
@@ -184,8 +184,12 @@ const LOOKS = {
   async fix() {
     await open("msg/Broken.msg");
     await page.locator(".squiggly-error").first().waitFor();
-    await keyboard.press("Control+.");
-    await page.locator(".action-widget .monaco-list-row", { hasText: "float64" }).first().waitFor();
+    const row = page.locator(".action-widget .monaco-list-row", { hasText: "float64" }).first();
+    // a busy machine may answer before the squiggle's problem is known there
+    await until("fix", async () => {
+      await keyboard.press("Control+.");
+      return row.waitFor({ timeout: 5000 }).then(() => true, () => false);
+    });
     await picture("fix");
     await keyboard.press("Enter");
     await page.locator(".squiggly-error").first().waitFor({ state: "detached" });
@@ -259,10 +263,11 @@ const LOOKS = {
     await box.waitFor();
     await box.fill("velocity");
     await keyboard.press("Enter");
-    // it breaks something, so VS Code asks before it does it
-    await page.locator(".bulk-edit-panel .monaco-list-row input[type=checkbox]").first().check();
+    // it breaks something, and says so before it does it
+    const dialog = page.locator(".monaco-dialog-box", { hasText: "breaks hash, source" });
+    await dialog.waitFor();
     await picture("rename");
-    await page.locator(".bulk-edit-panel").getByText("Apply", { exact: true }).click();
+    await dialog.getByText("Rename", { exact: true }).click();
     await page.locator(".view-line", { hasText: "velocity" }).first().waitFor();
     return saved("msg/Drive.msg");
   },
@@ -295,6 +300,41 @@ const LOOKS = {
     await page.locator(".markers-panel .monaco-list-row").nth(1).waitFor();
     await picture("hints");
     await keyboard.press("Control+j");
+    return found;
+  },
+  async lens() {
+    await open("msg/Drive.msg");
+    const shown = page.locator(".codelens-decoration");
+    const found = await until("lenses", async () => {
+      const texts = (await shown.allTextContents()).join(" | ");
+      return ["RIHS01_", "2 uses", "defaults: speed 0.5"].every((one) => texts.includes(one)) && texts;
+    });
+    await keyboard.press("Control+Shift+m");
+    await page.locator(".markers-panel .monaco-list-row").nth(1).waitFor();
+    await shown.first().waitFor();
+    await picture("lens");
+    await keyboard.press("Control+j");
+    return found;
+  },
+  async update() {
+    writeFileSync(join(folder, "pyproject.toml"), '[tool.idlc]\npaths = ["msg"]\nout = "new/demo_msgs"\n');
+    writeFileSync(join(folder, "msg/Broken.msg"), "float64 x\n"); // or nothing would be written
+    await open("msg/Fleet.msg");
+    await until("action", async () => {
+      await pick("Source Action...");
+      const rows = page.locator(".action-widget .monaco-list-row");
+      await rows.first().waitFor({ timeout: 2000 }).catch(() => undefined);
+      const row = rows.filter({ hasText: "Update the generated package" });
+      if (!(await row.count())) {
+        await keyboard.press("Escape");
+        return false;
+      }
+      await picture("update");
+      await keyboard.press("Enter");
+      return true;
+    });
+    const found = await until("result", () => existsSync(join(folder, "new/demo_msgs/msg/_drive.py")));
+    rmSync(join(folder, "pyproject.toml"));
     return found;
   },
   async show() {

@@ -127,6 +127,7 @@ def compared(cases, record_property):
     return seen
 
 
+@pytest.mark.long
 def test_every_difference_is_known_and_every_known_one_is_seen(
     classes, ros_environment, record_property, tmp_path
 ):
@@ -138,6 +139,7 @@ def test_every_difference_is_known_and_every_known_one_is_seen(
     assert {one.__name__ for one in DIFFERENCES} <= set(seen)
 
 
+@pytest.mark.long
 def test_the_environment_lets_all_messages_check(
     classes, ros_environment, record_property, tmp_path
 ):

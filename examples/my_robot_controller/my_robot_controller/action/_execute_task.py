@@ -14,6 +14,8 @@ TYPE_CHECKING = False
 class ExecuteTask_Goal(_idlc.Message):
     """The goal of the action my_robot_controller/action/ExecuteTask.
 
+    Defined in action/ExecuteTask.action:1
+
     Attributes:
         task_name: string. The task to execute, e.g. "dock"
     """
@@ -26,6 +28,7 @@ class ExecuteTask_Goal(_idlc.Message):
     )
 
     task_name: str
+    """string task_name. The task to execute, e.g. "dock" (action/ExecuteTask.action)"""
 
     def __init__(
         self,
@@ -48,6 +51,8 @@ class ExecuteTask_Goal(_idlc.Message):
 class ExecuteTask_Result(_idlc.Message):
     """The result of the action my_robot_controller/action/ExecuteTask.
 
+    Defined in action/ExecuteTask.action
+
     Attributes:
         success: bool
     """
@@ -60,6 +65,7 @@ class ExecuteTask_Result(_idlc.Message):
     )
 
     success: bool
+    """bool success (action/ExecuteTask.action)"""
 
     def __init__(
         self,
@@ -82,6 +88,8 @@ class ExecuteTask_Result(_idlc.Message):
 class ExecuteTask_Feedback(_idlc.Message):
     """The feedback of the action my_robot_controller/action/ExecuteTask.
 
+    Defined in action/ExecuteTask.action
+
     Attributes:
         current_status: string. What the robot is doing now, for people to read
     """
@@ -94,6 +102,9 @@ class ExecuteTask_Feedback(_idlc.Message):
     )
 
     current_status: str
+    """string current_status. What the robot is doing now, for people to read
+    (action/ExecuteTask.action)
+    """
 
     def __init__(
         self,

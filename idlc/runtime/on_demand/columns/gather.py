@@ -12,6 +12,10 @@ LONG = 256
 SHORT = 32
 #: No dtype is larger.
 LARGEST_ITEM = 1 << 16
+#: So many bytes of each large message, which mostly are all but its payload, are copied.
+HEAD = 512
+#: What large pages of memory align to.
+PAGE = 1 << 21
 
 
 class Place(NamedTuple):
@@ -98,7 +102,7 @@ class Flat:
         return np.ndarray((count,), dtype, self.array, strides=(1,))
 
     def _one_by_one(self, starts: Any, sizes: Any) -> Any:
-        result: Any = np.empty(int(sizes.sum()), np.uint8)
+        result = fresh(int(sizes.sum()))
         target, source, at = memoryview(result), self.view, 0
         for start, size in zip(starts.tolist(), sizes.tolist(), strict=True):
             end = at + size
@@ -108,11 +112,18 @@ class Flat:
 
 
 class Pieces:
-    """Large messages where they are, with positions as if they were one array."""
+    """Large messages where they are, with positions as if they were one array.
+
+    Of their heads there is a copy, where all can be read at once.
+    """
 
     def __init__(self, raws: list[Any], starts: Any) -> None:
         self.raws = [memoryview(raw) for raw in raws]
         self.starts = starts
+        heads = [raw[:HEAD] for raw in self.raws]
+        self.heads = Flat(np.frombuffer(b"".join(heads), np.uint8))
+        sizes = [len(head) for head in heads]
+        self.head_starts = np.cumsum([0, *sizes[:-1]])
 
     def around(self, position: int) -> tuple[Any, int]:
         """Return what holds a position, and the position at which that begins."""
@@ -137,11 +148,13 @@ class Pieces:
         rows = self.ranges(starts, np.full(len(starts), size))
         return Place(rows, 0, (len(starts),), (size,))
 
-    def ranges(self, starts: Any, sizes: Any, _item: int = 1) -> Any:
+    def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
         """Return bytes, so many from each start, one after the other."""
         rows = np.searchsorted(self.starts, starts, "right") - 1
         inside = starts - self.starts[rows]
-        result: Any = np.empty(int(sizes.sum()), np.uint8)
+        if (inside + sizes <= HEAD).all():
+            return self.heads.ranges(self.head_starts[rows] + inside, sizes, item)
+        result = fresh(int(sizes.sum()))
         target, raws, at = memoryview(result), self.raws, 0
         for row, start, size in zip(
             rows.tolist(), inside.tolist(), sizes.tolist(), strict=True
@@ -164,6 +177,15 @@ def rows_of(source: Source, starts: Any, counts: Any, item: int) -> Place | None
     if count:
         place = source.blocks(starts, count * item)
     return place._replace(shape=(*place.shape, count), strides=(*place.strides, item))
+
+
+def fresh(size: int) -> Any:
+    """Return bytes of memory, so that if they are many, large pages are all they are made of."""
+    if size < 2 * PAGE:
+        return np.empty(size, np.uint8)
+    made: Any = np.empty(size + PAGE, np.uint8)
+    start = -made.__array_interface__["data"][0] % PAGE
+    return made[start : start + size]
 
 
 def _regular(starts: Any) -> int | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
 from .read import table_of
-from .table import Elements, Table, columns_of, instants
+from .table import Elements, Reading, Table, columns_of, instants
 
 #: Texts take as much room as the longest of their column. So many bytes are always taken, and
 #: more only up to so many for each byte of the messages.
@@ -107,15 +107,8 @@ class _Types:
         return int(counts[0]), inside
 
 
-class _Filling:
+class _Filling(Reading):
     """Copies columns of the elements of one level into a structured array."""
-
-    def __init__(
-        self, table: Table, elements: Elements, numbers: dict[int, Any]
-    ) -> None:
-        self.table = table
-        self.elements = elements
-        self.numbers = numbers
 
     def fill(self, node: Node, target: Any) -> None:
         """Copy a column."""
@@ -150,8 +143,5 @@ class _Filling:
         """Copy a column of sequences or arrays."""
         inside = self
         if node.step is not None:
-            _, elements = self.table.list(self.elements, node.step)
-            even = elements.big is None
-            numbers = self.table.inside(self.elements, node.step, elements, even)
-            inside = _Filling(self.table, elements, numbers)
+            _, inside = self.inside(node.step, self.elements.big is None)
         inside.fill(node.element, target)

@@ -155,8 +155,8 @@ def columns_of(table: Table, top: Elements) -> Columns:
     return columns
 
 
-class _Making:
-    """Makes columns of the elements of one level."""
+class Reading:
+    """Reads columns of the elements of one level, whose numbers are found already."""
 
     def __init__(
         self, table: Table, elements: Elements, numbers: dict[int, Any]
@@ -164,6 +164,16 @@ class _Making:
         self.table = table
         self.elements = elements
         self.numbers = numbers
+
+    def inside(self, step: List, even: bool = False) -> tuple[Any, Any]:
+        """Return the offsets of a column of sequences, and what reads their elements."""
+        offsets, elements = self.table.list(self.elements, step)
+        numbers = self.table.inside(self.elements, step, elements, even)
+        return offsets, type(self)(self.table, elements, numbers)
+
+
+class _Making(Reading):
+    """Makes columns of the elements of one level."""
 
     def column(self, node: Node, count: int, depth: int = 0) -> Any:
         """Return a column of `count` values, which are in arrays of so many dimensions."""
@@ -192,10 +202,8 @@ class _Making:
             offsets: Any = np.arange(count + 1) * node.size
             inner = self.column(node.element, count * node.size, depth + 1)
             return Ragged(offsets, inner)
-        offsets, elements = self.table.list(self.elements, node.step)
-        numbers = self.table.inside(self.elements, node.step, elements)
-        making = _Making(self.table, elements, numbers)
-        return Ragged(offsets, making.column(node.element, elements.total))
+        offsets, inside = self.inside(node.step)
+        return Ragged(offsets, inside.column(node.element, int(offsets[-1])))
 
 
 def instants(node: Instant, seconds: Any, nanoseconds: Any) -> Any:

@@ -14,6 +14,8 @@ TYPE_CHECKING = False
 class Fill_Goal(_idlc.Message):
     """Fills a gauge.
 
+    Defined in action/Fill.action:2
+
     Attributes:
         level: float32 [l]. to here
     """
@@ -26,6 +28,7 @@ class Fill_Goal(_idlc.Message):
     )
 
     level: float
+    """float32 level [l]. to here (action/Fill.action)"""
 
     def __init__(
         self,
@@ -48,6 +51,8 @@ class Fill_Goal(_idlc.Message):
 class Fill_Result(_idlc.Message):
     """The result of the action comments_msgs/action/Fill.
 
+    Defined in action/Fill.action
+
     Attributes:
         reached: float32 [l]
     """
@@ -60,6 +65,7 @@ class Fill_Result(_idlc.Message):
     )
 
     reached: float
+    """float32 reached [l] (action/Fill.action)"""
 
     def __init__(
         self,
@@ -82,6 +88,8 @@ class Fill_Result(_idlc.Message):
 class Fill_Feedback(_idlc.Message):
     """The feedback of the action comments_msgs/action/Fill.
 
+    Defined in action/Fill.action
+
     Attributes:
         level: float32
     """
@@ -94,6 +102,7 @@ class Fill_Feedback(_idlc.Message):
     )
 
     level: float
+    """float32 level (action/Fill.action)"""
 
     def __init__(
         self,

@@ -19,6 +19,8 @@ class Gauge(_idlc.Message):
 
       Indented, for who reads it.
 
+    Defined in msg/Gauge.msg:7
+
     Attributes:
         rate: float32 [Hz]. How often it is read
         level: uint8. 0 is empty
@@ -55,7 +57,9 @@ class Gauge(_idlc.Message):
     )
 
     EMPTY = 0
+    """uint8 EMPTY [l]. nothing (msg/Gauge.msg)"""
     FULL = 255
+    """uint8 FULL (msg/Gauge.msg)"""
     RATE__DEFAULT = 10.0
     LABEL__DEFAULT = 'it\'s "full"'
     NOTES__DEFAULT = _idlc.FreshList("a", "it's")
@@ -63,12 +67,21 @@ class Gauge(_idlc.Message):
     FLAGS__DEFAULT = b"\x07"
 
     rate: float
+    """float32 rate [Hz]. How often it is read (msg/Gauge.msg)"""
     level: int
+    """uint8 level. 0 is empty (msg/Gauge.msg)"""
     label: str
+    """string<=20 label. what stands on it (msg/Gauge.msg)"""
     notes: list[str]
+    """string[<=3] notes. at most three, in a comment that goes on for so long that
+    the line has to be broken somewhere (msg/Gauge.msg)
+    """
     samples: _idlc.Int16Sequence = _idlc.Int16Sequence()
+    """int16[] samples (msg/Gauge.msg)"""
     covariance: _arrays.Float64Array = _arrays.Float64Array(9)
+    """float64[9] covariance [m^2]. row by row (msg/Gauge.msg)"""
     flags: bytes
+    """byte flags (msg/Gauge.msg)"""
 
     def __init__(
         self,

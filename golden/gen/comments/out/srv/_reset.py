@@ -14,6 +14,8 @@ TYPE_CHECKING = False
 class Reset_Request(_idlc.Message):
     """Sets a gauge back.
 
+    Defined in srv/Reset.srv:2
+
     Attributes:
         reason: string. why
     """
@@ -26,6 +28,7 @@ class Reset_Request(_idlc.Message):
     )
 
     reason: str
+    """string reason. why (srv/Reset.srv)"""
 
     def __init__(
         self,
@@ -48,6 +51,8 @@ class Reset_Request(_idlc.Message):
 class Reset_Response(_idlc.Message):
     """Whether it worked.
 
+    Defined in srv/Reset.srv
+
     Attributes:
         ok: bool
     """
@@ -60,6 +65,7 @@ class Reset_Response(_idlc.Message):
     )
 
     ok: bool
+    """bool ok (srv/Reset.srv)"""
 
     def __init__(
         self,

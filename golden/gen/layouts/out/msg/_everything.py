@@ -23,6 +23,8 @@ with _idlc.importing():
 class Everything(_idlc.Message):
     """layouts_msgs/msg/Everything.
 
+    Defined in msg/Everything.msg:1
+
     Attributes:
         flag: bool
         inner: layouts_msgs/Inner
@@ -82,21 +84,37 @@ class Everything(_idlc.Message):
     )
 
     flag: bool
+    """bool flag (msg/Everything.msg)"""
     inner: Inner
+    """layouts_msgs/Inner inner (msg/Everything.msg)"""
     inners: list[Inner]
+    """layouts_msgs/Inner[] inners (msg/Everything.msg)"""
     rows: list[Row]
+    """layouts_msgs/Row[<=4] rows (msg/Everything.msg)"""
     pair: list[Row]
+    """layouts_msgs/Row[2] pair (msg/Everything.msg)"""
     nothing: Nothing
+    """layouts_msgs/Nothing nothing (msg/Everything.msg)"""
     nothings: list[Nothing]
+    """layouts_msgs/Nothing[] nothings (msg/Everything.msg)"""
     doubles: _idlc.Float64Sequence = _idlc.Float64Sequence()
+    """float64[] doubles (msg/Everything.msg)"""
     shorts: _idlc.Int16Sequence = _idlc.Int16Sequence()
+    """int16[<=3] shorts (msg/Everything.msg)"""
     flags: list[bool]
+    """bool[] flags (msg/Everything.msg)"""
     octets: list[bytes]
+    """byte[2] octets (msg/Everything.msg)"""
     texts: list[str]
+    """string[] texts (msg/Everything.msg)"""
     wides: list[str]
+    """wstring[2] wides (msg/Everything.msg)"""
     stamps: list[Time]
+    """builtin_interfaces/Time[] stamps (msg/Everything.msg)"""
     weights: _arrays.Float32Array = _arrays.Float32Array(4)
+    """float32[4] weights (msg/Everything.msg)"""
     last: int
+    """int64 last (msg/Everything.msg)"""
 
     def __init__(
         self,

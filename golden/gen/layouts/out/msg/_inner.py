@@ -12,6 +12,8 @@ from .. import _idlc
 class Inner(_idlc.Message):
     """layouts_msgs/msg/Inner.
 
+    Defined in msg/Inner.msg:1
+
     Attributes:
         a: uint8
         b: float64
@@ -30,9 +32,13 @@ class Inner(_idlc.Message):
     )
 
     a: int
+    """uint8 a (msg/Inner.msg)"""
     b: float
+    """float64 b (msg/Inner.msg)"""
     c: str
+    """string c (msg/Inner.msg)"""
     d: str
+    """wstring d (msg/Inner.msg)"""
 
     def __init__(
         self,

@@ -12,6 +12,8 @@ from .. import _idlc
 class Pair(_idlc.Message):
     """layouts_msgs/msg/Pair.
 
+    Defined in msg/Pair.msg:1
+
     Attributes:
         key: string
         value: string
@@ -26,7 +28,9 @@ class Pair(_idlc.Message):
     )
 
     key: str
+    """string key (msg/Pair.msg)"""
     value: str
+    """string value (msg/Pair.msg)"""
 
     def __init__(
         self,

@@ -13,6 +13,8 @@ from .._idlc import arrays as _arrays
 class Row(_idlc.Message):
     """layouts_msgs/msg/Row.
 
+    Defined in msg/Row.msg:1
+
     Attributes:
         a: uint32
         b: uint16
@@ -29,8 +31,11 @@ class Row(_idlc.Message):
     )
 
     a: int
+    """uint32 a (msg/Row.msg)"""
     b: int
+    """uint16 b (msg/Row.msg)"""
     c: _arrays.UInt8Array = _arrays.UInt8Array(3)
+    """uint8[3] c (msg/Row.msg)"""
 
     def __init__(
         self,

@@ -14,6 +14,8 @@ from ._titled import Titled
 class Texts(_idlc.Message):
     """layouts_msgs/msg/Texts.
 
+    Defined in msg/Texts.msg:1
+
     Attributes:
         pairs: layouts_msgs/Pair[]
         few: layouts_msgs/Pair[<=2]
@@ -32,9 +34,13 @@ class Texts(_idlc.Message):
     )
 
     pairs: list[Pair]
+    """layouts_msgs/Pair[] pairs (msg/Texts.msg)"""
     few: list[Pair]
+    """layouts_msgs/Pair[<=2] few (msg/Texts.msg)"""
     titled: list[Titled]
+    """layouts_msgs/Titled[] titled (msg/Texts.msg)"""
     last: str
+    """string last (msg/Texts.msg)"""
 
     def __init__(
         self,

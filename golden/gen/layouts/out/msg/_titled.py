@@ -13,6 +13,8 @@ from ._pair import Pair
 class Titled(_idlc.Message):
     """layouts_msgs/msg/Titled.
 
+    Defined in msg/Titled.msg:1
+
     Attributes:
         level: uint8
         title: string
@@ -31,9 +33,13 @@ class Titled(_idlc.Message):
     )
 
     level: int
+    """uint8 level (msg/Titled.msg)"""
     title: str
+    """string title (msg/Titled.msg)"""
     pairs: list[Pair]
+    """layouts_msgs/Pair[] pairs (msg/Titled.msg)"""
     number: float
+    """float64 number (msg/Titled.msg)"""
 
     def __init__(
         self,

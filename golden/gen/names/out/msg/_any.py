@@ -17,6 +17,8 @@ with _idlc.importing():
 class Any(_idlc.Message):
     """names_msgs/msg/Any.
 
+    Defined in msg/Any.msg:1
+
     Attributes:
         pose: geometry_msgs/Pose
     """
@@ -29,6 +31,7 @@ class Any(_idlc.Message):
     )
 
     pose: Pose
+    """geometry_msgs/Pose pose (msg/Any.msg)"""
 
     def __init__(
         self,

@@ -13,6 +13,8 @@ from ._foo_bar_2 import FooBar
 class FOOBar(_idlc.Message):
     """names_msgs/msg/FOOBar.
 
+    Defined in msg/FOOBar.msg:1
+
     Attributes:
         inner: names_msgs/FooBar
     """
@@ -25,6 +27,7 @@ class FOOBar(_idlc.Message):
     )
 
     inner: FooBar
+    """names_msgs/FooBar inner (msg/FOOBar.msg)"""
 
     def __init__(
         self,

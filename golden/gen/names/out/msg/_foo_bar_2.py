@@ -12,6 +12,8 @@ from .. import _idlc
 class FooBar(_idlc.Message):
     """names_msgs/msg/FooBar.
 
+    Defined in msg/FooBar.msg:1
+
     Attributes:
         a: int32
     """
@@ -24,6 +26,7 @@ class FooBar(_idlc.Message):
     )
 
     a: int
+    """int32 a (msg/FooBar.msg)"""
 
     def __init__(
         self,

@@ -21,6 +21,8 @@ class Hiding(_idlc.Message):
     from_dict, to_dict): `super(Hiding, message)` still has them, and `super(Hiding,
     Hiding)` those of the class.
 
+    Defined in msg/Hiding.msg:2
+
     Attributes:
         validate: names_msgs/Point
         serialize: uint8
@@ -43,10 +45,15 @@ class Hiding(_idlc.Message):
     SERIALIZE__DEFAULT = 1
 
     validate: Point  # type: ignore[assignment]
+    """names_msgs/Point validate (msg/Hiding.msg)"""
     serialize: int  # type: ignore[assignment]
+    """uint8 serialize (msg/Hiding.msg)"""
     deserialize: _idlc.Float32Sequence = _idlc.Float32Sequence()  # type: ignore[assignment]
+    """float32[] deserialize (msg/Hiding.msg)"""
     from_dict: _arrays.Int32Array = _arrays.Int32Array(3)  # type: ignore[assignment]
+    """int32[3] from_dict (msg/Hiding.msg)"""
     to_dict: list[str]  # type: ignore[assignment]
+    """string[] to_dict (msg/Hiding.msg)"""
 
     def __init__(
         self,

@@ -20,6 +20,8 @@ class Odd(_idlc.Message):
     Fields hide the methods of the same name (serialize): `super(Odd, message)`
     still has them, and `super(Odd, Odd)` those of the class.
 
+    Defined in msg/Odd.msg:1
+
     Attributes:
         class_: int32
         serialize: int32
@@ -84,21 +86,37 @@ class Odd(_idlc.Message):
     ORDER__DEFAULT = _idlc.Fresh(_arrays.array, (1, 2, 3), _arrays.INT32)
 
     class_: _builtins.int
+    """int32 class (msg/Odd.msg)"""
     serialize: _builtins.int  # type: ignore[assignment]
+    """int32 serialize (msg/Odd.msg)"""
     self: _builtins.int
+    """int32 self (msg/Odd.msg)"""
     fields_and_field_types: _builtins.int
+    """int32 fields_and_field_types (msg/Odd.msg)"""
     int: _builtins.int
+    """int32 int (msg/Odd.msg)"""
     list: _builtins.str
+    """string list (msg/Odd.msg)"""
     bytes: _builtins.bytes
+    """byte bytes (msg/Odd.msg)"""
     bool: _builtins.bool
+    """bool bool (msg/Odd.msg)"""
     float: _builtins.float
+    """float32 float (msg/Odd.msg)"""
     str: _builtins.list[_builtins.str]
+    """string[] str (msg/Odd.msg)"""
     message: _builtins.int
+    """int32 message (msg/Odd.msg)"""
     data: _builtins.int
+    """int32 data (msg/Odd.msg)"""
     at: _builtins.int
+    """int32 at (msg/Odd.msg)"""
     item: _builtins.list[Point]
+    """names_msgs/Point[] item (msg/Odd.msg)"""
     array: Point
+    """names_msgs/Point array (msg/Odd.msg)"""
     order: _arrays.Int32Array = _arrays.Int32Array(3)
+    """int32[3] order (msg/Odd.msg)"""
 
     def __init__(
         _self,

@@ -12,6 +12,8 @@ from .. import _idlc
 class Point(_idlc.Message):
     """names_msgs/msg/Point.
 
+    Defined in msg/Point.msg:1
+
     Attributes:
         x: float64
         y: float64
@@ -26,7 +28,9 @@ class Point(_idlc.Message):
     )
 
     x: float
+    """float64 x (msg/Point.msg)"""
     y: float
+    """float64 y (msg/Point.msg)"""
 
     def __init__(
         self,

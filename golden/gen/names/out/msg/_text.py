@@ -19,6 +19,8 @@ with _idlc.importing():
 class Text(_idlc.Message):
     """names_msgs/msg/Text.
 
+    Defined in msg/Text.msg:1
+
     Attributes:
         other: geometry_msgs/Point
         own: names_msgs/Point
@@ -35,8 +37,11 @@ class Text(_idlc.Message):
     )
 
     other: geometry_msgs_Point
+    """geometry_msgs/Point other (msg/Text.msg)"""
     own: names_msgs_Point
+    """names_msgs/Point own (msg/Text.msg)"""
     any: list[Any]
+    """names_msgs/Any[<=2] any (msg/Text.msg)"""
 
     def __init__(
         self,

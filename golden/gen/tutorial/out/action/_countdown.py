@@ -14,6 +14,8 @@ TYPE_CHECKING = False
 class Countdown_Goal(_idlc.Message):
     """Where to start counting down.
 
+    Defined in action/Countdown.action:2
+
     Attributes:
         target_count: int32
     """
@@ -26,6 +28,7 @@ class Countdown_Goal(_idlc.Message):
     )
 
     target_count: int
+    """int32 target_count (action/Countdown.action)"""
 
     def __init__(
         self,
@@ -48,6 +51,8 @@ class Countdown_Goal(_idlc.Message):
 class Countdown_Result(_idlc.Message):
     """The result of the action tutorial_msgs/action/Countdown.
 
+    Defined in action/Countdown.action
+
     Attributes:
         final_count: int32. The last number reached; 0 unless cancelled
         success: bool
@@ -62,7 +67,11 @@ class Countdown_Result(_idlc.Message):
     )
 
     final_count: int
+    """int32 final_count. The last number reached; 0 unless cancelled
+    (action/Countdown.action)
+    """
     success: bool
+    """bool success (action/Countdown.action)"""
 
     def __init__(
         self,
@@ -89,6 +98,8 @@ class Countdown_Result(_idlc.Message):
 class Countdown_Feedback(_idlc.Message):
     """The feedback of the action tutorial_msgs/action/Countdown.
 
+    Defined in action/Countdown.action
+
     Attributes:
         current_count: int32
     """
@@ -101,6 +112,7 @@ class Countdown_Feedback(_idlc.Message):
     )
 
     current_count: int
+    """int32 current_count (action/Countdown.action)"""
 
     def __init__(
         self,

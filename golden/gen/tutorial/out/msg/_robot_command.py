@@ -14,6 +14,8 @@ class RobotCommand(_idlc.Message):
 
     Sent by the operator, obeyed by the controller node.
 
+    Defined in msg/RobotCommand.msg:5
+
     Attributes:
         command_type: string. What to do: STOP, MOVE or TURN
         linear_velocity_x: float32 [m/s]. Forward speed, negative to reverse
@@ -38,13 +40,26 @@ class RobotCommand(_idlc.Message):
     )
 
     STOP = "stop"
+    """string STOP (msg/RobotCommand.msg)"""
     MOVE = "move"
+    """string MOVE (msg/RobotCommand.msg)"""
     TURN = "turn"
+    """string TURN (msg/RobotCommand.msg)"""
 
     command_type: str
+    """string command_type. What to do: STOP, MOVE or TURN (msg/RobotCommand.msg)"""
     linear_velocity_x: float
+    """float32 linear_velocity_x [m/s]. Forward speed, negative to reverse
+    (msg/RobotCommand.msg)
+    """
     angular_velocity_z: float
+    """float32 angular_velocity_z [rad/s]. Turn rate, counter-clockwise seen from
+    above (msg/RobotCommand.msg)
+    """
     frame_id: str
+    """string frame_id. The frame that the velocities are given in
+    (msg/RobotCommand.msg)
+    """
 
     def __init__(
         self,

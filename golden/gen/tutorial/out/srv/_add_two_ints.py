@@ -14,6 +14,8 @@ TYPE_CHECKING = False
 class AddTwoInts_Request(_idlc.Message):
     """The service of the ROS 2 tutorials.
 
+    Defined in srv/AddTwoInts.srv:2
+
     Attributes:
         a: int64
         b: int64
@@ -28,7 +30,9 @@ class AddTwoInts_Request(_idlc.Message):
     )
 
     a: int
+    """int64 a (srv/AddTwoInts.srv)"""
     b: int
+    """int64 b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,
@@ -53,6 +57,8 @@ class AddTwoInts_Request(_idlc.Message):
 class AddTwoInts_Response(_idlc.Message):
     """The response of the service tutorial_msgs/srv/AddTwoInts.
 
+    Defined in srv/AddTwoInts.srv
+
     Attributes:
         sum: int64. a + b
     """
@@ -65,6 +71,7 @@ class AddTwoInts_Response(_idlc.Message):
     )
 
     sum: int
+    """int64 sum. a + b (srv/AddTwoInts.srv)"""
 
     def __init__(
         self,

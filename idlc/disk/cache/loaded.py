@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from shutil import rmtree
 
-from idlc.disk.cache import folder as caches
+from idlc.disk.cache.place import folder as caches
 from idlc.disk.output.up_to_date import last_change
 from idlc.templating import RenderedFile
 
@@ -63,5 +63,5 @@ def keep(name: str, files: Iterable[RenderedFile]) -> None:
 @cache
 def newest() -> int:
     """Return when idlc itself was changed last: its version does not change with each edit."""
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parents[2]
     return last_change((package, package.parent / "templates"))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
-from idlc.disk.environment import INDEX
+from idlc.disk.machine.environment import INDEX
 from idlc.disk.read import is_file, is_folder, read_bytes, shown
 from idlc.model.names import is_package_name
 

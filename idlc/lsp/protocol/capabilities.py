@@ -5,13 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from idlc import __version__
-from idlc.lsp import token_kinds
+from idlc.lsp.protocol import token_kinds
 
 #: What positions can be counted in, and what holds if nothing was agreed on.
 ENCODINGS = ("utf-8", "utf-16", "utf-32")
 DEFAULT_ENCODING = "utf-16"
 #: The command that declares a package in package.xml, for what is completed.
 ADD_DEPENDENCY = "idlc.addDependency"
+#: The command that does what `idlc gen` does for a document, and the kind of action that offers it.
+UPDATE_GENERATED = "idlc.updateGenerated"
+UPDATE_KIND = "source.updateGenerated.idlc"
 
 
 def encoding(client: dict[str, Any]) -> str:
@@ -38,7 +41,7 @@ CAPABILITIES: dict[str, object] = {
         "workspaceDiagnostics": True,
     },
     "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "]},
-    "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc"]},
+    "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc", UPDATE_KIND]},
     "renameProvider": {"prepareProvider": True},
     "inlayHintProvider": True,
     "codeLensProvider": {"resolveProvider": True},
@@ -50,7 +53,7 @@ CAPABILITIES: dict[str, object] = {
     "foldingRangeProvider": True,
     "selectionRangeProvider": True,
     "documentLinkProvider": {},
-    "executeCommandProvider": {"commands": [ADD_DEPENDENCY]},
+    "executeCommandProvider": {"commands": [ADD_DEPENDENCY, UPDATE_GENERATED]},
     "hoverProvider": True,
     "definitionProvider": True,
     "typeDefinitionProvider": True,

@@ -9,7 +9,7 @@ from pathlib import Path
 import jinja2
 
 from idlc import templating
-from idlc.disk import cache
+from idlc.disk.cache import place as cache
 
 
 def keep() -> None:

@@ -10,13 +10,13 @@ import msgspec
 from msgspec import Meta
 
 from idlc.diagnostics.codes import CODES
-from idlc.disk.settings_table import Place, Table, Tables, Text, Texts, read_table, read_value
+from idlc.disk.settings.table import Place, Table, Tables, Text, Texts, read_table, read_value
 
 if TYPE_CHECKING:
     from idlc.breaking.allow import Allowance
     from idlc.checks.select import Selection
     from idlc.diagnostics.report import Report
-    from idlc.disk.pyproject import Config
+    from idlc.disk.settings.pyproject import Config
 
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.disk import environment
-from idlc.disk.enclosing_package import declared_version
+from idlc.disk.machine import environment
+from idlc.disk.packages.enclosing import declared_version
 from idlc.model import distro
 
 #: What is taken where nothing of ROS 2 is installed.

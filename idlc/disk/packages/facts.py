@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from idlc.checks.package.facts import Facts, Output
 from idlc.checks.package.package_xml import statements
 from idlc.diagnostics.report import Report
-from idlc.disk.enclosing_package import manifest
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
-from idlc.disk.inputs import Inputs
 from idlc.disk.output import lock_file
+from idlc.disk.packages.enclosing import manifest
+from idlc.disk.packages.inputs import Inputs
 from idlc.disk.read import NOTHING_OPEN, Unsaved, read_bytes, shown
 
 if TYPE_CHECKING:

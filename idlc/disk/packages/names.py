@@ -8,9 +8,9 @@ from pathlib import Path
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.find import InterfaceFile, look
 from idlc.disk.output import lock_file
+from idlc.disk.packages.enclosing import declared_name, manifest
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from idlc.lsp.capabilities import ADD_DEPENDENCY
+from idlc.lsp.protocol.capabilities import ADD_DEPENDENCY
 from idlc.lsp.world import World
 
 

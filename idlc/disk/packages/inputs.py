@@ -13,7 +13,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.find import InterfaceFile
 from idlc.disk.output.lock_file import digest, meaning
-from idlc.disk.package_names import by_home, locks, name_of
+from idlc.disk.packages.names import by_home, locks, name_of
 from idlc.disk.read import NOTHING_OPEN, Unsaved, decode, is_folder, shown
 from idlc.disk.scope import Scope
 from idlc.model.ir import TypeName

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from idlc.diagnostics.source import Span
-from idlc.lsp.protocol import Position, Range
+from idlc.lsp.protocol.parts import Position, Range
 
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from idlc.checks.package import package_xml
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
-from idlc.disk.read import NOTHING_OPEN, Unsaved, is_file, is_folder, read_bytes, read_source
+from idlc.disk.read import NOTHING_OPEN, Unsaved, is_file, read_bytes, read_source
 
 if TYPE_CHECKING:
     from idlc.checks.package.facts import Statement
@@ -23,18 +24,13 @@ MANIFEST = "package.xml"
 @lru_cache(maxsize=1024)
 def manifest(folder: Path) -> Path | None:
     """Return the nearest package.xml at or above an absolute folder, within its repository."""
-    for here in (folder, *folder.parents):
-        path = here / MANIFEST
+    for here in map(str, (folder, *folder.parents)):
+        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
         if is_file(path):
-            return path
-        if _is_repository(here):
+            return Path(path)
+        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
             break
     return None
-
-
-def _is_repository(folder: Path) -> bool:
-    """Return whether a folder is the top of a git repository, of a submodule or a worktree too."""
-    return is_folder(folder / ".git") or is_file(folder / ".git")
 
 
 def declared_name(
@@ -63,9 +59,13 @@ def declared_name(
 
 def declared_version(path: Path) -> str:
     """Return the version in a package.xml; empty if it has none or cannot be read."""
-    data = read_bytes(path, path.as_posix(), Report())
+    return _version(read_bytes(path, path.as_posix(), Report()) or b"")
+
+
+@lru_cache(maxsize=64)
+def _version(data: bytes) -> str:
     with contextlib.suppress(package_xml.NotXmlError):
-        return next(iter(package_xml.read(data or b"").texts("version")), "")
+        return next(iter(package_xml.read(data).texts("version")), "")
     return ""
 
 

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.disk import inputs, pyproject
-from idlc.disk.enclosing_package import manifest
 from idlc.disk.find import find
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import manifest
 from idlc.disk.read import absolute
 from idlc.disk.scope import scope
+from idlc.disk.settings import pyproject
 
 
 def near() -> Mapping[str, Sequence[Path]]:

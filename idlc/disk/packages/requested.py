@@ -10,13 +10,13 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk import inputs
-from idlc.disk.enclosing_package import declared_name, manifest
 from idlc.disk.find import InterfaceFile, find
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
 from idlc.disk.output.lock_file import FILE
-from idlc.disk.package_names import accept_name, by_home, places, several
+from idlc.disk.packages import inputs
+from idlc.disk.packages.enclosing import declared_name, manifest
+from idlc.disk.packages.names import accept_name, by_home, places, several
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
 from idlc.model import ir

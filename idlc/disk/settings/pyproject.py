@@ -18,7 +18,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.read import NOTHING_OPEN, Unsaved, decode, shown
-from idlc.disk.settings_table import Place, Switch, Table, Text, TextOrTexts, Texts, read_table
+from idlc.disk.settings.table import Place, Switch, Table, Text, TextOrTexts, Texts, read_table
 from idlc.model.distro import BY_NAME, listed, unknown_distro
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ FILE = "pyproject.toml"
 
 
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
-    """`[tool.idlc]` as it is written; `idlc.disk.command_settings` reads the tables of commands."""
+    """`[tool.idlc]` as it is written; `disk.settings.commands` reads the tables of commands."""
 
     paths: Texts = ()
     include: Texts = ()

@@ -1,0 +1,1 @@
+"""What idlc can always make again, kept for the next run."""

@@ -1,0 +1,1 @@
+"""What this machine has: ROS 2 and its prefixes, importable packages, the graph that runs."""

@@ -1,0 +1,1 @@
+"""Which files make a package, what it is called and what is around it."""

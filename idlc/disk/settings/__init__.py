@@ -1,0 +1,1 @@
+"""What a project has set: [tool.idlc], the settings of commands, templates of its own."""
