@@ -13,6 +13,8 @@ import pytest
 from tests.support import programs
 from tests.support.paths import EXAMPLE, ROOT
 
+pytestmark = pytest.mark.long
+
 #: The smallest of ROS 2's wheels that brings lark-parser 0.12 into the folder of lark 1.x.
 OLD_LARK = "ros-jazzy-rosidl-parser"
 
@@ -22,7 +24,6 @@ from my_robot_controller.action import Countdown
 from my_robot_controller.msg import RobotCommand
 from my_robot_controller.srv import AddTwoInts
 
-pytestmark = pytest.mark.long
 command = RobotCommand(command_type=RobotCommand.MOVE, linear_velocity_x=0.5)
 assert RobotCommand.deserialize(command.serialize()) == command
 assert AddTwoInts.Request(a=1, b=2).serialize() == bytes.fromhex(
