@@ -103,8 +103,15 @@ async function open(path, line = 1, column = 1) {
     original.set(path, disk(path));
   }
   const name = path.split("/").at(-1);
-  await page.locator(`.explorer-folders-view .monaco-list-row[aria-label^="${name}"]`).dblclick();
-  await page.locator(`.tab.active[data-resource-name="${name}"]`).waitFor();
+  const row = page.locator(`.explorer-folders-view .monaco-list-row[aria-label^="${name}"]`);
+  const tab = page.locator(`.tab.active[data-resource-name="${name}"]`);
+  await until(`tab of ${name}`, async () => {
+    // where the pointer rests on a row, its full path comes up and covers the row below
+    await page.mouse.move(0, 0);
+    await page.locator(".workbench-hover").waitFor({ state: "hidden" });
+    await row.dblclick(); // which hits another row where files come or go meanwhile
+    return tab.waitFor({ timeout: 2000 }).then(() => true, () => false);
+  });
   await keyboard.press("Control+g");
   const input = page.locator(".quick-input-widget input[type=text]").first();
   await input.waitFor();
