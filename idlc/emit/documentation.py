@@ -111,9 +111,9 @@ def _place(structure: ir.Message, file: str) -> str:
     if not spans:
         return ""
     first = min(spans, key=lambda span: span.start)
-    above = first.source.text[: first.start].split("\n")
-    is_later = any(line.startswith("---") for line in above)
-    return file if is_later else f"{file}:{len(above)}"
+    if "\n---" in f"\n{first.source.text[: first.start]}":
+        return file
+    return f"{file}:{first.source.position(first.start)[0]}"
 
 
 def _constant(constant: ir.Constant) -> str:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from idlc.model.ir import DUMMY_FIELD
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pyarrow as pa
 
 
@@ -17,7 +19,7 @@ def storable(schema: pa.Schema) -> pa.Schema:
 
     They get the one that ROS 2 gives them for C++, for the same reason.
     """
-    return _with_types(schema, _filled_type)
+    return _with_types(schema, lambda kind: _each(kind, _filled_type))
 
 
 def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
@@ -38,19 +40,26 @@ def _with_types(schema: pa.Schema, made: Any) -> pa.Schema:
     return pa.schema(fields, schema.metadata)
 
 
-def _filled_type(kind: pa.DataType) -> pa.DataType:
-    """Return a type in which each struct has fields."""
+def _each(kind: pa.DataType, made: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
+    """Return a type with another in the place of each in it, and of itself, inner ones first."""
     import pyarrow as pa
     from pyarrow import types
 
     if types.is_struct(kind):
-        fields = [one.with_type(_filled_type(one.type)) for one in kind]
-        return pa.struct(fields or [pa.field(DUMMY_FIELD, pa.uint8())])
-    if types.is_large_list(kind):
-        return pa.large_list(_filled_type(kind.value_type))
-    if types.is_fixed_size_list(kind):
-        return pa.list_(_filled_type(kind.value_type), kind.list_size)
-    return kind
+        kind = pa.struct([one.with_type(_each(one.type, made)) for one in kind])
+    elif types.is_large_list(kind):
+        kind = pa.large_list(_each(kind.value_type, made))
+    elif types.is_fixed_size_list(kind):
+        kind = pa.list_(_each(kind.value_type, made), kind.list_size)
+    return made(kind)
+
+
+def _filled_type(kind: pa.DataType) -> pa.DataType:
+    """Return a struct that has fields."""
+    import pyarrow as pa
+
+    empty = pa.types.is_struct(kind) and not kind.num_fields
+    return pa.struct([pa.field(DUMMY_FIELD, pa.uint8())]) if empty else kind
 
 
 def _filled(column: pa.Array, kind: pa.DataType) -> pa.Array:
@@ -122,7 +131,7 @@ def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 def _timeless(column: pa.Array) -> pa.Array:
     """Return a column with times as texts: Python's own know no nanoseconds."""
-    return column.cast(_timeless_type(column.type))
+    return column.cast(_each(column.type, _timeless_type))
 
 
 def _timeless_type(kind: pa.DataType) -> pa.DataType:
@@ -133,12 +142,6 @@ def _timeless_type(kind: pa.DataType) -> pa.DataType:
         return pa.string()
     if types.is_duration(kind):
         return pa.int64()
-    if types.is_struct(kind):
-        return pa.struct([one.with_type(_timeless_type(one.type)) for one in kind])
-    if types.is_large_list(kind):
-        return pa.large_list(_timeless_type(kind.value_type))
-    if types.is_fixed_size_list(kind):
-        return pa.list_(_timeless_type(kind.value_type), kind.list_size)
     return kind
 
 

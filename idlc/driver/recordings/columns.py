@@ -13,7 +13,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.driver.recordings.load import MissingDefinitionWarning, OtherDefinitionWarning
 from idlc.driver.recordings.recording import RecordedTopic, Recording, UnknownTopicError
-from idlc.driver.recordings.types import NAMED
+from idlc.driver.recordings.types import BORROWED, NAMED
 from idlc.recordings import export
 from idlc.recordings.errors import RecordingError
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 #: What stands in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
-BORROWED = "see to it that it is what was recorded, or point -I to it"
 
 
 class UnknownFieldError(Exception):

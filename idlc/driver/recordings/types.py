@@ -23,6 +23,8 @@ from idlc.recordings.definitions import ENCODINGS, Recorded
 
 #: Names that are told in a sentence.
 NAMED = 5
+#: What to do where another definition is used than the recording's.
+BORROWED = "see to it that it is what was recorded, or point -I to it"
 #: Why a definition is not the recording's.
 ABSENT, UNREADABLE = "there is no definition of", "there are errors in the definition of"
 
@@ -105,7 +107,6 @@ class RecordedTypes:
         self.topics = tuple(_typed(version.topics, texts, around, report))
         self._compiler = Compiler(self.library)
         self.interfaces = self._compiler.reached(one.interface for one in self.topics)
-        self.errors = Report()
         report.extend(self._doubts())
 
     @property
@@ -140,16 +141,25 @@ class RecordedTypes:
             yield codes.MISSING_DEFINITION.of(
                 recording,
                 f"{why} {names}; what is known here {which} is used",
-                hint=None if sure else "see to it that it is what was recorded, or point -I to it",
+                hint=None if sure else BORROWED,
             )
 
     def names_of(self, topic: Typed) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of."""
         return _explicit([topic.interface], self.interfaces)
 
-    @cached_property
+    @property
     def models(self) -> dict[str, Model]:
-        """The model of each package without what has errors, which are in `errors` then."""
+        """The model of each package, without what has errors."""
+        return self._compiled[0]
+
+    @property
+    def errors(self) -> Report:
+        """What is wrong with the definitions."""
+        return self._compiled[1]
+
+    @cached_property
+    def _compiled(self) -> tuple[dict[str, Model], Report]:
         found = Report()
         models = {
             package: self._compiler.model(
@@ -161,14 +171,16 @@ class RecordedTypes:
             extents: Extents = {}
             for model in models.values():
                 found.extend(oversized(model, extents))
-        self.errors.extend(one for one in found if one.severity is Severity.ERROR)
-        broken = {one.where[0] for one in self.errors}
-        return {name: one.sound(broken) for name, one in models.items()} if broken else models
+        errors = Report()
+        errors.extend(one for one in found if one.severity is Severity.ERROR)
+        broken = {one.where[0] for one in errors}
+        if broken:
+            models = {name: one.sound(broken) for name, one in models.items()}
+        return models, errors
 
     @property
     def broken(self) -> set[ir.TypeName]:
         """The definitions of the recording that have errors."""
-        assert self.models is not None  # its errors are known from then on
         wrong = {one.where[0] for one in self.errors}
         return {name for name, one in self.texts.items() if one.path in wrong}
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from idlc.breaking.change import LEVELS
 from idlc.breaking.packages import compare
+from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import first_few
 from idlc.lsp.protocol.parts import Action, Lens, OfDocument, Position, Range
 from idlc.lsp.users import users
@@ -74,8 +75,7 @@ def _text(world: World, uri: str, kind: str) -> str:
         return ""
     name = known.interface.name
     if kind == _USERS:
-        count = len(list(users(name, world)))
-        return f"{count} use{'s' * (count != 1)}"
+        return counted(len(list(users(name, world))), "use")
     if kind == _BREAKS:
         return _what_breaks(known, world)
     model = known.state.model_of(known.interface)
@@ -107,4 +107,4 @@ def _what_breaks(known: Known, world: World) -> str:
         return f"breaks nothing against {earlier.name}"
     count = len({state.path_of(span.source) for state, span in users(interface.name, world)})
     levels = ", ".join(level for level in LEVELS if level in broken)
-    return f"breaks: {levels} for {count} user{'s' * (count != 1)} against {earlier.name}"
+    return f"breaks: {levels} for {counted(count, 'user')} against {earlier.name}"
