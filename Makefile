@@ -8,6 +8,7 @@
 #   EDITORS=no          do without Debian's neovim, emacs-nox and elpa-eglot, in which idlc lsp is tried
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
+#   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
 #   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind, with
@@ -54,12 +55,14 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-long test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
+.PHONY: help install demo test test-long test-bare test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
     lock site release-check clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'
 	@sed -n 's/^\([a-z-]*\):.*## /  \1 \t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 14
+
+install: $(DEMO_ENV)/installed $(TEST_ENV)/installed ## prepare what demo and test need; neither needs a network then
 
 demo: $(DEMO_ENV)/installed ## compile the example; publish, call and act with it in the real rclpy
 	@echo '$$ idlc gen examples/my_robot_controller -o $(DEMO_OUT)/my_robot_controller'
@@ -81,6 +84,9 @@ endif
 
 test-long: $(TEST_ENV)/installed ## run the tests that take long: they build, install and break packages
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
+
+test-bare: ## run the commands of the README on a bare Debian: as root and a user, with gcc and without
+	sh tests/project/bare.sh $(WAYS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
 	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
