@@ -19,6 +19,9 @@ for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", signal.
 CACHE = tempfile.TemporaryDirectory(prefix="idlc-cache-")
 os.environ["IDLC_CACHE"] = CACHE.name
 
+# Where pytest keeps the names of the tests that passed in the last run, for --left-out.
+PASSED = "idlc/passed"
+
 # The same examples in every run, and no verdict that depends on how busy the machine is.
 settings.register_profile(
     "idlc", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
@@ -26,16 +29,41 @@ settings.register_profile(
 settings.load_profile("idlc")
 
 
-def pytest_collection_modifyitems(items):
-    """Leave out on Windows, and name, what cannot be there."""
+def pytest_addoption(parser):
+    parser.addoption(
+        "--left-out",
+        action="store_true",
+        help="run what has not passed in earlier runs",
+    )
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out on Windows, and name, what cannot be there; with --left-out, what has passed."""
     for item in items if sys.platform == "win32" else ():
         for name, reason in NOT_THERE.items():
             if name in item.nodeid:
                 item.add_marker(pytest.mark.skip(reason=reason))
+    if config.getoption("left_out"):
+        passed = set(config.cache.get(PASSED, []))
+        config.hook.pytest_deselected(items=[item for item in items if item.nodeid in passed])
+        items[:] = [item for item in items if item.nodeid not in passed]
 
 
-def pytest_terminal_summary(terminalreporter):
-    """Print what tests recorded as found, in whichever process they ran."""
+def pytest_sessionfinish(session):
+    """Accept that --left-out has nothing to run."""
+    if (
+        session.config.getoption("left_out")
+        and session.exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED
+    ):
+        session.exitstatus = pytest.ExitCode.OK
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Keep the names of tests that passed, and print what tests recorded as found."""
+    passed = {report.nodeid for report in terminalreporter.getreports("passed")}
+    if config.getoption("left_out"):
+        passed.update(config.cache.get(PASSED, []))
+    config.cache.set(PASSED, sorted(passed))
     for report in terminalreporter.getreports("passed"):
         for name, value in report.user_properties:
             if name == "found":

@@ -20,9 +20,9 @@ mkdir -p "$work/packages"
 # Run a command in the folder $root as $name, without the variables of this shell but those of pip and proxies.
 inside() {
     # shellcheck disable=SC2046
-    env -i $(env | grep -E '^(PIP_[A-Z_]*|[a-z]*_proxy|[A-Z]*_PROXY)=[^[:space:]]*$') \
-        PATH=/usr/local/bin:/usr/bin:/bin HOME="$home" \
-        chroot --userspec="$name:$name" "$root" /bin/sh -c "cd '$home/idlc' && $1"
+    chroot --userspec="$name:$name" "$root" /usr/bin/env -i \
+        $(env | grep -E '^(PIP_[A-Z_]*|[a-z]*_proxy|[A-Z]*_PROXY)=[^[:space:]]*$') \
+        PATH=/usr/local/bin:/usr/bin:/bin HOME="$home" sh -c "cd '$home/idlc' && $1"
 }
 
 # The part below runs again as the first process of namespaces of its own, which end with it.
