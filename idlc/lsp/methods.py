@@ -36,6 +36,7 @@ METHODS = {
     "textDocument/diagnostic": Method("pull", "document", "OfDocument"),
     "workspace/diagnostic": Method("pull", "workspace", "AskedWorkspace"),
     "textDocument/completion": Method("completion", "complete", "AtPosition"),
+    "completionItem/resolve": Method("completion", "resolve", "CompletionItem"),
     "textDocument/codeAction": Method("actions", "actions", "AskedActions"),
     "textDocument/prepareRename": Method("rename", "prepare", "AtPosition"),
     "textDocument/rename": Method("rename", "rename", "AskedRename"),

@@ -103,6 +103,23 @@ def test_a_problem_offers_what_was_meant(opened, text, title, expected):
     assert found[name].diagnostics
 
 
+@pytest.mark.parametrize(
+    ("text", "title", "expected"),
+    [
+        ("int32 x = 5 # five\n", "Write `int32 x 5`", "int32 x 5 # five\n"),
+        ("int32 x = 5 # five\n", "Write `X`", "int32 X = 5 # five\n"),
+        ("int8 x[3]  # three\n", "Write `int8[3] x`", "int8[3] x  # three\n"),
+        ("string<=3 s 'abcde'\n", "Raise the bound to 5", "string<=5 s 'abcde'\n"),
+        ("int8 x\nint16 x", "Remove this line", "int8 x\n"),
+    ],
+)
+def test_choices_are_left_to_the_user(opened, text, title, expected):
+    one, _, open_ = opened
+    found = actions(one, open_(text), lsp.Range(start=at(0, 0), end=at(9, 0)))
+    assert applied(edits_of(found[title].edit)["Drive.msg"], text) == expected
+    assert not found[title].is_preferred
+
+
 def test_what_would_not_help_is_not_offered(opened):
     one, _, open_ = opened
     text = "qqqqqq/Zzzz x\n"

@@ -118,3 +118,24 @@ def test_a_constant_is_written_as_its_value(typing):
     item = typing("uint8 FAST=2\nuint8 mode |")["FAST"]
     assert item.text_edit.new_text == "2"
     assert "OTHER" not in typing("uint8 OTHER=3\n---\nuint8 mode |", "srv/Stop.srv")
+
+
+def test_a_type_comes_with_its_definition(typing):
+    items = typing("std_msgs/He|")
+    answer = typing.editor.ask(lsp.COMPLETION_ITEM_RESOLVE, items["std_msgs/Header"])
+    assert "builtin_interfaces/Time stamp" in answer.documentation.value
+    assert answer.text_edit == items["std_msgs/Header"].text_edit
+    own = typing("Whe|")["Wheel"]
+    assert "int8 x" in typing.editor.ask(lsp.COMPLETION_ITEM_RESOLVE, own).documentation.value
+
+
+@pytest.mark.parametrize("data", [None, 7, [], ["x", "y", "z"], [1, 2, 3], {"uri": []}])
+def test_other_items_are_returned_as_they_are(typing, data):
+    item = lsp.CompletionItem(label="float64", data=data)
+    assert typing.editor.ask(lsp.COMPLETION_ITEM_RESOLVE, item) == item
+
+
+def test_built_in_types_say_how_large_they_are(typing):
+    items = typing("|")
+    assert items["float64"].detail == "8 bytes"
+    assert items["Wheel"].detail == "demo"

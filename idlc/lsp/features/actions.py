@@ -21,7 +21,7 @@ from idlc.lsp.publish import Shown, problems, shown
 from idlc.lsp.world import World
 
 _FIX, _FIX_ALL, _UPDATE = "quickfix", "source.fixAll.idlc", UPDATE_KIND
-#: Hints that name what could stand there instead.
+#: Hints that name what should stand there instead.
 _MEANT = re.compile(r"(?:did you mean|write|use) `")
 #: Of the names in a hint, so many are tried.
 MOST = 3
@@ -90,19 +90,40 @@ def _about(one: Guilty) -> Iterator[Action]:
         hint = problem.hint or f"fix {problem.code}"
         yield one.action(hint[:1].upper() + hint[1:], problem.edits, best=True)
     elif problem.span is not None:
-        for word in _meant(problem):
-            edit = _instead(problem.span, word)
+        best = bool(_MEANT.match(problem.hint or ""))
+        for title, edit in _offers(problem.hint or "", problem.span):
             if _helps(one, edit):
-                yield one.action(f"Write `{word}`", [edit], best=True)
+                yield one.action(title, [edit], best=best)
     remark = _remark(one) if problem.severity is Severity.WARNING else None
     if remark is not None and _helps(one, remark):
         yield one.action(f"Ignore {problem.code} here", [remark])
 
 
-def _meant(problem: Diagnostic) -> list[str]:
-    """Return the words that a hint names for what stands there."""
-    hint = problem.hint or ""
-    return re.findall(r"`([^`]+)`", hint)[:MOST] if _MEANT.match(hint) else []
+def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
+    """Yield edits that a hint may mean, with their titles; some do not help.
+
+    A text in backticks stands for the span; if it has several words, for the line's definition.
+    """
+    source = span.source
+    number, _ = source.position(span.start)
+    start, line = source.line_starts[number - 1], source.line_text(number)
+    definition = line.partition("#")[0]
+    words = re.findall(r"`([^`]+)`", hint)[:MOST]
+    has_one_definition = sum(" " in word for word in words) == 1
+    for word in words:
+        if " " not in word:
+            yield f"Write `{word}`", _instead(span, word)
+        elif has_one_definition:
+            whole = Span(source, start, start + len(definition.rstrip()))
+            yield f"Write `{word}`", Edit(whole, word)
+    if bound := re.search(r"raise the bound to (\d+)", hint):
+        at = re.match(r"[^#\s]*<=(\d+)", definition)
+        if at:
+            title = f"Raise the bound to {bound[1]}"
+            yield title, Edit(Span(source, start + at.start(1), start + at.end(1)), bound[1])
+    if re.search(r"\bremove (?:it|one of them)$", hint):
+        end = source.line_starts_after(span.start)
+        yield "Remove this line", Edit(Span(source, start, end), "")
 
 
 def _instead(span: Span, word: str) -> Edit:

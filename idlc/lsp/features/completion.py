@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Severity
 from idlc.lsp.documents import Document
 from idlc.lsp.features import dependencies, suggestions
+from idlc.lsp.features.hover import code, shortened
 from idlc.lsp.projects import Project
-from idlc.lsp.protocol.parts import AtPosition, Part, Position, Range, TextEdit
+from idlc.lsp.protocol.parts import AtPosition, Markup, Part, Position, Range, TextEdit
 from idlc.lsp.protocol.positions import in_lines, lines_of, units
 from idlc.lsp.world import World
 from idlc.model import ir
@@ -38,6 +40,8 @@ class Item(Part, frozen=True):
     sort_text: str = ""
     filter_text: str = ""
     command: dict[str, object] | None = None
+    #: Which type `resolve` describes: the document, and the type's package and name.
+    data: tuple[str, str, str] | None = None
 
 
 class Items(Part, frozen=True, omit_defaults=False):
@@ -93,6 +97,17 @@ def complete(world: World, asked: AtPosition) -> Items:
     return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, words)))
 
 
+def resolve(world: World, item: dict[str, object]) -> dict[str, object]:
+    """Return an item with the text of its type as documentation, if it stands for a type."""
+    match item.get("data"):
+        case [str(uri), str(package), str(name)] if known := world.known(uri):
+            source = known.state.source(ir.TypeName(package, "msg", name))
+            lines = source.text.splitlines() if source else []
+            return {**item, "documentation": Markup(code(shortened(lines)))} if lines else item
+        case _:
+            return item
+
+
 def _fits(item: Item, words: Mapping[int, str]) -> bool:
     """Return whether what an item replaces has its letters in that order; not all editors look."""
     letters = iter((item.filter_text or item.label).lower())
@@ -133,7 +148,8 @@ def _types(typed: Typed, word: str, world: World) -> Iterator[Item]:
     name = workspace.name_of(typed.path)
     own = name.package
     for one in (*ir.PRIMITIVES, *STRINGS):
-        yield Item(one, _KEYWORD, typed.replacing(len(word), one), sort_text=f"1{one}")
+        size = counted(ir.PRIMITIVES[one].size, "byte") if one in ir.PRIMITIVES else "text"
+        yield Item(one, _KEYWORD, typed.replacing(len(word), one), size, f"1{one}")
     for one in workspace.names(own):
         if name != (own, "msg", one):
             yield _type(typed, word, one, own, "0", world)
@@ -169,8 +185,9 @@ def _type(
         typed.replacing(len(word), text),
         sort_text=rank + text,
         filter_text=looked_for,
-        detail=package if looked_for else "",
+        detail=package,
         command=dependencies.command(typed.document.uri, package, world) if missing else None,
+        data=(typed.document.uri, package, text.rpartition("/")[2]),
     )
 
 

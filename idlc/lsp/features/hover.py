@@ -103,9 +103,7 @@ def _interface(interface: ir.Interface, state: State) -> Iterator[str]:
     if model is None:
         yield prose(derive.sections(interface)[0].comment)
         return
-    lines = list(outline(interface, model))
-    more = [f"# and {len(lines) - MOST_LINES} lines more"] if len(lines) > MOST_LINES else []
-    yield code(lines[:MOST_LINES] + more)
+    yield code(shortened(list(outline(interface, model))))
     yield "  \n".join(_sizes(interface, model))
     if model.distro.has_hashes:
         yield f"`{model.describer.hash(str(interface.name))}`"
@@ -116,6 +114,12 @@ def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
     for name, section in zip(names, derive.sections(interface), strict=True):
         of = f" of the {name.lower()}" if name else ""
         yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
+
+
+def shortened(lines: list[str]) -> list[str]:
+    """Return the first lines of a definition, with a remark that counts the others."""
+    more = [f"# {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else []
+    return lines[:MOST_LINES] + more
 
 
 def code(lines: list[str]) -> str:

@@ -40,7 +40,10 @@ CAPABILITIES: dict[str, object] = {
         "interFileDependencies": True,
         "workspaceDiagnostics": True,
     },
-    "completionProvider": {"triggerCharacters": ["/", "=", "[", "(", " "]},
+    "completionProvider": {
+        "triggerCharacters": ["/", "=", "[", "(", " "],
+        "resolveProvider": True,
+    },
     "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc", UPDATE_KIND]},
     "renameProvider": {"prepareProvider": True},
     "inlayHintProvider": True,

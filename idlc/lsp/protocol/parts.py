@@ -259,6 +259,10 @@ class DidChangeSettings(Part, frozen=True):
     settings: Any = None
 
 
+#: completionItem/resolve: what the server sent, and what else a client has in it.
+CompletionItem = dict[str, Any]
+
+
 class Markup(Part, omit_defaults=False, frozen=True):
     """Text for people, in Markdown."""
 
