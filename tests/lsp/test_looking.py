@@ -262,3 +262,12 @@ def test_layout_is_that_of_the_command_line(opened):
     one.change(uri, "int8   a\nint9 b\n---\n", 3)
     params = lsp.DocumentFormattingParams(text_document=document(uri), options=options)
     assert one.ask(lsp.TEXT_DOCUMENT_FORMATTING, params) == ()  # errors: it is left alone
+
+
+def test_built_in_types_lead_to_their_documentation(opened):
+    one, uri, _ = opened
+    one.change(uri, "shape_msgs/Plane plane\nWheel wheel\n")
+    text, _ = hover(opened, 0, 0)
+    assert "(https://docs.ros.org/en/jazzy/p/shape_msgs/)" in text
+    text, _ = hover(opened, 1, 0)
+    assert "docs.ros.org" not in text

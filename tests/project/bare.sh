@@ -30,6 +30,7 @@ if [ "${BARE_ROOT:-}" ]; then
     root=$BARE_ROOT name=$BARE_NAME home=$BARE_HOME
     mount -t proc proc "$root/proc"
     mount -t devpts -o newinstance,ptmxmode=0666 devpts "$root/dev/pts"
+    mount -t tmpfs -o mode=1777 tmpfs "$root/dev/shm" # without it Python has no locks between processes
     if [ "$BARE_STEP" = test ]; then
         python3 -c 'import fcntl, socket, struct
 fcntl.ioctl(socket.socket(), 0x8914, struct.pack("16sh22x", b"lo", 0x1 | 0x40 | 0x1000))' # up, running, multicast

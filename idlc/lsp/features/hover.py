@@ -9,7 +9,7 @@ from idlc.export.byte_layout import Extent, Placed, layout
 from idlc.export.outline import outline
 from idlc.lsp.elements import Element, section_names, spot
 from idlc.lsp.protocol.parts import AtPosition, Markup, Part, Range
-from idlc.lsp.world import World
+from idlc.lsp.world import World, is_built_in
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.model.spelling import spell, spell_value
@@ -107,6 +107,11 @@ def _interface(interface: ir.Interface, state: State) -> Iterator[str]:
     yield "  \n".join(_sizes(interface, model))
     if model.distro.has_hashes:
         yield f"`{model.describer.hash(str(interface.name))}`"
+    if interface.source is not None and is_built_in(interface.source):
+        # the catalogue has no comments
+        package = interface.name.package
+        page = f"https://docs.ros.org/en/{model.distro.name}/p/{package}/"
+        yield f"[{prose((package,))} in the documentation of ROS 2]({page})"
 
 
 def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
