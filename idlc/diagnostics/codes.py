@@ -184,6 +184,7 @@ HASH_CHANGED = Code("IDL516", "hash-changed", ERROR)
 UNUSED_ALLOWANCE = Code("IDL517", "unused-allowance", WARNING)
 EXPIRED_ALLOWANCE = Code("IDL518", "expired-allowance", WARNING)
 OPTIONAL_ADDED = Code("IDL519", "optional-added", ERROR)
+NOT_COMPARED = Code("IDL520", "not-compared", WARNING)
 SEVERAL_VERSIONS = Code("IDL530", "several-versions", ERROR)
 SEVERAL_TYPES = Code("IDL531", "several-types", ERROR)
 

@@ -234,6 +234,23 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     assert lsp.WORKSPACE_CODE_LENS_REFRESH in [method for method, _ in asked]
 
 
+def test_what_cannot_be_compared_is_said(editor, package):
+    """One broken file of the old version says nothing of the others."""
+    files = {"pyproject.toml": TABLE, "msg/Old.msg": "int9 x\n", "msg/New.msg": "int8 x\n"}
+    folder = package(files)
+    shutil.rmtree(folder / ".git")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "first")
+    one = editor(folder)
+    uri, old = (one.open(folder / f"msg/{name}.msg", "int16 x\n") for name in ("New", "Old"))
+    assert lenses(one, old)[2] == "not compared: there are errors in git:HEAD"
+    assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
+    shutil.rmtree(folder / ".git/objects")
+    (folder / ".git/refs/heads").rename(folder / ".git/refs/gone")
+    assert lenses(one, uri)[2].startswith("not compared: cannot read `git:HEAD`: ")
+
+
 def watchers(asked):
     """Return what the client was asked to watch last."""
     (*_, params) = (params for method, params in asked if method == lsp.CLIENT_REGISTER_CAPABILITY)
