@@ -120,7 +120,7 @@ class Db3File(File):
         self.place = str(path)
         self.name = str(path)
         self.database = Db3(path)
-        self.notes: list[str] = []
+        self.notes = self.database.notes
         self.topics: list[tuple[Topic, int]] = []
         for one in self.database.topics() if read else ():
             name = full_name(one.type)

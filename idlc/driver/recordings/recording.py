@@ -110,7 +110,7 @@ class RecordedTopic(Selection):
 
         A time is an int in nanoseconds, a datetime, or a text: `10` and `1m30s` count from the
         start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
-        in UTC.
+        in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
         """
         first, last = (
             None if one is None else moment(one, self._container.start) for one in (start, end)
