@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
+import idlc
 from idlc.checks.registry import advise
 from idlc.checks.select import Selection
 from idlc.cli import completion
@@ -282,15 +283,40 @@ def test_one_name_for_all_but_check(words, capsys):
     assert "did you mean `jazzy`?" in capsys.readouterr().err
 
 
-def test_generated_code_is_the_same_for_all(capsys):
-    write({"demo/msg/A.msg": "std_msgs/Header header\nfloat64[] a\n", "demo/srv/S.srv": "---\n"})
+def test_generated_code_is_the_same_before_lyrical_and_from_then_on(capsys):
+    text = "std_msgs/Header header\nfloat64[] a\nstring b\n"
+    write({"demo/msg/A.msg": text, "demo/srv/S.srv": "---\n"})
     found = {}
     for distro in BY_NAME:
         assert main(["gen", "demo", "-o", f"out/{distro}/demo", "--distro", distro]) == 0
         files = sorted(Path("out", distro).rglob("*.py"))
         found[distro] = {path.relative_to(f"out/{distro}"): path.read_bytes() for path in files}
     assert len(found["humble"]) > 10
-    assert all(one == found["jazzy"] for one in found.values())
+    differing = {name for name in found["jazzy"] if found["jazzy"][name] != found["lyrical"][name]}
+    assert differing == {Path("demo/msg/_a.py"), Path("demo/srv/_s__protocol.py")}
+    for distro, files in found.items():
+        assert files == found["lyrical" if BY_NAME[distro].converts_values else "jazzy"]
+
+
+def test_generating_for_a_distribution_with_other_classes(capsys):
+    write({"demo/msg/A.msg": "string[] a\n"})
+    for distro, written in (("jazzy", 1), ("kilted", 0), ("lyrical", 1), ("rolling", 0)):
+        before = Path("out/demo/msg/_a.py").read_bytes() if Path("out").exists() else b""
+        lock = Path("out/demo/idlc.lock").read_bytes() if before else b""
+        assert main(["gen", "demo", "-o", "out/demo", "--distro", distro]) == 0
+        assert (Path("out/demo/msg/_a.py").read_bytes() != before) == written
+        assert (Path("out/demo/idlc.lock").read_bytes() != lock) == written
+    capsys.readouterr()
+    assert main(["gen", "demo", "-o", "out/demo", "--distro", "lyrical", "--check"]) == 0
+    assert main(["gen", "demo", "-o", "out/demo", "--distro", "jazzy", "--check"]) == 1
+    assert "it was written for another distribution of ROS 2" in capsys.readouterr().err
+
+
+def test_loaded_classes_are_of_a_distribution():
+    write({"demo/msg/A.msg": "string[] a\n"})
+    for distro, kind in (("jazzy", tuple), ("lyrical", list), ("jazzy", tuple), ("rolling", list)):
+        loaded = idlc.load("demo/msg/A.msg", distro=distro)
+        assert type(loaded.A(a=("x",)).a) is kind
 
 
 def test_generating_again_for_another_distribution_is_no_shortcut(capsys):
