@@ -153,6 +153,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     found = []
     if old.idlc != new.idlc:
         found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.converts_values != new.converts_values:
+        found.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
         found.append(f"the package was called `{old.package}`")
     for before, after in pairs:
