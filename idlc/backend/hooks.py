@@ -9,14 +9,14 @@ from __future__ import annotations
 import importlib.util
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from idlc.cli import output
 from idlc.cli.exit_status import ended
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.disk.machine import environment
 from idlc.disk.machine.distribution import Distribution
 from idlc.disk.packages.enclosing import MANIFEST
@@ -24,7 +24,7 @@ from idlc.disk.read import reason
 from idlc.disk.settings import pyproject
 
 if TYPE_CHECKING:
-    from hatchling.builders.plugin.interface import BuilderInterface
+    from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
 
     from idlc.backend.content import Content
 
@@ -63,14 +63,44 @@ def finished(build: Callable[[Report], str | None]) -> str:
 
 
 def sdist(directory: str, report: Report) -> str | None:
-    """Write the archive of the working folder, without what version control ignores."""
-    from hatchling.builders.sdist import SdistBuilder
+    """Write the archive of the working folder, without what version control ignores.
+
+    Links that lead out of the folder are left out, and noted: an archive is given to others.
+    """
+    from hatchling.builders.sdist import SdistBuilder, SdistBuilderConfig
+
+    here = Path.cwd().resolve()
+    outside: set[str] = set()
+
+    def leads_out(path: Path) -> bool:
+        is_outside = not path.resolve().is_relative_to(here)
+        if is_outside:
+            outside.add(path.relative_to(here).as_posix())
+        return is_outside
+
+    class Config(SdistBuilderConfig):
+        def directory_is_excluded(self, name: str, relative_path: str) -> bool:
+            left_out: bool = super().directory_is_excluded(name, relative_path)
+            return left_out or leads_out(here / relative_path / name)
+
+    class Builder(SdistBuilder):
+        @classmethod
+        def get_config_class(cls) -> type[SdistBuilderConfig]:
+            return Config
+
+        def recurse_included_files(self) -> Iterator[IncludedFile]:
+            files = super().recurse_included_files()
+            yield from (file for file in files if not leads_out(here / file.path))
 
     found = _declared(report)
     if found is None:
         return None
     settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
-    return _written(SdistBuilder(str(Path.cwd()), config=settings), directory, report)
+    name = _written(Builder(str(here), config=settings), directory, report)
+    if outside:
+        names = first_few((f"`{one}`" for one in sorted(outside)), 5)
+        report.notes.append(f"left out, because they lead out of the project: {names}")
+    return name
 
 
 def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:

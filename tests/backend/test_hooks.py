@@ -169,6 +169,32 @@ def test_the_source_archive_builds_the_same_wheel(source, tmp_path, monkeypatch)
     assert built(tmp_path / "again").read_bytes() == wheel
 
 
+@pytest.mark.skipif(os.name == "nt", reason="links need a right of their own")
+def test_a_source_distribution_holds_nothing_from_outside(source, tmp_path, capsys):
+    write(tmp_path, {"outside/secret.txt": "secret", "outside/Out.msg": "int8 secret\n"})
+    write(source, {"kept/here.txt": "here"})
+    for name, target in {
+        "extra": "../outside",
+        "whole": "/",
+        "note.txt": "../outside/secret.txt",
+        "NOTICE": str(tmp_path / "outside/secret.txt"),
+        "msg/Out.msg": "../../outside/Out.msg",
+        "action/by": "../extra",
+        "kept/again.txt": "here.txt",
+        "circle": ".",
+        "nowhere": "gone",
+    }.items():
+        (source / name).symlink_to(target)
+    with tarfile.open(built(tmp_path, backend.build_sdist)) as sdist:
+        names = {name.removeprefix("demo_msgs-1.2.3/") for name in sdist.getnames()}
+        contents = [sdist.extractfile(one).read() for one in sdist if one.isfile()]
+    assert not any(b"secret" in one for one in contents)
+    assert names >= {*FILES, "kept/again.txt"}
+    assert not names & {"NOTICE", "note.txt", "msg/Out.msg"}
+    said = capsys.readouterr().err
+    assert "left out, because they lead out of the project: `NOTICE`, `action/by`, `extra`" in said
+
+
 def changed(old, new=""):
     assert old in MANIFEST
     return {"package.xml": MANIFEST.replace(old, new)}

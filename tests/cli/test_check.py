@@ -76,14 +76,13 @@ def from_gitlab(out):
 
 def from_junit(out):
     suite = ElementTree.fromstring(out)  # noqa: S314 - our own
-    failed = [case for case in suite if case.find("failure") is not None]
     assert suite.tag == "testsuite"
     assert int(suite.get("tests")) == len(suite)
-    assert int(suite.get("failures")) == len(failed)
-    found = [re.fullmatch(r"(IDL\d+) \S+:(\d+):\d+", case.get("name")) for case in failed]
+    assert int(suite.get("failures")) == len(suite.findall("testcase/failure"))
+    told = [case for case in suite if len(case)]
+    found = [re.fullmatch(r"(IDL\d+) \S+:(\d+):\d+", case.get("name")) for case in told]
     return [
-        (case.get("classname"), int(one[2]), one[1])
-        for case, one in zip(failed, found, strict=True)
+        (case.get("classname"), int(one[2]), one[1]) for case, one in zip(told, found, strict=True)
     ]
 
 
@@ -148,16 +147,37 @@ def test_nothing_found_is_a_whole_document_too(capsys):
     assert check(capsys, "demo", "--format", "github")[1] == ""
 
 
-def test_colcon_reads_the_junit_file(capsys):
+#: How formats say that something fails a build.
+FAILS = {
+    "json": '"severity": "error"',
+    "github": "::error",
+    "gitlab": '"severity": "major"',
+    "junit": "<failure",
+    "sarif": '"level": "error"',
+}
+
+
+@pytest.mark.parametrize("style", FAILS)
+@pytest.mark.parametrize("text", ["wstring a\n", "wstring a\nint9 b\n"])
+def test_a_format_fails_a_build_when_the_status_does(style, text, capsys):
+    write_all({"demo/msg/Wide.msg": text})
+    status, out = check(capsys, "demo", "--format", style)
+    assert (FAILS[style] in out) == (status == 1) == ("int9" in text)
+    assert "IDL421" in out
+    assert check(capsys, "demo", "--strict", "--format", "junit")[1].count("<failure") == 1 + status
+
+
+@pytest.mark.parametrize(("options", "failures"), [((), 5), (["--strict"], 10)])
+def test_colcon_reads_the_junit_file(options, failures, capsys):
     write_all(MISTAKES)
-    _, out = check(capsys, "--format", "junit")
+    _, out = check(capsys, "--format", "junit", *options)
     write_all({"build/demo/idlc.xunit.xml": out})
     code = "import sys; from colcon_core.command import main; sys.exit(main(argv=sys.argv[1:]))"
     words = ["--log-base", "/dev/null", "test-result", "--test-result-base", "build", "--verbose"]
     done = subprocess.run(
         [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
     )
-    assert "10 tests, 0 errors, 10 failures, 0 skipped" in done.stdout, done.stderr
+    assert f"10 tests, 0 errors, {failures} failures, 0 skipped" in done.stdout, done.stderr
     assert "unknown type `flot64`" in done.stdout
     assert done.returncode == 1
 
