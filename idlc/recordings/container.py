@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from array import array
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -13,8 +16,8 @@ from idlc.recordings.db3 import MAGIC as DB3_MAGIC
 from idlc.recordings.db3 import Db3, Rows
 from idlc.recordings.errors import RecordingError, of_file
 from idlc.recordings.mcap import McapFacts, read_facts
+from idlc.recordings.mcap_records import INDEX_OFFSET, Chunk
 from idlc.recordings.mcap_records import MAGIC as MCAP_MAGIC
-from idlc.recordings.mcap_records import Chunk
 from idlc.recordings.source import first_bytes, is_local, source_of
 
 if TYPE_CHECKING:
@@ -95,10 +98,51 @@ class McapFile(File):
         return self.facts.start
 
     def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
-        """Return where messages of some channels may be."""
+        """Return where messages of some channels may be, with no more indexes than of these."""
         from idlc.recordings.mcap_messages import may_have
 
-        return [one for one in self.facts.chunks if may_have(one, channels, window)]
+        mine: dict[int, bytes] = {}
+        for channel in channels:
+            entries = self._indexes.get(channel, ())
+            for number, at in zip(entries[::2], entries[1::2], strict=True):
+                mine[number] = mine.get(number, b"") + INDEX_OFFSET.pack(channel, at)
+        found = [
+            chunk._replace(indexes=mine.get(number))
+            for number, chunk in enumerate(self.facts.chunks)
+            if number in mine or chunk.indexes is None
+        ]
+        if window != (None, None):
+            found = self._checked(found, channels)
+        return [one for one in found if may_have(one, window)]
+
+    @cached_property
+    def _indexes(self) -> dict[int, array[int]]:
+        """Of each channel the numbers of chunks, each followed by where its MessageIndex is."""
+        found: dict[int, array[int]] = defaultdict(lambda: array("Q"))
+        for number, chunk in enumerate(self.facts.chunks):
+            for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
+                found[channel].extend((number, at))
+        return found
+
+    def _checked(self, chunks: list[Chunk], channels: Collection[int]) -> list[Chunk]:
+        """Return chunks of some channels, without their indexes if these may be incomplete.
+
+        Raises RecordingError if they are: otherwise, messages would be missing from a window. In
+        stores that is not looked for, because each index is a request there.
+        """
+        from idlc.recordings.mcap_messages import count
+
+        loose, counts = self.facts.loose, self.facts.counts
+        whole = [one for one in chunks if one.compression is not None]
+        if loose is None or not is_local(self.place):
+            return chunks
+        if any(one.indexes is None for one in whole):
+            return [one._replace(indexes=None) for one in self.facts.chunks]
+        with of_file(self.name):
+            told = sum(counts.get(one, 0) - loose.get(one, 0) for one in channels)
+            name = self.facts.channels[next(iter(channels))].topic
+            check_count(name, told, sum(count(self.source, one) for one in whole))
+        return chunks
 
     def messages(
         self, channels: Collection[int], pieces: Iterable[Chunk], window: Window
@@ -159,24 +203,34 @@ class Container(File):
         self.notes = (*notes, *(note for file in files for note in file.notes))
         self.topics: tuple[Topic, ...] = tuple(_merged(files))
 
-    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int]]]:
-        """Yield each file that has messages of a topic, and what it calls the topic."""
-        for file in self.files:
-            ids = [number for one, number in file.topics if _is_part_of(one, topic)]
-            if ids:
-                yield file, ids
+    @cached_property
+    def _places(self) -> dict[tuple[str, str, str], list[tuple[int, Topic, int]]]:
+        """Of each topic, whatever its definition: number of the file, and what that says of it."""
+        found: dict[tuple[str, str, str], list[tuple[int, Topic, int]]] = {}
+        for index, file in enumerate(self.files):
+            for topic, number in file.topics:
+                found.setdefault(_key(topic), []).append((index, topic, number))
+        return found
+
+    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int], int]]:
+        """Yield each file with messages of a topic, what it calls the topic, and their count."""
+        mine: dict[int, dict[int, int]] = {}
+        for index, one, number in self._places.get(_key(topic), ()):
+            if one.schema in (topic.schema, None):  # definitions may be left out
+                mine.setdefault(index, {})[number] = one.count
+        for index, counts in mine.items():
+            yield self.files[index], list(counts), sum(counts.values())
 
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""
-        for file, ids in self.ids_of(topic):
+        for file, ids, told in self.ids_of(topic):
             found = 0
             for some in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
                 found += len(some)
                 yield some
-            told = sum(one.count for one, number in file.topics if number in ids)
-            if window == (None, None) and found != told:
-                what = f"{told:,} messages of `{topic.name}` are counted, and there are {found:,}"
-                raise RecordingError(f"`{file.name}`: {what}")
+            if window == (None, None):
+                with of_file(file.name):
+                    check_count(topic.name, told, found)
 
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""
@@ -255,10 +309,17 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
-def _is_part_of(one: Topic, whole: Topic) -> bool:
-    """Return whether a channel belongs to a topic: definitions may be left out."""
-    same = (one.name, one.type, one.encoding) == (whole.name, whole.type, whole.encoding)
-    return same and one.schema in (whole.schema, None)
+def _key(topic: Topic) -> tuple[str, str, str]:
+    """Return what is the same of all channels that may belong to a topic."""
+    return topic.name, topic.type, topic.encoding
+
+
+def check_count(topic: str, told: int, found: int) -> None:
+    """Raise RecordingError if there are other messages than are counted."""
+    if told != found:
+        hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
+        what = f"{told:,} messages of `{topic}` are counted, and there are {found:,}"
+        raise RecordingError(what, hint)
 
 
 def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
@@ -266,15 +327,18 @@ def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     found: dict[tuple[str, str, str], list[Topic]] = {}
     for file in files:
         for topic, _ in file.topics:
-            found.setdefault((topic.name, topic.type, topic.encoding), []).append(topic)
+            found.setdefault(_key(topic), []).append(topic)
     for same in found.values():
-        texts = dict.fromkeys(topic.schema for topic in same if topic.schema)
-        for schema in texts or [None]:
-            whole = replace(same[0], schema=schema)
-            mine = [one for one in same if _is_part_of(one, whole)]
-            hashes = [one.hash for one in mine if one.hash]
-            yield replace(
-                whole,
-                count=sum(one.count for one in mine),
-                hash=hashes[0] if hashes else None,
-            )
+        by_schema: dict[Schema | None, list[Topic]] = {}
+        for topic in same:
+            by_schema.setdefault(topic.schema, []).append(topic)
+        # without a definition, a channel belongs to each of the others
+        bare = _joined(by_schema.pop(None, []))
+        for mine in by_schema.values() or [[]]:
+            yield _joined([*mine, *bare])[0]
+
+
+def _joined(same: list[Topic]) -> list[Topic]:
+    """Return what channels have in common, if there is any, the first definition and hash of it."""
+    digest = next((one.hash for one in same if one.hash), None)
+    return [replace(one, count=sum(x.count for x in same), hash=digest) for one in same[:1]]

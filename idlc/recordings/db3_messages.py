@@ -7,7 +7,7 @@ from contextlib import closing
 
 import numpy as np
 
-from idlc.recordings.compression import ZSTD_MAGIC, zstd_frame
+from idlc.recordings.compression import ZSTD_MAGIC, Room, zstd_frame
 from idlc.recordings.db3 import Db3, Rows
 from idlc.recordings.errors import RecordingError, of_file
 from idlc.recordings.messages import Messages, Raw, Separate, Window
@@ -22,17 +22,18 @@ def messages(
     database: Db3, pieces: Iterable[Rows], topics: Collection[int], window: Window
 ) -> Iterator[Messages]:
     """Yield the messages of some topics in some rows."""
+    room = Room(database.size)
     for piece in pieces:
         with of_file(database.name):
             first: int | None = piece.first
             while first is not None:
-                times, raws, first = _group(database, Rows(first, piece.last), topics, window)
+                times, raws, first = _group(database, Rows(first, piece.last), topics, window, room)
                 if raws:
                     yield Separate(np.array(times, np.int64), None, raws)
 
 
 def _group(
-    database: Db3, piece: Rows, topics: Collection[int], window: Window
+    database: Db3, piece: Rows, topics: Collection[int], window: Window, room: Room
 ) -> tuple[list[int], list[Raw], int | None]:
     """Return times and contents of the first messages, and the row that is next, if any.
 
@@ -41,7 +42,7 @@ def _group(
     times: list[int] = []
     raws: list[Raw] = []
     size = 0
-    with closing(_rows(database, piece, topics, window)) as rows:
+    with closing(_rows(database, piece, topics, window, room)) as rows:
         for row, time, data in rows:
             times.append(time)
             raws.append(data)
@@ -52,7 +53,7 @@ def _group(
 
 
 def _rows(
-    database: Db3, piece: Rows, topics: Collection[int], window: Window
+    database: Db3, piece: Rows, topics: Collection[int], window: Window, room: Room
 ) -> Generator[tuple[int, int, bytes], None, None]:
     """Yield row, time and content of each message."""
     marks = ", ".join("?" * len(topics))
@@ -69,9 +70,4 @@ def _rows(
         for row, time, data in found:
             if not isinstance(time, int) or not isinstance(data, bytes):
                 raise RecordingError("a message has values of other types")
-            yield row, time, _plain(data)
-
-
-def _plain(data: bytes) -> bytes:
-    """Return a message that may be compressed by itself; none begins like a zstd frame."""
-    return zstd_frame(data) if data.startswith(ZSTD_MAGIC) else data
+            yield row, time, data if data[:4] != ZSTD_MAGIC else zstd_frame(data, room)
