@@ -19,6 +19,7 @@ from idlc.disk.setup_command import distribution_class
 from idlc.driver.generate.gen import GenOptions, gen
 from idlc.driver.generate.libraries import Libraries, libraries_of
 from idlc.driver.stages import models_of
+from idlc.emit.render import support_packages
 from idlc.model.link import Model
 from idlc.scaffold import new_interface
 
@@ -36,12 +37,13 @@ def compile_interfaces(package: str) -> dict[str, type]:
     here, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
-        installed, libraries = _compile(package)
+        installed, libraries, generated = _compile(package)
     finally:
         os.chdir(here)
     if source != here:
         _link(installed, source, here)
-    return {"distclass": distribution_class(package, libraries.files, libraries.missing)}
+    made = distribution_class(package, libraries.files, libraries.missing, generated)
+    return {"distclass": made}
 
 
 def _link(paths: Iterable[str], source: Path, here: Path) -> None:
@@ -56,13 +58,16 @@ def _link(paths: Iterable[str], source: Path, here: Path) -> None:
             (here / path).symlink_to(source / path)
 
 
-def _compile(package: str) -> tuple[Iterable[str], Libraries]:
-    """Compile the package in the working folder; return the files that ROS 2's tools read."""
+def _compile(package: str) -> tuple[Iterable[str], Libraries, Iterable[str]]:
+    """Compile the package in the working folder.
+
+    Returns the files that ROS 2's tools read, libraries, and the Python packages of the classes.
+    """
     report = Report()
     where = scope(pyproject.load(report), package)
     found = packages(look((".",), Report(), where.exclude).files, where, report)
     if not found:
-        return (), Libraries({})
+        return (), Libraries({}), ()
     (given,) = found
     gen(GenOptions(paths=(".",), out=package, scope=where), report)
     ((_, model),) = models_of(found, where, Report())
@@ -76,7 +81,8 @@ def _compile(package: str) -> tuple[Iterable[str], Libraries]:
     output.show(report, "text", sys.stderr)
     if report.had_errors:
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    return files, libraries_of(model)
+    parts = {*support_packages(), *(key.partition("/")[0] for key in given.digests)}
+    return files, libraries_of(model), (package, *(f"{package}.{part}" for part in parts))
 
 
 def _described(model: Model) -> Iterator[tuple[str, str]]:

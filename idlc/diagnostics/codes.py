@@ -159,6 +159,7 @@ NAME_MISMATCH = Code("IDL458", "name-mismatch", WARNING, PACKAGE)
 UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING, PACKAGE)
 STALE_GENERATED_CODE = Code("IDL460", "stale-generated-code", WARNING, PACKAGE)
 NO_LIBRARY_INSTALLED = Code("IDL461", "no-library-installed", WARNING, PACKAGE)
+CLASSES_NOT_INSTALLED = Code("IDL462", "classes-not-installed", WARNING, PACKAGE)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)

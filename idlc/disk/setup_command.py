@@ -22,6 +22,11 @@ INDEX = f"{environment.INDEX}/packages"
 NEW = ".new"
 #: The commands of setup.py by which pip installs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
+_BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
+_NOT_INSTALLED = """\
+{package}: setup() is given `packages` without {absent}, so that the classes of the interfaces \
+would not be installed; write `packages=find_packages(exclude=['test'])`, or run \
+`idlc check --fix`"""
 _COMMAND = re.compile(r"\s*([\w.-]+)\s*=")
 _LAUNCHER = """\
 #!/bin/sh
@@ -30,14 +35,20 @@ exec "$(dirname "$0")/../../bin/{name}" "$@"
 """
 
 
-def distribution_class(package: str, libraries: Mapping[str, bytes], missing: str) -> type:
+def distribution_class(
+    package: str, libraries: Mapping[str, bytes], missing: str, packages: Iterable[str] = ()
+) -> type:
     """Return a class for setup(distclass=...) that installs libraries, by paths in a prefix.
 
-    With a reason why they are `missing`, the package is not entered in ROS 2's index.
+    With a reason why they are `missing`, the package is not entered in ROS 2's index. The build
+    stops unless setup() was given all Python `packages` that were generated.
     """
     base = import_module("setuptools").Distribution
 
     def run_commands(self: Any) -> None:
+        absent = sorted({*packages}.difference(self.packages or ()))
+        if absent and _BUILDS & {*self.commands}:
+            raise SystemExit(_NOT_INSTALLED.format(package=package, absent=", ".join(absent)))
         place = Path(self.get_option_dict("build").get("build_base", ("", "build"))[1], "idlc")
         added = dict(libraries)
         if _WHEELS & set(self.commands):

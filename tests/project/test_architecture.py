@@ -50,11 +50,9 @@ RUNTIME_ON_DEMAND = {"numpy", "pyarrow", "rclpy", "rosidl_parser"}
 NUMPY_AT_ONCE = ("idlc/runtime/arrays.py", "idlc/runtime/on_demand/columns/")
 
 MODULE_BUDGET = 600
-FUNCTION_BUDGET = 40
+FUNCTION_BUDGET = 60
 #: path, or path:function, that is over budget -> why it stays so.
-OVER_BUDGET: dict[str, str] = {
-    "idlc/runtime/typesupport/services.py:event": "two callbacks over what they close over",
-}
+OVER_BUDGET: dict[str, str] = {}
 
 
 def name_of(path: Path) -> str:

@@ -34,6 +34,7 @@ class Facts(msgspec.Struct, frozen=True):
     files are all that it has. `generates` is whether its CMakeLists.txt
     generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
     whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    `folders` are those with files by dotted name, and whether they are Python packages.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Facts(msgspec.Struct, frozen=True):
     whole: bool = False
     outputs: tuple[Output, ...] = ()
     known: frozenset[str] = frozenset()
+    folders: Mapping[str, bool] = {}
 
     def declared(self, *tags: str) -> dict[str, Statement]:
         """Return the statements with one of these tags by their text, the first of each."""

@@ -128,15 +128,16 @@ def declared_imports(facts: Facts, _: Model, report: Report) -> None:
     """ROS packages that the nodes import are declared."""
     if not facts.modules:
         return
-    from idlc.checks.package.python_files import imported_packages
+    from idlc.checks.package.python_files import imported_modules, span_of
 
     declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
     for source in facts.modules.values():
-        for package, span in imported_packages(source):
+        for module, node in imported_modules(source):
+            package = module.partition(".")[0]
             if package in facts.known and package not in declared:
                 declared.add(package)
                 found = codes.UNDECLARED_IMPORT.at(
-                    span,
+                    span_of(source, node),
                     f"`{facts.manifest.path}` does not declare `{package}`",
                     hint=f"add `<exec_depend>{package}</exec_depend>`",
                 )

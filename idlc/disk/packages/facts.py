@@ -62,8 +62,25 @@ def facts(
         whole=_whole(given, files, exclude),
         marker=(folder / "resource" / given.package).is_file(),
         outputs=tuple(Output(shown(at), one.package, one.inputs) for at, one in locks.items()),
+        folders=_by_name(folder, files),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
     )
+
+
+def folders(folder: Path) -> dict[str, bool]:
+    """Return the folders with files, by dotted name, and whether each is a Python package."""
+    return _by_name(folder, _files(folder))
+
+
+def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
+    found: dict[str, bool] = {}
+    for file in files:
+        parts = file.relative_to(folder).parts[:-1]
+        for end in range(1, len(parts) + 1):
+            found.setdefault(".".join(parts[:end]), False)
+        if file.name == "__init__.py" and parts:
+            found[".".join(parts)] = True
+    return found
 
 
 def _locks(files: Iterable[Path]) -> dict[Path, lock_file.Lock]:

@@ -16,6 +16,7 @@ from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
 from idlc.disk.settings import pyproject, user_templates
 from idlc.driver.stages import stage
+from idlc.model import ir
 from idlc.scaffold.edits.outcome import Edited, Outcome
 from idlc.scaffold.template_problems import BrokenTemplateError
 from idlc.scaffold.templates import ENDING, Templates, folders
@@ -91,6 +92,11 @@ def generation(project: Project, own: str) -> tuple[str, ...]:
     if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
         return ("gen",)
     return ("gen", project.name, "-o", project.shown(own))
+
+
+def keys_of(project: Project) -> set[str]:
+    """Return the interfaces of a package as `kind/Name.kind`."""
+    return {f"{k}/{name}" for k in ir.KINDS for name in project.names(k) if name.endswith(f".{k}")}
 
 
 def accepted(
