@@ -217,6 +217,7 @@ NO_TYPE_HASHES = Code("IDL624", "no-type-hashes", ERROR, usage=True)
 NO_SUCH_REVISION = Code("IDL630", "no-such-revision", ERROR, usage=True)
 DUPLICATE_PACKAGE = Code("IDL631", "duplicate-package", ERROR, usage=True)
 UNUSABLE_LIBRARY = Code("IDL632", "unusable-library", ERROR)
+INCONSISTENT_INDEX = Code("IDL633", "inconsistent-index", ERROR)
 NO_RCLPY = Code("IDL640", "no-rclpy", ERROR, usage=True)
 EMPTY_GRAPH = Code("IDL641", "empty-graph", ERROR, usage=True)
 

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import os
+import re
 import shutil
 import sys
 import tarfile
@@ -11,9 +12,12 @@ import zipfile
 from email.parser import Parser
 
 import pytest
+from packaging.utils import parse_wheel_filename
 
 from idlc import backend
+from idlc.cli.main import main
 from idlc.disk.machine import environment
+from idlc.native.layouts import LAYOUTS
 from tests.support.programs import ended
 
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
@@ -122,6 +126,14 @@ def test_a_wheel_holds_classes_and_what_ros_installs(source, tmp_path):
         if not name.endswith("/RECORD"):
             digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=")
             assert digests[name] == f"sha256={digest.decode()}"
+
+
+def test_committed_classes_are_compiled_anew(source, tmp_path):
+    wheel = built(tmp_path).read_bytes()
+    assert main(["gen", ".", "-o", "demo_msgs"]) == 0
+    assert built(tmp_path).read_bytes() == wheel
+    (source / "demo_msgs" / "msg" / "_drive.py").write_text("edited\n")
+    assert built(tmp_path).read_bytes() == wheel
 
 
 def test_an_editable_wheel_is_like_any(source, tmp_path):
@@ -307,6 +319,14 @@ REFUSED = {
     ),
     "no TOML": ({"pyproject.toml": BUILD + "[project\n"}, "pyproject.toml:4:9"),
     "a wrong setting": ({"pyproject.toml": BUILD + "[tool.idlc]\nx = 1\n"}, "unknown setting `x`"),
+    "a setting of `idlc gen` alone": (
+        {"pyproject.toml": BUILD + "[tool.idlc]\nvendor-deps = true\n"},
+        "pyproject.toml:5:1",
+    ),
+    "modules that the wheel would not have": (
+        {"demo_msgs/node.py": "print()\n"},
+        "and here is `demo_msgs/node.py`",
+    ),
     "no table": ({"pyproject.toml": "project = 3\n" + BUILD}, "must be a table"),
     "no project name": (project('version = "1"'), "project.name"),
     "a wrong project name": (project('name = "a b"', 'version = "1"'), "IDL611"),
@@ -365,16 +385,55 @@ def test_the_builder_may_be_missing(source, tmp_path, capfd, monkeypatch):
     assert "pip install hatchling" in capfd.readouterr().err
 
 
-def test_without_a_library_a_package_is_not_entered_in_the_index(
-    source, tmp_path, capfd, monkeypatch
+@pytest.mark.parametrize("settings", [None, {"libraries": "no", "distro": "humble"}])
+def test_without_a_library_a_package_is_not_registered(
+    settings, source, tmp_path, capfd, monkeypatch
 ):
-    monkeypatch.setattr(environment, "machine", lambda: "")
-    wheel = built(tmp_path)
+    if settings is None:
+        monkeypatch.setattr(environment, "machine", lambda: "")
+    wheel = built(tmp_path, settings=settings)
     assert wheel.name == "demo_msgs-1.2.3-py3-none-any.whl"
     files, _ = read(wheel)
-    assert not [name for name in files if "/lib/" in name or "/packages/" in name]
-    assert [name for name in files if "/rosidl_interfaces/" in name]
+    data = "demo_msgs-1.2.3.data/data/"
+    kept = {path for path in PREFIX if "/packages/" not in path and "/rosidl_int" not in path}
+    assert {name.removeprefix(data) for name in files if name.startswith(data)} == {
+        path for path in kept if not path.startswith("lib/")
+    }
     assert "recorders stop at packages without a library" in capfd.readouterr().err
+
+
+def test_wheels_that_differ_have_different_names_and_a_platform_tag_of_pypi(source, tmp_path):
+    """They are for one folder: no build replaces a wheel that holds other libraries."""
+    wheels = {}
+    for distro in LAYOUTS:
+        path = built(tmp_path / "dist", settings={"distro": distro})
+        assert wheels.setdefault(path.name, path.read_bytes()) == path.read_bytes()
+    built(tmp_path / "dist", settings={"libraries": "no"})
+    names = {path.name for path in (tmp_path / "dist").iterdir()}
+    assert len(wheels) == 3
+    assert names == {*wheels, "demo_msgs-1.2.3-py3-none-any.whl"}
+    parsed = [parse_wheel_filename(name) for name in sorted(names)]
+    assert sorted(build for _, _, build, _ in parsed) == [(), (), (1, "humble"), (1, "lyrical")]
+    for _, _, _, tags in parsed:
+        (tag,) = tags
+        assert re.fullmatch(r"any|(manylinux_2_17|musllinux_1_1)_x86_64", tag.platform)
+    for name, content in wheels.items():
+        assert (tmp_path / "dist" / name).read_bytes() == content
+
+
+@pytest.mark.parametrize("hook", [backend.build_wheel, backend.build_sdist])
+def test_settings_of_frontends_are_checked(hook, source, tmp_path, capfd):
+    for settings, expected in (
+        ({"distr": "jazzy"}, "did you mean `distro`?"),
+        ({"foo": "bar"}, "the settings are distro, libraries"),
+        ({"--build-option": ["--x"]}, "unknown setting `--build-option`"),
+        ({"libraries": "nope"}, "use yes, no"),
+        ({"libraries": False}, "use yes, no"),
+    ):
+        with pytest.raises(SystemExit):
+            hook(str(tmp_path / "dist"), settings)
+        assert expected in capfd.readouterr().err
+    assert not (tmp_path / "dist").exists()
 
 
 def test_the_distribution_can_be_told(source, tmp_path, capfd):

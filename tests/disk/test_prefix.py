@@ -66,9 +66,26 @@ def test_what_is_right_is_right(said):
 
 
 def test_what_is_not_in_the_index_is_not_looked_for(here, said):
-    (here / "share/ament_index/resource_index/packages/arm").unlink()
+    for kind in ("packages", "rosidl_interfaces"):
+        (here / "share/ament_index/resource_index" / kind / "arm").unlink()
     (here / LIBRARY).unlink()
     assert said() == (0, [])
+
+
+def test_the_index_is_compared_with_what_is_installed(here, capsys):
+    index = here / "share/ament_index/resource_index"
+    for change, expected in (
+        (lambda: (here / "share/arm/srv/Wave.srv").unlink(), "lists `srv/Wave.srv` there"),
+        (lambda: (index / "rosidl_interfaces/arm").write_bytes(b"\xff\n/etc\n" * 99), "`/etc`"),
+        (lambda: (index / "rosidl_interfaces/arm").unlink(), "`ros2 interface` misses them"),
+        (lambda: (index / "rosidl_interfaces/only").write_text("msg/X.msg\n"), "list` fails"),
+        (lambda: (index / "rosidl_interfaces/only").rename(index / "packages/nodes"), ""),
+    ):
+        change()
+        assert main(["check", "--prefix", "prefix"]) == 1
+        printed = capsys.readouterr().out
+        assert "error[IDL633]" in printed
+        assert expected in printed
 
 
 def test_a_missing_library(here, said):

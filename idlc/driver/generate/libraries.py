@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from idlc.disk.machine import environment
-from idlc.disk.machine.distribution import Distribution, distribution
+from idlc.disk.machine.distribution import DEFAULT, Distribution, distribution
 from idlc.driver.stages import stage
 
 if TYPE_CHECKING:
@@ -19,11 +19,13 @@ class Libraries(NamedTuple):
     """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
 
     `missing` says why there are none although the package has interfaces. Such a package must not
-    be entered in the index of ROS 2: recorders stop at it.
+    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel with them
+    has in its name, so that wheels for different distributions have different names.
     """
 
     files: Mapping[str, bytes]
     missing: str = ""
+    build_tag: str = ""
 
 
 def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
@@ -38,7 +40,17 @@ def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
         return Libraries({}, target if model.own and isinstance(target, str) else "")
     with stage("libraries", model.package):
         files = libraries(model, *target)
-    return Libraries({f"lib/{name}": content for name, content in files.items()})
+    placed = {f"lib/{name}": content for name, content in files.items()}
+    return Libraries(placed, build_tag=_build_tag(target[1]))
+
+
+def _build_tag(layout: Layout) -> str:
+    """Return the build tag of wheels with libraries of a layout; empty for the default one."""
+    from idlc.native.layouts import LAYOUTS
+
+    if layout == LAYOUTS[DEFAULT]:
+        return ""
+    return "1" + next(name for name, known in LAYOUTS.items() if known == layout)
 
 
 def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
