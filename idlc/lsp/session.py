@@ -96,10 +96,13 @@ class Session:
             self.workbench.idle()
 
     def prepare(self) -> None:
-        """Import what answers, so that the first time takes no longer than others."""
-        if "workbench" in self.__dict__ and any(True for _ in self.workbench.world.documents):
+        """Import what answers, so that the first time takes no longer than others; look around."""
+        if "workbench" not in self.__dict__ or self.is_shut_down:
+            return
+        if any(True for _ in self.workbench.world.documents):
             for method in METHODS.values():
                 method.prepare()
+        self.workbench.rest()
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
