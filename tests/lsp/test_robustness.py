@@ -1,6 +1,7 @@
 """Whatever a client sends, the server lives on; it ends when the client does."""
 
 import json
+import os
 import random
 import signal
 import subprocess
@@ -218,17 +219,19 @@ def test_a_cancelled_request_is_not_begun(workspace):
     assert "result" in answers[0]
 
 
-def start(*words):
+def start(*words, **variables):
     return subprocess.Popen(
         [sys.executable, *(words or ("-m", "idlc", "lsp"))],
+        env={**os.environ, **variables},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
 
 
-def test_it_ends_with_a_client_that_reads_no_more(workspace):
-    with start() as server:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_it_ends_with_a_client_that_reads_no_more(unbuffered, workspace):
+    with start(PYTHONUNBUFFERED=unbuffered) as server:
         server.stdin.write(frame(beginning(rootUri=workspace.as_uri())))
         server.stdin.flush()
         assert server.stdout.readline()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
@@ -10,7 +11,8 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk.find import InterfaceFile, find
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import KINDS, InterfaceFile, find
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
 from idlc.disk.output.lock_file import FILE
@@ -119,6 +121,22 @@ def completed(
         files = sorted((*one.files, *more), key=lambda each: each.file.key)
         found.append(msgspec.structs.replace(one, files=tuple(files)))
     return [] if found == [*given] else found
+
+
+def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
+    """Return the .idl files of a package that no .msg, .srv or .action file is beside, sorted."""
+    found = []
+    for folder in folders:
+        for kind in KINDS:
+            inside = folder / kind[1:]
+            try:
+                names = {entry.name for entry in os.scandir(inside)}
+            except OSError:
+                continue
+            own = (name for name in names if name.endswith(".idl"))
+            alone = (name for name in own if f"{name.removesuffix('.idl')}{kind}" not in names)
+            found += [f"{kind[1:]}/{name}" for name in alone if not exclude.has(str(inside / name))]
+    return sorted(found)
 
 
 def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:

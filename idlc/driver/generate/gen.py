@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
 from idlc.disk.packages import inputs
-from idlc.disk.packages.requested import borrowed, completed, targets, wanted
+from idlc.disk.packages.requested import borrowed, completed, targets, unread_idl, wanted
 from idlc.disk.scope import Scope
 from idlc.disk.settings.pyproject import Config
 from idlc.driver import named_types
@@ -73,6 +73,8 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
+    whole = {one.package for one in given if one.is_whole or options.ament}.union(words)
+    _note_idl((one for one in given if one.package in whole), options.scope, report)
     found = _targets(given, options, report) if given else ()
     if not found:
         return ()
@@ -83,6 +85,16 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
             enter(found[0])
         return done
+
+
+def _note_idl(given: Iterable[inputs.Inputs], scope: Scope, report: Report) -> None:
+    for one in given:
+        if names := unread_idl(one.folders, scope.exclude):
+            files = first_few((f"`{name}`" for name in names), 3)
+            report.notes.append(
+                f"idlc does not compile .idl files, so `{one.package}` lacks what these define: "
+                f"{files}"
+            )
 
 
 def _targets(
