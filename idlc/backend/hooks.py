@@ -7,6 +7,7 @@ its traceback.
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -73,16 +74,16 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
     here = Path.cwd().resolve()
     outside: set[str] = set()
 
-    def leads_out(path: Path) -> bool:
-        is_outside = not path.resolve().is_relative_to(here)
+    def leads_out(path: str) -> bool:
+        is_outside = not Path(os.path.realpath(path)).is_relative_to(here)  # of circles, too
         if is_outside:
-            outside.add(path.relative_to(here).as_posix())
+            outside.add(Path(os.path.relpath(path, here)).as_posix())
         return is_outside
 
     class Config(SdistBuilderConfig):
         def directory_is_excluded(self, name: str, relative_path: str) -> bool:
             left_out: bool = super().directory_is_excluded(name, relative_path)
-            return left_out or leads_out(here / relative_path / name)
+            return left_out or leads_out(str(here / relative_path / name))
 
     class Builder(SdistBuilder):
         @classmethod
@@ -91,7 +92,7 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 
         def recurse_included_files(self) -> Iterator[IncludedFile]:
             files = super().recurse_included_files()
-            yield from (file for file in files if not leads_out(here / file.path))
+            yield from (file for file in files if not leads_out(file.path))
 
     found, _ = _declared(report), _options(settings, report)
     if found is None or report.had_errors:

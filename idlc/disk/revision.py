@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory, TemporaryFile
+from threading import Timer
 from typing import NamedTuple
 
 import msgspec
@@ -26,6 +27,8 @@ from idlc.disk.read import absolute, reason
 
 #: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
 MOST = 128 << 20
+#: Seconds; how long one answer may take. Settings can include a pipe, names can hold patterns.
+PATIENCE = 120.0
 _HASH = re.compile(rb"[0-9a-f]{40}(?:[0-9a-f]{24})?")
 _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTALL)
 _LINK, _SUBMODULE = b"120000", b"160000"
@@ -52,13 +55,17 @@ _ELSEWHERE = frozenset(
     ).split()
 )
 _HINT = (
-    "idlc fetches nothing: `git fetch --unshallow` completes a shallow clone, "
+    "fetch it first, idlc does not: `git fetch --unshallow` completes a shallow clone, "
     "`git fetch --refetch --no-filter` a partial one"
 )
 
 
 class GitError(Exception):
-    """Git could not answer; the text says why."""
+    """Git could not answer; the text says why, and `hint` is what git says to do."""
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
 
 
 class Revision(NamedTuple):
@@ -122,7 +129,7 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
             submodules = _extract(top, _commit(name, top), root)
         except GitError as error:
             message = f"cannot read `git:{name}`: {one_line(str(error))}"
-            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=hint))
+            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=error.hint or hint))
             revision = None
         else:
             (root / ".git").mkdir(exist_ok=True)  # what is above is not part of the repository
@@ -215,7 +222,12 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
                 command, stdin=asked, stdout=subprocess.PIPE, stderr=said, env=kept | _ENVIRONMENT
             ) as process:
                 assert process.stdout is not None
-                answer = process.stdout.read(MOST + 1)
+                timer = Timer(PATIENCE, process.kill)
+                timer.start()
+                try:
+                    answer = process.stdout.read(MOST + 1)
+                finally:
+                    timer.cancel()
                 if len(answer) > MOST:
                     process.kill()
                     raise GitError(f"more than {MOST >> 20} MiB of files")
@@ -226,7 +238,9 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
     if process.returncode:
         why = otherwise or f"`git {words[0]}` ended with status {process.returncode}"
         fatal = [line for line in lines if line.startswith("fatal: ")]
-        raise GitError(next(iter(fatal + lines), why).removeprefix("fatal: "))
+        said_to_do = next((line.strip() for line in lines if line.startswith("\tgit ")), "")
+        hint = f"`{one_line(said_to_do)}`" if said_to_do else None
+        raise GitError(next(iter(fatal + lines), why).removeprefix("fatal: "), hint)
     return answer
 
 

@@ -195,6 +195,7 @@ def test_a_source_distribution_holds_nothing_from_outside(source, tmp_path, caps
         "kept/again.txt": "here.txt",
         "circle": ".",
         "nowhere": "gone",
+        "loop": "loop",
     }.items():
         (source / name).symlink_to(target)
     with tarfile.open(built(tmp_path, backend.build_sdist)) as sdist:
@@ -205,6 +206,19 @@ def test_a_source_distribution_holds_nothing_from_outside(source, tmp_path, caps
     assert not names & {"NOTICE", "note.txt", "msg/Out.msg"}
     said = capsys.readouterr().err
     assert "left out, because they lead out of the project: `NOTICE`, `action/by`, `extra`" in said
+
+
+def test_hooks_of_hatchling_are_not_run(source, tmp_path):
+    settings = "".join(
+        f'[tool.hatch.{table}.hooks.custom]\npath = "hook.py"\n'
+        for table in ("build", "build.targets.sdist", "build.targets.wheel", "metadata")
+    )
+    mark = f"open({str(tmp_path / 'ran')!r}, 'w')\n"
+    hooks = dict.fromkeys(("hook.py", "hatch_build.py", "setup.py", "hatchling.py"), mark)
+    write(source, {"pyproject.toml": BUILD + settings, **hooks})
+    built(tmp_path / "wheels")
+    built(tmp_path / "sdists", backend.build_sdist)
+    assert not (tmp_path / "ran").exists()
 
 
 def changed(old, new=""):

@@ -222,6 +222,23 @@ def test_any_answer_that_git_owes_is_an_error(alone, monkeypatch, way, capsys):
         assert compare(capsys, *words)[:2] == FAILED, f"call {number}"
 
 
+@NO_SH
+def test_a_git_that_does_not_answer(monkeypatch, capsys):
+    folder = changed("r")
+    monkeypatch.setattr(revision, "PATIENCE", 0.5)
+    os.mkfifo(folder / ".git/pipe")
+    with (folder / ".git/config").open("a") as file:
+        file.write("[include]\npath = pipe\n")
+    assert compare(capsys, "r/p", "--against", "git:HEAD~1")[:2] == FAILED
+
+
+def test_what_git_says_to_do_is_the_hint(monkeypatch, capsys):
+    changed("r")
+    monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
+    assert main(["breaking", "r/p", "--against", "git:HEAD~1"]) == 2
+    assert "hint: `git config --global --add safe.directory " in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("every", ["blob:none", "tree:0", "depth"])
 def test_what_a_clone_lacks_is_an_error_and_is_not_fetched(alone, every, capsys):
     changed("o")
@@ -354,6 +371,16 @@ def test_a_broken_file_is_repaired_and_the_rest_is_compared(stored, capsys):
     assert "IDL201 at git:HEAD:p/msg/A.msg:1: unknown type `int46`" in capsys.readouterr().out
     write("p/msg/A.msg", "int46 a\n")
     assert compare(capsys, "p", "--against", "git:HEAD")[:2] == (1, ["IDL520", "IDL201", "IDL507"])
+    write(
+        "pyproject.toml",
+        """\
+[[tool.idlc.breaking.allow]]
+at = "p/msg/A"
+reason = "it may be needed: nobody knows"
+until = 2999-12-31
+""",
+    )
+    assert "IDL517" not in compare(capsys, "p", "--against", "git:HEAD")[1]
 
 
 @pytest.mark.usefixtures("stored")

@@ -82,9 +82,12 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         # of what was removed, there is something to compare with
         report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
         return None
-    changes = without_allowed(
-        comparison.changes, options.allowed, options.today, options.allowed_in, report
-    )
+    if comparison.left_out:  # for which allowances may be
+        changes = not_allowed(comparison.changes, options, report)
+    else:
+        changes = without_allowed(
+            comparison.changes, options.allowed, options.today, options.allowed_in, report
+        )
     wanted = [change for change in changes if change.levels & set(options.levels)]
     report.extend(change.diagnostic for change in wanted)
     part = None
