@@ -101,8 +101,8 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
     Warns if something else had to be used, or if it is not what the topic's publisher said it is.
     """
     schema, key = topic.schema, ""
-    if schema:
-        key = _key([topic.type, schema.encoding, schema.text])
+    if schema and not schema.is_blank:
+        key = _key([topic.type, schema.encoding, schema.text, topic.hash or ""])
     if not (key and cache.has(key)):
         from idlc.driver.recordings.loading import topic_models
 
