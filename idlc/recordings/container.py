@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Opened = TypeVar("Opened", bound="File")
 DB3 = ".db3"
+#: The encoding of definitions that are .msg files.
+MSG = "ros2msg"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -36,6 +38,11 @@ class Schema:
     name: str
     encoding: str
     text: str
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether it says nothing, as that of a message without fields does."""
+        return not self.text.strip()
 
 
 @dataclass(frozen=True)
@@ -87,7 +94,7 @@ class McapFile(File):
         channel = facts.channels[number]
         found = facts.schemas.get(channel.schema)
         name = full_name(found.name) if found else ""
-        schema = Schema(name, found.encoding, found.text) if found and found.text else None
+        schema = _schema(name, found.encoding, found.text) if found else None
         count = facts.counts.get(number, 0)
         digest = channel.metadata.get("topic_type_hash") or None
         return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
@@ -168,7 +175,7 @@ class Db3File(File):
         self.topics: list[tuple[Topic, int]] = []
         for one in self.database.topics() if read else ():
             name = full_name(one.type)
-            schema = Schema(name, one.schema_encoding, one.text) if one.text.strip() else None
+            schema = _schema(name, one.schema_encoding, one.text)
             topic = Topic(one.name, name, one.messages, one.hash or None, one.encoding, schema)
             self.topics.append((topic, one.id))
 
@@ -216,7 +223,7 @@ class Container(File):
         """Yield each file with messages of a topic, what it calls the topic, and their count."""
         mine: dict[int, dict[int, int]] = {}
         for index, one, number in self._places.get(_key(topic), ()):
-            if one.schema in (topic.schema, None):  # definitions may be left out
+            if one.schema == topic.schema or _is_bare(one):
                 mine.setdefault(index, {})[number] = one.count
         for index, counts in mine.items():
             yield self.files[index], list(counts), sum(counts.values())
@@ -309,6 +316,17 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
+def _schema(name: str, encoding: str, text: str) -> Schema | None:
+    """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
+    schema = Schema(name, encoding, text)
+    return None if schema.is_blank and encoding != MSG else schema
+
+
+def _is_bare(topic: Topic) -> bool:
+    """Return whether a channel has no definition, or an empty one, which others may complete."""
+    return topic.schema is None or topic.schema.is_blank
+
+
 def _key(topic: Topic) -> tuple[str, str, str]:
     """Return what is the same of all channels that may belong to a topic."""
     return topic.name, topic.type, topic.encoding
@@ -331,9 +349,9 @@ def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     for same in found.values():
         by_schema: dict[Schema | None, list[Topic]] = {}
         for topic in same:
-            by_schema.setdefault(topic.schema, []).append(topic)
+            by_schema.setdefault(None if _is_bare(topic) else topic.schema, []).append(topic)
         # without a definition, a channel belongs to each of the others
-        bare = _joined(by_schema.pop(None, []))
+        bare = _joined(sorted(by_schema.pop(None, []), key=lambda one: one.schema is None))
         for mine in by_schema.values() or [[]]:
             yield _joined([*mine, *bare])[0]
 

@@ -102,9 +102,10 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
     Warns if something else had to be used, or if it is not what the topic's publisher said it is.
     """
     schema, key = topic.schema, ""
-    if schema:
+    if schema and not schema.is_blank:
         converts = Scope(include=include).distro.converts_values
-        key = _key([topic.type, schema.encoding, schema.text], converts=converts)
+        texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
+        key = _key(texts, converts=converts)
     if not (key and cache.has(key)):
         from idlc.driver.recordings.loading import topic_models
 

@@ -51,7 +51,7 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
             yield codes.RECORDED_HASH_DIFFERS.of(
                 f"{one.recorded.recording}: topic {topic.name}",
                 f"the definition of `{one.name}` is not that of what was recorded",
-                hint="the recorder found another version of its files than the publisher used",
+                hint="point -I to the files that the publisher used",
                 place=one.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )

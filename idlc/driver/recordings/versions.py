@@ -15,10 +15,13 @@ from idlc.model import ir
 from idlc.model.lowering.file import lower
 from idlc.model.meaning import content
 from idlc.recordings.container import open_recording
-from idlc.recordings.definitions import Recorded, recorded
+from idlc.recordings.definitions import Known, Recorded, recorded
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.find import is_there
 from idlc.syntax.parse import parse_any
+
+#: With so many versions a topic is compared.
+TRIED = 16
 
 
 class Recording(NamedTuple):
@@ -43,7 +46,8 @@ def read(path: str, report: Report) -> Recording | None:
     try:
         with open_recording(path) as container:
             report.notes += container.notes
-            return Recording(path, tuple(recorded(one, path) for one in container.topics))
+            known: Known = {}
+            return Recording(path, tuple(recorded(one, path, known) for one in container.topics))
     except RecordingError as error:
         report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
         return None
@@ -76,27 +80,30 @@ def versions(topics: Iterable[Recorded]) -> list[Version]:
     What differs in comments only is no other definition.
     """
     found: list[Version] = []
-    contents = _Contents()
+    contents = Contents()
+    placed: dict[int, Version] = {}  # topics of one definition share their texts
     for one in topics:
-        for version in found:
-            if contents.agree(one.texts, version.texts):
-                break
-        else:
-            version = Version([], {})
-            found.append(version)
-        version.topics.append(one)
-        if not one.texts.keys() <= version.texts.keys():
-            version.texts = {**one.texts, **version.texts}
+        if id(one.texts) not in placed:
+            # real recordings have few versions; of many, not all are tried
+            some = (each for each in found[-TRIED:] if contents.agree(one.texts, each.texts))
+            version = next(some, None) or Version([], {})
+            if not version.topics:
+                found.append(version)
+            for name, source in one.texts.items():
+                version.texts.setdefault(name, source)
+            placed[id(one.texts)] = version
+        placed[id(one.texts)].topics.append(one)
     return found
 
 
 def contradictions(found: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Source, Source]]:
     """Yield each name that has several definitions, with the first two of them."""
-    contents = _Contents()
+    contents = Contents()
     seen: dict[ir.TypeName, Source] = {}
     told: set[ir.TypeName] = set()
     for version in found:
-        repeated = (pair for topic in version.topics for pair in topic.repeated)
+        every = {id(topic.repeated): topic.repeated for topic in version.topics}
+        repeated = (pair for pairs in every.values() for pair in pairs)
         for name, source in (*version.texts.items(), *repeated):
             first = seen.setdefault(name, source)
             if name not in told and not contents.same(name, first, source):
@@ -104,7 +111,7 @@ def contradictions(found: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Sour
                 yield name, first, source
 
 
-class _Contents:
+class Contents:
     """Compares definitions by what they mean without comments; each is read once."""
 
     def __init__(self) -> None:
@@ -114,7 +121,9 @@ class _Contents:
         self, some: Mapping[ir.TypeName, Source], others: Mapping[ir.TypeName, Source]
     ) -> bool:
         """Return whether no name has different definitions in both."""
-        return all(self.same(name, some[name], others[name]) for name in some.keys() & others)
+        return all(
+            self.same(name, one, others[name]) for name, one in some.items() if name in others
+        )
 
     def same(self, name: ir.TypeName, one: Source, other: Source) -> bool:
         """Return whether two definitions mean the same."""
