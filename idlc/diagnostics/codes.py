@@ -160,6 +160,7 @@ UNDECLARED_IMPORT = Code("IDL459", "undeclared-import", WARNING, PACKAGE)
 STALE_GENERATED_CODE = Code("IDL460", "stale-generated-code", WARNING, PACKAGE)
 NO_LIBRARY_INSTALLED = Code("IDL461", "no-library-installed", WARNING, PACKAGE)
 CLASSES_NOT_INSTALLED = Code("IDL462", "classes-not-installed", WARNING, PACKAGE)
+MISSING_CMAKE_DEPENDENCY = Code("IDL463", "missing-cmake-dependency", WARNING, PACKAGE)
 
 # remarks that silence others
 UNUSED_IGNORE = Code("IDL490", "unused-ignore", WARNING)

@@ -43,7 +43,7 @@ def closest(name: str, known: Iterable[str]) -> str | None:
 
 def package_hint(name: str, known: Iterable[str]) -> str:
     """Return the hint for a package that is nowhere to be found."""
-    near = _closest_package(name, known)
+    near = closest_package(name, known)
     if near is not None:
         return f"did you mean `{near}`?"
     return (
@@ -52,7 +52,7 @@ def package_hint(name: str, known: Iterable[str]) -> str:
     )
 
 
-def _closest_package(name: str, known: Iterable[str]) -> str | None:
+def closest_package(name: str, known: Iterable[str]) -> str | None:
     """Return the package of the nearest name, or `None` if none is near.
 
     Digits are no slips of the pen: `nav2_msgs` is not `nav_msgs`.

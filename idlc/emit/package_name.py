@@ -12,8 +12,8 @@ from idlc.model.names import is_package_name
 _LOADED = frozenset(
     ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
 )
-#: What generated code imports beside the standard library.
-_NEEDED = frozenset(("numpy",))
+#: What generated code, and the nodes and builds that use it, import beside the standard library.
+_NEEDED = frozenset(("idlc", "numpy", "rclpy"))
 
 
 def why_not_package(name: str) -> str:

@@ -281,4 +281,4 @@ def test_checking_a_file_imports_little(tmp_path):
     own = {name for name in found if name.partition(".")[0] == "idlc"}
     assert "idlc.checks.package.manifest" in own
     assert "idlc.scaffold" not in own
-    assert len(own) <= 80, "what a run without problems does not need can wait"
+    assert len(own) <= 82, "what a run without problems does not need can wait"

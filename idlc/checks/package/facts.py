@@ -44,6 +44,7 @@ class Facts(msgspec.Struct, frozen=True):
     modules: Mapping[str, Source]
     setup_py: Source | None = None
     setup_cfg: Source | None = None
+    cmake: Source | None = None
     generates: bool = False
     native: bool = False
     marker: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -342,17 +343,22 @@ def current_output(facts: Facts, _: Model, report: Report) -> None:
     for output in facts.outputs:
         if output.package != facts.name or not facts.whole:
             continue
-        changed = {
-            name
-            for name in output.inputs.keys() | facts.inputs.keys()
+        changed = [
+            f"`{name}` {_changed(output.inputs.get(name), facts.inputs.get(name))}"
+            for name in sorted(output.inputs.keys() | facts.inputs.keys())
             if output.inputs.get(name) != facts.inputs.get(name)
-        }
+        ]
         if changed:
-            listed = first_few((f"`{name}`" for name in sorted(changed)), 3)
+            folder = facts.manifest.path.rpartition("/")[0] or "."
+            words = ("gen", folder, "-o", output.path.rpartition("/")[0])
             report.add(
                 codes.STALE_GENERATED_CODE.of(
                     output.path,
-                    f"the generated code is out of date: {listed} changed",
-                    hint="run idlc gen",
+                    f"the generated code is out of date: {first_few(changed, 3)}",
+                    hint=f"run `idlc {shlex.join(words)}`",
                 )
             )
+
+
+def _changed(before: str | None, now: str | None) -> str:
+    return "was added" if before is None else "was removed" if now is None else "changed"

@@ -59,8 +59,8 @@ def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[E
     if tail is None:
         before, behind = (" ", ",") if comma else (", ", "") if node.elts else ("", ", ")
         return (insertion(source, last, before + ", ".join(new) + behind),)
-    own_lines = [start_of(source, element) for element in node.elts]
-    margins = [indent_of(source, at) for at in own_lines if _begins_line(source, at)]
+    ends = [start_of(source, element) for element in (node.elts[:1] + node.elts[-1:])]
+    margins = [indent_of(source, at) for at in ends if _begins_line(source, at)]
     margin = margins[-1] if margins else bracket + _STEP
     lines = "".join(f"\n{_broken(margin, element)}," for element in new)
     edits = () if comma or not node.elts else (insertion(source, last, ","),)
@@ -74,7 +74,7 @@ def _broken(margin: str, element: str) -> str:
 
 
 def _begins_line(source: Source, at: int) -> bool:
-    return not source.text[:at].splitlines()[-1].strip() if at else True
+    return source.text[:at].endswith(("\n" + indent_of(source, at), "\r" + indent_of(source, at)))
 
 
 def _behind(text: str) -> tuple[int, bool]:

@@ -21,7 +21,7 @@ from idlc.disk.packages.enclosing import declared_name, manifest
 from idlc.disk.packages.names import accept_name, by_home, places, several
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
-from idlc.model import ir
+from idlc.model import catalog, ir
 
 
 def wanted(
@@ -63,8 +63,24 @@ def _from_files(
             name, origins = declared_name(declared, shown(declared), report), ["package.xml"]
         if name is None:
             name, origins = absolute(out).name, ["the folder given with -o"]
+            if catalog.is_standard(name):
+                report.add(
+                    codes.UNIMPORTABLE_PACKAGE.of(
+                        "",
+                        f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
+                        hint=f"choose another folder; add `--package {name}` if they are its files",
+                    )
+                )
             _tell(name, min(homes), out, report)
         found = (inputs.load(name, files, min(homes), report),)
+    if out and any(absolute(str(file.path.parent)) == absolute(out) for file in files):
+        report.add(
+            codes.FOREIGN_FILE.of(
+                out,
+                f"`{out}` holds interface files: generated code would lie among them",
+                hint="choose another folder with -o",
+            )
+        )
     for one, origin in zip(found, origins, strict=True):
         accept_name(one.package, origin, report)
     return found

@@ -87,11 +87,12 @@ def library_around(package: str, project: Project, settings: Settings, report: R
     return Library(settings.include, report, own=own, distro=distro)
 
 
-def generation(project: Project, own: str) -> tuple[str, ...]:
+def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...]:
     """Return the words of the command that compiles the package's interfaces."""
+    included = (word for folder in settings.include for word in ("-I", folder))
     if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
-        return ("gen",)
-    return ("gen", project.name, "-o", project.shown(own))
+        return ("gen", *included)
+    return ("gen", project.name, "-o", project.shown(own), *included)
 
 
 def keys_of(project: Project) -> set[str]:

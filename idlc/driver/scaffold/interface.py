@@ -60,7 +60,7 @@ def interface(
         return None
     edited |= enter_interface.index(model, texts, keys)
     result = write(project, added, edited, settings, report)
-    after = () if CMAKE in texts else generation(project, own)
+    after = () if CMAKE in texts else generation(project, own, settings)
     return result and result._replace(following=after)
 
 

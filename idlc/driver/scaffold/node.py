@@ -50,7 +50,7 @@ def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None
         return None
     missing = not project.has(f"{own}/_idlc")
     compiled = any(one.interface and one.interface.name.package == own for one in planned.endpoints)
-    after = generation(project, own) if missing and compiled else ()
+    after = generation(project, own, settings) if missing and compiled else ()
     notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
     return result._replace(notes=(*notes, *_absent(planned)), following=after)
 
