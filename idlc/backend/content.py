@@ -53,10 +53,15 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     Returns `None` after a problem.
     """
     config = pyproject.load(report)
-    if config.vendor_deps and config.source:
-        message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
-        hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
-        Place(config.source, "tool.idlc", "[tool.idlc]").wrong("vendor-deps", message, report, hint)
+    if config.source:
+        place = Place(config.source, "tool.idlc", "[tool.idlc]")
+        if config.vendor_deps:
+            message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
+            hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
+            place.wrong("vendor-deps", message, report, hint)
+        if config.package not in (None, name):
+            message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
+            place.wrong("package", message, report, "remove `package` from [tool.idlc]")
     settings = scope(config)
     where = msgspec.structs.replace(
         settings, package=None, include=(*settings.include, *_required_prefixes())

@@ -341,6 +341,10 @@ REFUSED = {
         {"demo_msgs/node.py": "print()\n"},
         "and here is `demo_msgs/node.py`",
     ),
+    "another name than in package.xml": (
+        {"pyproject.toml": BUILD + '[tool.idlc]\npackage = "other"\n'},
+        "pyproject.toml:5:1",
+    ),
     "no table": ({"pyproject.toml": "project = 3\n" + BUILD}, "must be a table"),
     "no project name": (project('version = "1"'), "project.name"),
     "a wrong project name": (project('name = "a b"', 'version = "1"'), "IDL611"),

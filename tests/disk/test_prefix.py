@@ -139,6 +139,26 @@ def test_another_distribution(here, said, monkeypatch):
         )
 
 
+def test_the_distribution_that_is_named_is_noticed(here, said, capsys, monkeypatch):
+    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", tuple)
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    generate = ["gen", "arm", "--ament", "prefix"]
+    for words, fits in ((["--distro", "humble"], False), (["--distro", "jazzy"], True)):
+        assert main([*generate, *words]) == 0
+        noted = "prefix` gets libraries for humble, not for jazzy" in capsys.readouterr().err
+        status, found = said()
+        assert (noted, status, bool(found)) == (not fits, int(not fits), not fits)
+    assert main([*generate, "--distro", "lyrical"]) == 0
+    capsys.readouterr()
+    assert main([*generate, "--check"]) == 1
+    printed = "".join(capsys.readouterr())
+    for line in printed.splitlines():
+        if ".so`" in line:
+            assert line.endswith(".so` is out of date: it is for another distribution of ROS 2")
+    assert printed.count(".so` is out of date") == 2
+
+
 def test_colcon_makes_a_prefix_for_each_package(here, said):
     install = here.parent / "install"
     install.mkdir()

@@ -64,7 +64,7 @@ def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
         share = prefix / "share" / name
         missing = [line for line in listed.split() if not is_file(share / line)]
         if missing:
-            files = first_few((f"`{file}`" for file in missing), 3)
+            files = first_few((f"`{file[:80]}`" for file in missing), 3)
             yield name, f"lists {files} there, and not all of it is installed"
     for name in sorted(packages.difference(interfaces)):
         share = prefix / "share" / name

@@ -134,7 +134,11 @@ def _targets(
         (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
         for one in given
     )
-    found = [Overlay(prefix, name, home, report, force=options.force) for name, home in homes]
+    distros = [one.name for one in options.scope.distros]
+    found = [
+        Overlay(prefix, name, home, report, force=options.force, distros=distros)
+        for name, home in homes
+    ]
     return tuple(found) if found[0].usable() else ()
 
 
