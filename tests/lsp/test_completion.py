@@ -3,6 +3,12 @@
 import pytest
 from lsprotocol import types as lsp
 
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.lsp.features import suggestions
+from idlc.model.ir import PRIMITIVES, TypeName
+from idlc.model.lowering.file import lower
+from idlc.syntax.parse import parse
 from tests.support.editor import at
 
 MANIFEST = """\
@@ -118,3 +124,21 @@ def test_a_constant_is_written_as_its_value(typing):
     item = typing("uint8 FAST=2\nuint8 mode |")["FAST"]
     assert item.text_edit.new_text == "2"
     assert "OTHER" not in typing("uint8 OTHER=3\n---\nuint8 mode |", "srv/Stop.srv")
+
+
+@pytest.mark.parametrize(
+    "array", ["", "[]", "[3]", "[12]", "[<=3]", "[0]", "[99999999999999999999]"]
+)
+@pytest.mark.parametrize("base", [*PRIMITIVES, "string", "wstring", "string<=2", "demo/Drive"])
+def test_every_value_that_is_offered_is_one(base, array):
+    for value in suggestions.values(f"{base}{array}"):
+        report = Report()
+        source = Source("A.msg", f"{base}{array} a {value}\n")
+        lower(parse(source), TypeName("demo", "msg", "A"), report)
+        assert not report.had_errors, value
+
+
+def test_an_array_of_a_length_gets_a_value_of_that_length(typing):
+    assert "[0, 0, 0]" in typing("uint8[3] rgb |")
+    assert "[]" not in typing("uint8[3] rgb |")
+    assert typing("uint8[3] RGB=|") == {}
