@@ -88,7 +88,10 @@ class Session:
             return json.dumps(message).encode()
         import msgspec
 
-        return msgspec.json.encode(message)
+        try:
+            return msgspec.json.encode(message)
+        except UnicodeEncodeError:  # words of a client that are no text
+            return json.dumps(msgspec.to_builtins(message)).encode()
 
     def idle(self) -> None:
         """Do what can be done while the client says nothing."""

@@ -7,12 +7,13 @@ import random
 import re
 
 import pytest
+from lsprotocol import types as lsp
 
 from idlc.disk.read import Unsaved
 from idlc.driver.workspace import Wishes, Workspace
 from idlc.lsp.protocol.errors import RequestError
 from tests.editors.scenario import RENAMED, RENAMING, write
-from tests.support.simulated import BEHAVIOURS, Simulated
+from tests.support.simulated import BEHAVIOURS, Server, Simulated
 
 
 @pytest.fixture(params=BEHAVIOURS)
@@ -141,6 +142,65 @@ def test_a_build_file_that_cannot_be_read(client):
     cmake.write_bytes(RENAMING["base/CMakeLists.txt"].encode() + b"# \xff\n")
     with pytest.raises(RequestError, match=r"nothing is renamed: .*CMakeLists\.txt"):
         rename(client)
+
+
+def test_a_rename_says_which_types_get_another_hash(client):
+    """Of all that reach the message, not only of its users."""
+    folder = client.folder
+    (folder / "fleet/msg/Fleet.msg").write_text("Robot[] robots\n")
+    (folder / "fleet/msg/Other.msg").write_text("int8 x\n")
+    edit = client.ask_rename(folder / "base/msg/Pose.msg", 0, 8, "y")
+    if edit.change_annotations:
+        (said,) = (one.description for one in edit.change_annotations.values())
+    else:
+        (said,) = (words[1]["message"] for words in client.server.told if "message" in str(words))
+    # Pose, Track, Robot, Where, Fleet
+    assert "base/msg/Track, fleet/msg/Robot, fleet/srv/Where" in said
+    assert said.endswith("changes the type hash of 5 interfaces")
+
+
+def test_a_rename_among_errors_does_not_claim_to_break_nothing(client):
+    path = client.folder / "base/msg/Pose.msg"
+    client.open(path)
+    client.write(path, RENAMING["base/msg/Pose.msg"] + "flot64 z\n")
+    edit = client.ask_rename(path, 0, 8, "y")
+    said = str(edit.change_annotations or client.server.told)
+    assert "breaks nothing" not in said
+    assert "there are errors" in said
+
+
+REFRESHED = lsp.WorkspaceClientCapabilities(
+    inlay_hint=lsp.InlayHintWorkspaceClientCapabilities(refresh_support=True),
+    code_lens=lsp.CodeLensWorkspaceClientCapabilities(refresh_support=True),
+    semantic_tokens=lsp.SemanticTokensWorkspaceClientCapabilities(refresh_support=True),
+)
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_what_is_shown_is_fresh_after_a_nested_type_changed(tmp_path, is_open):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["vscode"])
+    client.server = Server(folder, capabilities=lsp.ClientCapabilities(workspace=REFRESHED))
+    pose, robot = folder / "base/msg/Pose.msg", folder / "fleet/msg/Robot.msg"
+    client.open(robot)
+
+    def change(path, text):
+        client.server.told.clear()
+        if is_open or path == robot:
+            client.write(path, text)
+        else:
+            path.write_text(text)
+            client.tell_of_changes([path])
+        client.server.rest()
+        return {words[0] for words in client.server.told if words[0].endswith("/refresh")}
+
+    every = {f"workspace/{one}/refresh" for one in ("inlayHint", "codeLens", "semanticTokens")}
+    assert change(pose, "float32 x\n") == every
+    assert change(pose, "float32 x  # [m]\n") == set()  # nothing else looks different
+    assert change(robot, "base/Pose pose\nbase/Pose other\n") == set()  # of which the client knows
+    assert change(pose, "float32 y\n") == every  # another hash
+    assert change(pose, "flot32 y\n") == every
+    assert change(pose, "float32 y\n") == every
 
 
 @pytest.mark.parametrize("seed", range(2))

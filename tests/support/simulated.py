@@ -146,7 +146,7 @@ class Simulated:
                 document = lsp.TextDocumentIdentifier(uri=path.as_uri())
                 params = lsp.DidSaveTextDocumentParams(text_document=document)
                 self.server.tell(lsp.TEXT_DOCUMENT_DID_SAVE, params)
-        self._tell_of_changes(paths)
+        self.tell_of_changes(paths)
 
     def close(self, path: Path) -> None:
         """Drop a buffer."""
@@ -204,7 +204,7 @@ class Simulated:
         if self.behaviour.asks:
             moved = [lsp.FileRename(old_uri=old.as_uri(), new_uri=new.as_uri())]
             self.server.tell(lsp.WORKSPACE_DID_RENAME_FILES, lsp.RenameFilesParams(files=moved))
-        self._tell_of_changes((old, new))
+        self.tell_of_changes((old, new))
 
     def problems(self) -> set[tuple[str, str, int]]:
         """Return file, code and line of the problems that the server has."""
@@ -222,7 +222,8 @@ class Simulated:
         is_cmake = path.name == "CMakeLists.txt"
         return path.suffix in INTERFACES or (is_cmake and self.behaviour.syncs_cmake)
 
-    def _tell_of_changes(self, paths: Iterable[Path]) -> None:
+    def tell_of_changes(self, paths: Iterable[Path]) -> None:
+        """Tell the server which files are others on disk, if the editor watches them."""
         if self.behaviour.watches:
             kinds = lsp.FileChangeType
             changes = [
