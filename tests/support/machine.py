@@ -23,11 +23,12 @@ class Machine:
 
     def __init__(self, folder, code):
         self.folder = folder
+        path = os.pathsep.join(filter(None, (code, os.environ.get("PYTHONPATH"))))
         self.process = subprocess.Popen(
             [sys.executable, str(HERE / "faults.py"), str(folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": code, "AMENT_PREFIX_PATH": ""},
+            env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": path, "AMENT_PREFIX_PATH": ""},
             text=True,
         )
 
