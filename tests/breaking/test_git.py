@@ -11,7 +11,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.disk import revision
 from tests.support.files import write
-from tests.support.repositories import changed, git, instead
+from tests.support.repositories import changed, git, instead, version
 
 
 @pytest.fixture(autouse=True)
@@ -253,6 +253,8 @@ def test_what_a_clone_lacks_is_an_error_and_is_not_fetched(alone, every, capsys)
     assert main(["breaking", "c/p", "--against", "git:HEAD~1"]) == 2
     quoted = capsys.readouterr().out.split("`")
     commands = [one for one in quoted if one.startswith("git fetch")]
+    if every != "depth" and version() < (2, 36):
+        return  # which does not know the command
     git(*commands[every != "depth"].split()[1:], cwd="c")
     assert compare(capsys, "c/p", "--against", "git:HEAD~1")[:2] == BROKEN
 
