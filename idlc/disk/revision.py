@@ -122,6 +122,7 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
     """
     with TemporaryDirectory(prefix="idlc-") as place:
         root = Path(place).resolve()
+        (root / ".git").mkdir()  # what is above is not part of the repository
         hint = None
         try:
             top = _repository(path)
@@ -132,7 +133,6 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
             report.add(codes.NO_SUCH_REVISION.of(path, message, hint=error.hint or hint))
             revision = None
         else:
-            (root / ".git").mkdir(exist_ok=True)  # what is above is not part of the repository
             revision = Revision(name, top, root, submodules)
         yield revision
 

@@ -350,11 +350,15 @@ def test_few_bytes_that_name_endless_files(stored, monkeypatch, capsys):
 def test_trees_that_git_would_not_make(stored, name, alone, capsys):
     blob = git("hash-object", "-w", "--stdin", given=b"int32 a\n").decode().strip()
     inner = tree((b"100644", b"A.msg", blob))
-    whole = tree((b"100644", b"A.msg", blob), (b"40000", name, inner), (b"100644", name, blob))
+    link = git("hash-object", "-w", "--stdin", given=b"A.msg").decode().strip()
+    first, *others = ((b"100644", blob), (b"40000", inner), (b"120000", link))
+    named = [(mode, name, one) for mode, one in (*others, first)]
     before = sorted(alone.parent.rglob("A.msg"))
-    status, codes, _ = compare(capsys, ".", "--against", f"git:{stored(whole)}")
-    assert (status, codes) == FAILED or set(codes) <= {"IDL501", "IDL507"}
-    assert sorted(alone.parent.rglob("A.msg")) == before
+    for entries in (named, *([one] for one in named)):
+        whole = tree((b"100644", b"A.msg", blob), *entries)
+        status, codes, _ = compare(capsys, ".", "--against", f"git:{stored(whole)}")
+        assert (status, codes) == FAILED or set(codes) <= {"IDL501", "IDL502", "IDL507"}
+        assert sorted(alone.parent.rglob("A.msg")) == before
 
 
 def test_a_broken_file_is_repaired_and_the_rest_is_compared(stored, capsys):
