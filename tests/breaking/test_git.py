@@ -361,6 +361,20 @@ def test_trees_that_git_would_not_make(stored, name, alone, capsys):
         assert sorted(alone.parent.rglob("A.msg")) == before
 
 
+@pytest.mark.skipif(os.name == "nt", reason="links need a right of their own")
+def test_a_chain_of_links_costs_what_its_links_do(stored, monkeypatch, capsys):
+    links = (git("hash-object", "-w", "--stdin", given=b"%04d" % at) for at in range(1, 201))
+    entries = [(b"120000", b"%04d" % at, name.decode().strip()) for at, name in enumerate(links)]
+    blob = git("hash-object", "-w", "--stdin", given=b"int32 a\n").decode().strip()
+    inner = tree((b"100644", b"A.msg", blob))
+    name = stored(tree(*entries, (b"40000", b"0200", inner), (b"40000", b"p", inner)))
+    followed = []
+    readlink = os.readlink
+    monkeypatch.setattr(os, "readlink", lambda *a, **b: followed.append(a) or readlink(*a, **b))
+    assert compare(capsys, "p", "--against", f"git:{name}")[0] == 1
+    assert len(followed) < 50 * 41
+
+
 def test_a_broken_file_is_repaired_and_the_rest_is_compared(stored, capsys):
     """The first error is told with its place; both sides may have some."""
     write("p/msg/B.msg", "A a\n")
