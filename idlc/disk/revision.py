@@ -122,6 +122,7 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
     """
     with TemporaryDirectory(prefix="idlc-") as place:
         root = Path(place).resolve()
+        (root / ".git").mkdir()  # what is above is not part of the repository
         hint = None
         try:
             top = _repository(path)
@@ -132,7 +133,6 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
             report.add(codes.NO_SUCH_REVISION.of(path, message, hint=error.hint or hint))
             revision = None
         else:
-            (root / ".git").mkdir(exist_ok=True)  # what is above is not part of the repository
             revision = Revision(name, top, root, submodules)
         yield revision
 
@@ -276,8 +276,9 @@ def _link(root: Path, links: dict[str, bytes]) -> None:
             made.append(target)
     for target in made:
         try:
+            target.stat()  # the system follows a few links only, so that few are resolved
             is_inside = target.resolve().is_relative_to(root)
-        except (OSError, RuntimeError):  # a circle
+        except OSError:
             is_inside = False
         if not is_inside:
             target.unlink()

@@ -1,6 +1,7 @@
 """Repositories of git for tests, and gits that do not answer as they should."""
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -39,3 +40,8 @@ def instead(monkeypatch, folder, script):
     program.write_text(f"#!/bin/sh\nGIT={shlex.quote(GIT)}\n{script}\n", encoding="utf-8")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+
+
+def version():
+    """Return the version of the real git, as numbers."""
+    return tuple(map(int, re.findall(r"\d+", git("--version").decode())[:2]))
