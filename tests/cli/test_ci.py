@@ -13,6 +13,7 @@ import pytest
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 from tests.support.sarif_schema import runs_of
+from tests.support.tools import tool
 
 LOOSE = "float64   speed# [m/s]\n"
 TIDY = "float64 speed  # [m/s]\n"
@@ -47,7 +48,8 @@ def run(*words, **environment):
 
 def git(*words):
     who = ["-c", "user.name=me", "-c", "user.email=me@example.org"]
-    return subprocess.run(["git", *who, *words], check=True, capture_output=True, text=True).stdout  # noqa: S607
+    command = [tool("git"), *who, *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def hooks():

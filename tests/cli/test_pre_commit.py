@@ -10,11 +10,17 @@ import pytest
 
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import clean_environment
+from tests.support.tools import tool
 
 pytestmark = pytest.mark.long  # pre-commit installs idlc, and what builds it, from a package index
 TIDY = "float64 speed  # [m/s]\n"
 LOOSE = "float64   speed# [m/s]\n"
 FILES = ("pyproject.toml", "README.md", "LICENSE", ".pre-commit-hooks.yaml", "action.yml")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _git():
+    tool("git")
 
 
 def run(*words, cwd, home):

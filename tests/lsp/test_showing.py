@@ -11,6 +11,7 @@ from idlc.lsp.protocol.parts import DocumentId, OfDocument
 from idlc.lsp.protocol.token_kinds import TYPES
 from idlc.lsp.workbench import Workbench
 from tests.support.editor import at, between
+from tests.support.tools import tool
 
 STOP = """\
 # Stops the robot.
@@ -23,7 +24,6 @@ uint8 how
 uint8 OK=1
 bool ok
 """
-GIT = shutil.which("git")
 FILES = {"srv/Stop.srv": STOP, "msg/Wheel.msg": "uint8 side\nfloat64 radius\n"}
 
 
@@ -39,7 +39,7 @@ def server(editor, package):
 
 def git(folder, *words):
     who = ("-c", "user.name=test", "-c", "user.email=test@example.org")
-    subprocess.run([GIT, *who, *words], cwd=folder, check=True)
+    subprocess.run([tool("git"), *who, *words], cwd=folder, check=True)
 
 
 @pytest.fixture

@@ -16,9 +16,15 @@ from release.project import FailedError, Project
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import clean_environment, ended, run
+from tests.support.tools import tool
 
 REPOSITORY = "https://github.com/someone/idlc"
 HERE = Project(ROOT)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _git():
+    tool("git")
 
 
 def git(*words, cwd):

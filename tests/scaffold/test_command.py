@@ -17,6 +17,7 @@ from catkin_pkg.package import parse_package
 from idlc.cli.main import main
 from tests.support import refresh
 from tests.support.paths import GOLDEN
+from tests.support.tools import tool
 
 FOLDER = GOLDEN / "scaffold"
 CASES = sorted(path.parent for path in FOLDER.glob("*/commands"))
@@ -117,9 +118,7 @@ def test_a_dry_run_shows_what_patch_would_need(package, capsys):
     assert main([*NODE, "--dry-run"]) == 0
     diff = capsys.readouterr().out
     assert tree(package) == before
-    git = shutil.which("git")
-    assert git
-    subprocess.run([git, "apply", "-"], input=diff, text=True, check=True, cwd=package)
+    subprocess.run([tool("git"), "apply", "-"], input=diff, text=True, check=True, cwd=package)
     patched = tree(package)
     assert patched != before
     assert main(NODE) == 0
@@ -231,6 +230,7 @@ def test_the_wizard_asks_for_the_same(package, monkeypatch):
 
 
 def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
+    tool("git")
     config = tmp_path / "config"
     config.write_text("[user]\n\tname = \"Ada <L> & 'co'\"\n\temail = ada@example.com\n")
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(config))

@@ -13,6 +13,7 @@ PACKAGES = {
     "eu-elflint": "elfutils",
     "g++": "g++",
     "gcc": "gcc",
+    "git": "git",
     "ld": "binutils",
     "nm": "binutils",
     "objcopy": "binutils",
