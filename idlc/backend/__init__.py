@@ -42,9 +42,9 @@ def build_wheel(
 ) -> str:
     """Compile the package in the working folder into a wheel, and return its name.
 
-    The setting `distro` names the distribution of ROS 2 whose C++ tools are to know the package;
-    without it that is the one that is installed here. `libraries=no` makes a wheel for every
-    machine, without libraries for these tools.
+    The setting `distro` names the distribution of ROS 2 that the package is for, and whose C++
+    tools are to know it; without it that is the one that is installed here. `libraries=no` makes
+    a wheel for every machine, without libraries for these tools.
     """
     from idlc.backend.hooks import finished, wheel
 

@@ -22,11 +22,9 @@ from idlc.disk.scope import Scope, scope
 from idlc.disk.settings import pyproject
 from idlc.disk.settings.table import Place
 from idlc.driver.generate.gen import GenOptions, gen
-from idlc.driver.generate.libraries import Libraries, libraries_of
+from idlc.driver.generate.libraries import Libraries, build_tag, libraries_of
 from idlc.driver.generate.share import shared
 from idlc.driver.stages import models_of
-
-NO_LIBRARIES = Libraries({}, "the build was told `libraries=no`")
 
 
 class Options(NamedTuple):
@@ -62,7 +60,7 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
         if config.package not in (None, name):
             message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
             place.wrong("package", message, report, "remove `package` from [tool.idlc]")
-    settings = scope(config)
+    settings = scope(config, distro=options.distribution and options.distribution.name)
     where = msgspec.structs.replace(
         settings, package=None, include=(*settings.include, *_required_prefixes())
     )
@@ -78,7 +76,10 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     if report.had_errors or manifest is None:
         return None
     ((_, model),) = models_of((given,), where, Report())
-    libraries = libraries_of(model, options.distribution) if options.libraries else NO_LIBRARIES
+    if options.libraries:
+        libraries = libraries_of(model, options.distribution)
+    else:
+        libraries = Libraries({}, "the build was told `libraries=no`", build_tag(model))
     return Content(classes, shared(model, manifest, libraries, report), libraries)
 
 

@@ -173,11 +173,12 @@ def test_pip_installs_libraries_and_commands(options, scaffolded, environment, p
 
 def test_a_wheel_is_for_the_machine_whose_library_it_holds(scaffolded, pip, tmp_path):
     package = shutil.copytree(scaffolded, tmp_path / "demo")
-    pip("wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, package)
+    words = ("wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, package)
+    pip(*words, ROS_DISTRO="jazzy")
     (wheel,) = tmp_path.glob("*.whl")
     tag = rf"(manylinux_2_17|musllinux_1_1)_{platform.machine()}"
     assert re.fullmatch(rf"demo-0\.1\.0-py3-none-{tag}\.whl", wheel.name)
-    pip("wheel", *INSTALL[2:], "-w", tmp_path, package, ROS_DISTRO="humble")
+    pip(*words, ROS_DISTRO="humble")
     assert len({*tmp_path.glob("*.whl")}) == 2, "libraries that differ are in wheels that do"
 
 

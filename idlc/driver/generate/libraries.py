@@ -19,8 +19,8 @@ class Libraries(NamedTuple):
     """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
 
     `missing` says why there are none although the package has interfaces. Such a package must not
-    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel with them
-    has in its name, so that wheels for different distributions have different names.
+    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel of the
+    package has in its name, so that wheels for different distributions have different names.
     """
 
     files: Mapping[str, bytes]
@@ -35,22 +35,21 @@ def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
     """
     from idlc.native.library import libraries
 
-    target = target_of(found or distribution())
+    found = found or distribution()
+    target = target_of(found)
     if not model.own or isinstance(target, str):
-        return Libraries({}, target if model.own and isinstance(target, str) else "")
+        missing = target if model.own and isinstance(target, str) else ""
+        return Libraries({}, missing, build_tag(model))
     with stage("libraries", model.package):
         files = libraries(model, *target)
     placed = {f"lib/{name}": content for name, content in files.items()}
-    return Libraries(placed, build_tag=_build_tag(target[1]))
+    return Libraries(placed, build_tag=build_tag(model, found.name))
 
 
-def _build_tag(layout: Layout) -> str:
-    """Return the build tag of wheels with libraries of a layout; empty for the default one."""
-    from idlc.native.layouts import LAYOUTS
-
-    if layout == LAYOUTS[DEFAULT]:
-        return ""
-    return "1" + next(name for name, known in LAYOUTS.items() if known == layout)
+def build_tag(model: Model, *libraries: str) -> str:
+    """Return a wheel's build tag; `libraries` is the distribution that it has libraries for."""
+    names = dict.fromkeys((model.distro.name, *libraries))
+    return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
 
 
 def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
