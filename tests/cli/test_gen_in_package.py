@@ -68,3 +68,23 @@ def test_a_place_that_hides_others_is_refused(out, capsys):
     assert main(["gen", "loose", "-o", out]) != 0
     assert "nothing was written" in capsys.readouterr().err
     assert sorted(path.name for path in Path().rglob("*.py")) == []
+
+
+def test_a_service_needs_both_parts(monkeypatch, capsys):
+    write_all(FILES)
+    monkeypatch.chdir("ws/bot")
+    words = ["scaffold", "interface", "srv", "Sort", "bool a", "bool b"]
+    assert main(words) == 2
+    assert "add `---` before" in capsys.readouterr().err
+    assert main([*words[:5], "---", words[5]]) == 0
+
+
+def test_names_of_packages_are_suggested(capsys):
+    assert main(["scaffold", "package", "Sorter-Arm"]) == 2
+    assert "did you mean `sorter_arm`?" in capsys.readouterr().err
+
+
+def test_hashes_are_those_of_the_first_distribution_that_has_any(capsys):
+    write_all({"pyproject.toml": '[tool.idlc]\ndistro = ["humble", "jazzy"]\n'})
+    assert main(["hash", "std_msgs/msg/Header"]) == 0
+    assert main(["hash", "std_msgs/msg/Header", "--distro", "humble"]) == 2

@@ -228,3 +228,26 @@ def test_a_build_stops_before_it_installs_no_classes(package, tmp_path):
     assert status != 0
     assert "setup() is given `packages` without demo._idlc, " in printed
     assert "demo.msg" in printed
+
+
+HEAD = "from setuptools import setup\n"
+#: What would never end, or grow without bounds, if each name were followed as often as it is used.
+HOSTILE = {
+    "circle": "a = a\nb = c\nc = b\nsetup(name=a, packages=b, data_files=c)\n",
+    "doubled lists": "a0 = ['x']\n"
+    + "".join(f"a{at + 1} = [*a{at}, *a{at}]\n" for at in range(99))
+    + "setup(name='demo', packages=a99, data_files=a99)\n",
+    "doubled texts": "a0 = 'xx'\n"
+    + "".join(f"a{at + 1} = a{at} + a{at}\n" for at in range(99))
+    + "setup(name=a99, packages=[a99])\n",
+    "wide format": "setup(name='%999999999s' % 'a', packages=['{:>999999999}'.format('a')])\n",
+    "deep sum": f"setup(name={' + '.join(['b'] * 500)}, packages=[])\n",
+    "no arguments": "setup()\n",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_what_names_stand_for_has_bounds(name, package, capsys):
+    package(HEAD + HOSTILE[name])
+    assert "Traceback" not in idlc(capsys, "check", "--fix")
+    compile(Path("setup.py").read_text(), "setup.py", "exec")

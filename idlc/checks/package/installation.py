@@ -120,7 +120,7 @@ def _with_data_files(
     edits: tuple[Edit, ...] = ()
     if listed is not None:
         edits = appended(setup.source, listed, new)
-    elif "data_files" not in setup.arguments:
+    elif "data_files" not in setup.arguments and uses_glob:  # one problem adds the argument
         edits = argument(setup, f"data_files=[{', '.join(new)}]")
     text = enumerated([f"`{line}`" for line in new])
     also = ", with `from glob import glob`" if imports else ""

@@ -280,7 +280,8 @@ class Setup:
     def data_files(self) -> tuple[DataFiles, ...] | None:
         """The entries of data_files; `None` if it cannot be seen which there are."""
         if "data_files" not in self.arguments:
-            return () if self.whole else None
+            # setup.cfg or pyproject.toml may say what setup() does not
+            return () if self.whole and "packages" in self.arguments else None
         items = self.items(self.arguments["data_files"])
         if not all(item.is_element for item in items):
             return None

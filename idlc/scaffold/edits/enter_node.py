@@ -76,6 +76,10 @@ def launch(planned: Plan, texts: Mapping[str, str], entry: Entry, templates: Tem
     if planned.once:
         return entry
     node = planned.node
+    manifest = entry.edits.get(MANIFEST)
+    if isinstance(manifest, Edited):  # what launch files import
+        needed = package_xml.add(manifest.text, executes=("launch", "launch_ros"))
+        entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
     started = launch_py.Started(node.package, node.name, node.lifecycle)
     path = next((one for one in texts if one.startswith("launch/")), "")
     if path:

@@ -15,12 +15,17 @@ GROUP = "rosidl_interface_packages"
 
 
 def add(
-    text: str, *, depends: Sequence[str] = (), tests: Sequence[str] = (), group: bool = False
+    text: str,
+    *,
+    depends: Sequence[str] = (),
+    executes: Sequence[str] = (),
+    tests: Sequence[str] = (),
+    group: bool = False,
 ) -> Outcome:
     """Return the file with the dependencies that it lacks.
 
-    `depends` are needed to run, `tests` for testing; with `group` the package says that it has
-    interfaces.
+    `depends` are needed to build and run, `executes` to run, `tests` for testing; with `group` the
+    package says that it has interfaces.
     """
     data = text.encode("utf-8")
     manifest = _manifest(data)
@@ -33,6 +38,8 @@ def add(
     testing = own.union(manifest.texts(*AT_TEST_TIME))
     tag = "run_depend" if manifest.format == "1" else "depend"
     new = [(tag, name) for name in depends if name not in running]
+    execute = "run_depend" if manifest.format == "1" else "exec_depend"
+    new += [(execute, name) for name in executes if name not in {*running, *depends}]
     testing.update(name for _, name in new)
     new += [("test_depend", name) for name in tests if name not in testing]
     if group and manifest.format not in ("1", "2"):
