@@ -110,10 +110,11 @@ def test_files_that_changed_unnoticed(client):
     assert client.text(track) == "# new\n\nPose[] poses\n"
 
 
-def test_a_file_in_two_folders_of_the_workspace(tmp_path):
+@pytest.mark.parametrize("name", BEHAVIOURS)
+def test_a_file_in_two_folders_of_the_workspace(tmp_path, name):
     folder = write(tmp_path.resolve() / "workspace", RENAMING)
     roots = folder, folder / "base", folder / "fleet"
-    client = Simulated(folder, BEHAVIOURS["vscode"], roots)
+    client = Simulated(folder, BEHAVIOURS[name], roots)
     rename(client)
     assert client.files() == RENAMED
 
