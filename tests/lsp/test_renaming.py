@@ -132,6 +132,12 @@ def test_the_same_name_changes_nothing(client):
     assert client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Pose") is None
 
 
+@pytest.mark.parametrize("new", ["", "../X", "Pose/..", "pose", "A b", "Track", "X" * 300])
+def test_names_that_are_refused(client, new):
+    with pytest.raises(RequestError, match=r"such a name|already|no file"):
+        client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, new)
+
+
 def test_names_that_no_message_can_have(asking):
     asking.open(asking.folder / "fleet/msg/Robot.msg")
     asking.move(asking.folder / "base/msg/Pose.msg", asking.folder / "base/msg/pose 2.msg")

@@ -27,6 +27,8 @@ from idlc.model import ir, names
 
 #: The file that lists the interface files of a package.
 BUILD = "CMakeLists.txt"
+#: Letters of the longest name that a file can have on usual disks.
+LONGEST_NAME = 255
 #: Users that a warning names.
 NAMED = 5
 _ANNOTATION = "idlc.rename"
@@ -140,9 +142,11 @@ def _rename_interface(
     """Return the edits for another name of a message, with the renaming of its file."""
     old, new = home.interface.name, asked.new_name
     path = home.state.path_of(home.source)
-    target = path.with_name(f"{new}.{old.kind}")
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
+    target = path.with_name(f"{new}.{old.kind}")
+    if len(target.name) > LONGEST_NAME:
+        raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
     if is_file(target) or world.documents.at(target):
