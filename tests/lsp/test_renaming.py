@@ -110,10 +110,11 @@ def test_files_that_changed_unnoticed(client):
     assert client.text(track) == "# new\n\nPose[] poses\n"
 
 
-def test_a_file_in_two_folders_of_the_workspace(tmp_path):
+@pytest.mark.parametrize("name", BEHAVIOURS)
+def test_a_file_in_two_folders_of_the_workspace(tmp_path, name):
     folder = write(tmp_path.resolve() / "workspace", RENAMING)
     roots = folder, folder / "base", folder / "fleet"
-    client = Simulated(folder, BEHAVIOURS["vscode"], roots)
+    client = Simulated(folder, BEHAVIOURS[name], roots)
     rename(client)
     assert client.files() == RENAMED
 
@@ -129,6 +130,12 @@ def test_an_editor_that_cannot_rename_files(tmp_path):
 
 def test_the_same_name_changes_nothing(client):
     assert client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Pose") is None
+
+
+@pytest.mark.parametrize("new", ["", "../X", "Pose/..", "pose", "A b", "Track", "X" * 300])
+def test_names_that_are_refused(client, new):
+    with pytest.raises(RequestError, match=r"such a name|already|no file"):
+        client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, new)
 
 
 def test_names_that_no_message_can_have(asking):

@@ -27,6 +27,8 @@ from idlc.model import ir, names
 
 #: The file that lists the interface files of a package.
 BUILD = "CMakeLists.txt"
+#: Letters of the longest name that a file can have on usual disks.
+LONGEST_NAME = 255
 #: Users that a warning names.
 NAMED = 5
 _ANNOTATION = "idlc.rename"
@@ -140,9 +142,11 @@ def _rename_interface(
     """Return the edits for another name of a message, with the renaming of its file."""
     old, new = home.interface.name, asked.new_name
     path = home.state.path_of(home.source)
-    target = path.with_name(f"{new}.{old.kind}")
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
+    target = path.with_name(f"{new}.{old.kind}")
+    if len(target.name) > LONGEST_NAME:
+        raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
     if is_file(target) or world.documents.at(target):
@@ -155,15 +159,11 @@ def _rename_interface(
     edits = _edits_of_users(old, new, path, report, world)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    here = world.path(asked.text_document.uri)
-    after = [
-        Edit(_last(span), new)
-        for state, span in users(old, world)
-        if state.path_of(span.source) == here
-    ]
-    world.renaming = Renaming(
-        path, target, asked.text_document.uri, apply(asking.source.text, after)[0]
-    )
+    uri = asked.text_document.uri
+    here = world.path(uri)
+    spans = (_last(one) for state, one in users(old, world) if state.path_of(one.source) == here)
+    own = dict.fromkeys(Edit(Span(asking.source, one.start, one.end), new) for one in spans)
+    world.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
     move = Move(world.uri(path), uris.from_path(target))
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
     changes = [called(home.interface, renamed)]
@@ -183,7 +183,7 @@ def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
     for one in asked.files:
         old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
         known = world.known(one.old_uri)
-        if not (old and new and known and is_other_name(old, new)):
+        if not (old and new and known and _is_other_name(old, new)):
             continue
         is_own = world.renaming is not None and _is_under_way(world.renaming, old, new, world)
         found = _edits_of_users(known.interface.name, new.stem, old, report, world)
@@ -197,7 +197,7 @@ def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
     return of_documents(edits, world) if edits else None
 
 
-def is_other_name(old: Path, new: Path) -> bool:
+def _is_other_name(old: Path, new: Path) -> bool:
     """Return whether a file gets another name by which an interface can be called."""
     is_valid = names.is_message_name(new.stem)
     return is_valid and old.parent == new.parent and old.suffix == new.suffix
