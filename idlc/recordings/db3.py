@@ -96,7 +96,7 @@ class Db3:
         """Turn what SQLite finds wrong into an error about the recording."""
         try:
             yield
-        except (sqlite3.Error, OverflowError, UnicodeError) as error:
+        except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
             raise self._error(str(error)) from None
 
     def _error(self, what: str) -> RecordingError:
@@ -119,8 +119,8 @@ class Db3:
         """Yield what a query finds; the file is locked until it is exhausted or closed."""
         with self.errors(), closing(self._db.execute(query, values)) as found:
             yield from found
-        if self._lone:
-            self._check_unchanged()
+            if self._lone:
+                self._check_unchanged()
 
     def _check_unchanged(self) -> None:
         """Raise RecordingError if somebody wrote to a file that was read without a lock."""

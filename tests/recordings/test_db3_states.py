@@ -225,6 +225,9 @@ def test_a_log_that_is_written_back_meanwhile_is_an_error(tmp_path, monkeypatch)
         os.utime(path, (1, 1))
         with pytest.raises(RecordingError, match="was changed while it was read"):
             recording["/x"].to_columns()
+        path.unlink()
+        with pytest.raises(RecordingError, match="No such file"):
+            recording["/x"].to_columns()
 
 
 @pytest.mark.parametrize("journal", JOURNALS)

@@ -51,7 +51,8 @@ def _facts(one: Recorded, compiled: str | None, around: Around) -> TopicFacts:
     here = "unknown"
     if known and hash_:
         here = "same" if known == hash_ else "differs"
-    definition = topic.schema.encoding or "unknown" if topic.schema else None
+    schema = None if topic.schema and topic.schema.is_blank and not compiled else topic.schema
+    definition = schema.encoding or "unknown" if schema else None
     return TopicFacts(topic.name, topic.type, topic.count, hash_, here, definition)
 
 

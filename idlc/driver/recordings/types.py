@@ -42,7 +42,8 @@ class Around:
     """The types that are known here without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
-        self.library = Library(scope.include, report, own=nearby.near(), distro=scope.distro)
+        self.near = nearby.near()
+        self.library = Library(scope.include, report, own=self.near, distro=scope.distro)
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
 
@@ -106,7 +107,7 @@ class RecordedTypes:
         texts = {name: one for name, one in version.texts.items() if name not in broken}
         texts |= _empty_ones(version.topics, texts, around)
         self.library = Library(
-            scope.include, Report(), own=nearby.near(), distro=scope.distro, texts=texts
+            scope.include, Report(), own=around.near, distro=scope.distro, texts=texts
         )
         self.topics = tuple(_typed(version.topics, texts, around, report))
         self._compiler = Compiler(self.library)
@@ -127,13 +128,13 @@ class RecordedTypes:
         return found
 
     def _doubts(self) -> Iterator[Diagnostic]:
-        """Yield IDL652 for definitions that are not the recording's.
+        """Yield IDL652 or IDL654 for definitions that are not the recording's.
 
         If none is there, and the recorded hash confirms the other, nothing is to be said.
         """
         doubtful: dict[tuple[str, str, bool], set[ir.TypeName]] = {}
         for one in self.topics:
-            missing = self.names_of(one) - self.texts.keys()
+            missing = {name for name in self.names_of(one) if name not in self.texts}
             sure = bool(missing) and one.recorded.topic.hash == self.hash(one)
             for name in missing:
                 why = self._broken.get(name, ABSENT)
@@ -142,7 +143,8 @@ class RecordedTypes:
         for (recording, why, sure), found in doubtful.items():
             names = first_few((f"`{name}`" for name in sorted(found)), NAMED)
             which = "has the recorded hash and" if sure else "by that name"
-            yield codes.MISSING_DEFINITION.of(
+            code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
+            yield code.of(
                 recording,
                 f"{why} {names}; what is known here {which} is used",
                 hint=None if sure else BORROWED,
@@ -233,7 +235,7 @@ def _empty_ones(
 ) -> Iterator[tuple[ir.TypeName, Source]]:
     """Yield the messages whose definitions are empty because they are.
 
-    Their hashes say so, or where none was recorded, their encoding or what is known here.
+    Their hashes say so, or where none was recorded, what is known here or their encoding.
     """
     for topic in topics:
         name, recorded = topic.interface, topic.topic.hash
@@ -241,7 +243,7 @@ def _empty_ones(
             continue
         empty = Describer({name: ir.Message(name=name)}).hash(str(name))
         said = empty if topic.topic.schema and topic.topic.schema.is_blank else None
-        if (recorded or said or around.hash(name, name)) == empty:
+        if (recorded or around.hash(name, name) or said) == empty:
             path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
             yield name, Source(path, "", topic.recording)
 
