@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +15,9 @@ from idlc.recordings import bag
 from idlc.recordings.compression import ZSTD_MAGIC
 from idlc.recordings.db3 import MAGIC as DB3_MAGIC
 from idlc.recordings.db3 import Db3, Rows
+from idlc.recordings.encapsulation import CDR, Unread, unread
 from idlc.recordings.errors import RecordingError, of_file
-from idlc.recordings.mcap import McapFacts, read_facts
+from idlc.recordings.mcap import McapFacts, first_messages, read_facts
 from idlc.recordings.mcap_records import INDEX_OFFSET, Chunk
 from idlc.recordings.mcap_records import MAGIC as MCAP_MAGIC
 from idlc.recordings.source import first_bytes, is_local, source_of
@@ -104,6 +106,10 @@ class McapFile(File):
         """When the first message came."""
         return self.facts.start
 
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield channels with how their first messages begin."""
+        return first_messages(self.source, self.facts, self.facts.channels)
+
     def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
         """Return where messages of some channels may be, with no more indexes than of these."""
         from idlc.recordings.mcap_messages import may_have
@@ -184,6 +190,10 @@ class Db3File(File):
         """When the first message came."""
         return self.database.start()
 
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield topics with how their first messages begin."""
+        return self.database.first_messages()
+
     def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
         """Return where messages of some topics may be."""
         return self.database.rows_of_messages()
@@ -238,6 +248,18 @@ class Container(File):
             if window == (None, None):
                 with of_file(file.name):
                     check_count(topic.name, told, found)
+
+    def unread(self) -> list[Unread]:
+        """Return which topics cannot be read, by the first message of each."""
+        found: dict[Unread, None] = {}
+        for file in self.files:
+            names = {number: one.name for one, number in file.topics if one.encoding == CDR}
+            with suppress(RecordingError):  # reading the messages says what is wrong
+                for number, start in file.first_messages():
+                    why = unread(names[number], start) if number in names else None
+                    if why:
+                        found[why] = None
+        return list(found)
 
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""

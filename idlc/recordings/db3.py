@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from idlc.recordings.encapsulation import START
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.source import first_bytes
 
@@ -176,6 +177,14 @@ class Db3:
             definition = (digest or other, schema_encoding, text, counts.get(number, 0))
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics
+
+    def first_messages(self) -> Iterator[tuple[Any, bytes]]:
+        """Yield topics with how their first messages begin; few pages of large ones are read."""
+        query = "SELECT topic_id, MIN(rowid) FROM messages NOT INDEXED GROUP BY topic_id"
+        for topic, row in list(self.rows(query)):
+            for (data,) in self.rows("SELECT data FROM messages WHERE rowid = ?", (row,)):
+                if isinstance(data, bytes):
+                    yield topic, data[:START]
 
     def rows_of_messages(self) -> list[Rows]:
         """Return the rows that there are, in one piece; none if there are no messages."""

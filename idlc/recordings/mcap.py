@@ -7,16 +7,19 @@ out. It is believed only if it accounts for all that its own statistics count.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from idlc.recordings import mcap_records as mcap
 from idlc.recordings.compression import Room, decompress
+from idlc.recordings.encapsulation import START
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.mcap_records import HEAD, MAGIC, Channel, Chunk, McapSchema
 from idlc.recordings.source import Source
 
 END_OF_TIME = (1 << 64) - 1
+#: Bytes of a Message record before the message itself.
+MESSAGE_HEAD = 22
 
 
 @dataclass
@@ -60,6 +63,49 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> McapF
         except RecordingError as error:
             reason = error.message
     return _walk(source, reason, index)
+
+
+def first_messages(
+    source: Source, facts: McapFacts, channels: Collection[int]
+) -> Iterator[tuple[int, bytes]]:
+    """Yield channels with how their first messages begin; each chunk is opened at most once."""
+    waiting = {one for one in channels if facts.counts.get(one)}
+    room = Room(source.size)
+    for chunk in facts.chunks:
+        named = {channel for channel, _ in mcap.INDEX_OFFSET.iter_unpack(chunk.indexes or b"")}
+        mine = waiting if chunk.indexes is None else waiting & named
+        if not mine:
+            continue
+        for data, _ in zip(_contents(source, chunk, room), room.each(), strict=False):
+            number = int.from_bytes(data[:2], "little")
+            if number in mine:
+                yield number, bytes(data[MESSAGE_HEAD:])
+                mine.remove(number)
+                waiting.discard(number)
+                if not mine:
+                    break
+
+
+def _contents(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
+    """Yield how each message of a chunk, or of a stretch outside of any, begins."""
+    most = MESSAGE_HEAD + START
+    if chunk.compression is None:
+        for op, at, size in mcap.heads(source, chunk.at, chunk.at + chunk.size):
+            if op == mcap.MESSAGE_OP:
+                yield source.view(at + HEAD.size, min(size - HEAD.size, most))
+        return
+    for op, _, data in mcap.records(_content(source, chunk, room)):
+        if op == mcap.MESSAGE_OP:
+            yield data[:most]
+
+
+def _content(source: Source, chunk: Chunk, room: Room) -> memoryview:
+    """Return the records of a chunk."""
+    head = mcap.chunk_head(source, chunk.at, chunk.size)
+    room.take(head.size)
+    target = memoryview(bytearray(head.size))
+    decompress(source.view(head.start, head.stored), head.compression, target)
+    return target
 
 
 class ContradictionError(RecordingError):
@@ -221,11 +267,8 @@ class _Walk:
 
     def open(self, chunk: Chunk, counting: bool) -> None:
         """Take note of what stands in a chunk."""
-        head = mcap.chunk_head(self.source, chunk.at, chunk.size)
-        self.room.take(head.size)
-        target = memoryview(bytearray(head.size))
-        decompress(self.source.view(head.start, head.stored), head.compression, target)
-        for (op, _, data), _ in zip(mcap.records(target), self.room.each(), strict=False):
+        content = _content(self.source, chunk, self.room)
+        for (op, _, data), _ in zip(mcap.records(content), self.room.each(), strict=False):
             self.facts.add(op, data)
             if counting and op == mcap.MESSAGE_OP:
                 self.count_one(data)

@@ -32,7 +32,8 @@ class TopicFacts(NamedTuple):
 
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
-    recording = read(path, report)
+    recording = read(path, report, look=True)
+    report.notes += [one.message for one in recording.unread] if recording else []
     around = Around(scope, report)
     found = []
     for version in versions(recording.topics) if recording else ():

@@ -16,6 +16,7 @@ from idlc.model.lowering.file import lower
 from idlc.model.meaning import content
 from idlc.recordings.container import open_recording
 from idlc.recordings.definitions import Known, Recorded, recorded
+from idlc.recordings.encapsulation import Unread
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.find import is_there
 from idlc.syntax.parse import parse_any
@@ -29,6 +30,7 @@ class Recording(NamedTuple):
 
     path: str
     topics: tuple[Recorded, ...]
+    unread: tuple[Unread, ...] = ()
 
 
 class Version(msgspec.Struct):
@@ -38,8 +40,11 @@ class Version(msgspec.Struct):
     texts: dict[ir.TypeName, Source]
 
 
-def read(path: str, report: Report) -> Recording | None:
-    """Return what is in a recording; report IDL651 and return `None` for one that is none."""
+def read(path: str, report: Report, *, look: bool = False) -> Recording | None:
+    """Return what is in a recording; report IDL651 and return `None` for one that is none.
+
+    With `look`, it says which topics cannot be read.
+    """
     if not is_there(path):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
         return None
@@ -47,7 +52,8 @@ def read(path: str, report: Report) -> Recording | None:
         with open_recording(path) as container:
             report.notes += container.notes
             known: Known = {}
-            return Recording(path, tuple(recorded(one, path, known) for one in container.topics))
+            topics = tuple(recorded(one, path, known) for one in container.topics)
+            return Recording(path, topics, tuple(container.unread()) if look else ())
     except RecordingError as error:
         report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
         return None
