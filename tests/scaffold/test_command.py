@@ -5,6 +5,7 @@ golden/scaffold that match, and fails, so that the changes are looked at.
 """
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -321,3 +322,69 @@ def test_the_next_command_is_one_that_works(package, capsys, monkeypatch, tmp_pa
     (tools / "idlc").unlink()
     assert main(["scaffold", "interface", "msg", "Third", "float32 speed"]) == 0
     assert "-m idlc gen . -o demo\n" in capsys.readouterr().out
+
+
+CHOICES = {
+    "--maintainer": ("Lena & K", "maintainer="),
+    "--email": ("lena@example.com", "maintainer_email="),
+    "--description": ("Sorts 'parcels' & <letters>", "description="),
+    "--license": ("MIT", "license="),
+}
+
+
+@pytest.mark.parametrize("option", CHOICES)
+def test_what_an_existing_package_says_otherwise_is_reported(option, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "demo"]
+    assert main(words) == 0
+    before = tree(tmp_path)
+    capsys.readouterr()
+    value, argument = CHOICES[option]
+    assert main([*words, option, value]) == 1
+    assert tree(tmp_path) == before
+    said = capsys.readouterr().err
+    assert "nothing was written" in said
+    # what the hints say is all there is to do
+    for file, start in (("package.xml", "<"), ("setup.py", argument)):
+        (line,) = re.findall(rf"demo/{file}:(\d+):", said)
+        (new,) = re.findall(rf"write `({start}.*)`$", said, re.MULTILINE)
+        lines = before[f"demo/{file}"].splitlines()
+        lines[int(line) - 1] = f"  {new}" + "," * (file == "setup.py")
+        (tmp_path / "demo" / file).write_text("\n".join(lines) + "\n")
+    if option == "--license":
+        (tmp_path / "demo/LICENSE").unlink()
+    assert main([*words, option, value]) == 0
+    parse_package(tmp_path / "demo").validate()
+
+
+def test_choices_that_setup_py_computes_are_left_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "demo"]
+    assert main([*words, "--maintainer", "Bo"]) == 0
+    setup = tmp_path / "demo/setup.py"
+    setup.write_text(setup.read_text().replace("maintainer='Bo'", "maintainer=name()"))
+    assert main([*words, "--maintainer", "Bo"]) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
+def test_a_package_of_another_kind_is_left_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    before = tree(tmp_path)
+    assert main(["scaffold", "package", "demo", "--interfaces"]) == 1
+    assert "the build type is `ament_python` here" in capsys.readouterr().err
+    assert tree(tmp_path) == before
+
+
+def test_interfaces_for_a_package_that_has_others_are_reported(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "--interfaces", "demo_msgs", "Drive"]
+    assert main(words) == 0
+    assert main(words) == 0
+    assert main([*words, "srv/Ask"]) == 1
+    said = capsys.readouterr().err
+    commands = re.search("run `cd (.*)`, then `idlc (.*)`", said)
+    monkeypatch.chdir(commands[1])
+    assert main(shlex.split(commands[2])) == 0
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "srv/Ask"]) == 0
