@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shlex
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 
 def edit_distance(left: str, right: str) -> int:
@@ -47,9 +50,29 @@ def package_hint(name: str, known: Iterable[str]) -> str:
     if near is not None:
         return f"did you mean `{near}`?"
     return (
-        f"`{name}` is not built in; add `-I DIR` with the folder of its sources, "
+        f"`{name}` is not built in; {including('DIR')} with the folder of its sources, "
         "or source the ROS 2 workspace that has it"
     )
+
+
+_IN_BUILD: ContextVar[bool] = ContextVar("in_build", default=False)
+
+
+@contextmanager
+def building() -> Iterator[None]:
+    """Let hints within speak to someone who builds a package and types no options of idlc."""
+    before = _IN_BUILD.set(True)
+    try:
+        yield
+    finally:
+        _IN_BUILD.reset(before)
+
+
+def including(folder: str) -> str:
+    """Return the advice to look for packages in a folder, too."""
+    if _IN_BUILD.get():
+        return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
+    return f"add `-I {shlex.quote(folder)}`"
 
 
 def closest_package(name: str, known: Iterable[str]) -> str | None:

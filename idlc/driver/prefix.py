@@ -51,6 +51,10 @@ def check_prefix(folder: str, report: Report) -> Checked:
             if why:
                 message = f"`{name}` {why}: C++ tools fail at the types of `{one.package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
+    if found and not files and not len(report):
+        message = f"no package with interfaces is registered in `{folder}`"
+        hint = "build one with idlc, or name the prefix in which it is installed"
+        report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
     return Checked(tuple(files), len(files))
 
 

@@ -15,6 +15,7 @@ import pytest
 from packaging.utils import parse_wheel_filename
 
 from idlc import backend
+from idlc.build import compile_interfaces
 from idlc.cli.main import main
 from idlc.disk.machine import environment
 from idlc.native.layouts import LAYOUTS
@@ -499,3 +500,26 @@ def test_a_package_may_refer_to_others_and_leave_files_out(source, tmp_path):
     ]
     assert b"from base_msgs.msg import Base" in files["demo_msgs/msg/_drive.py"]
     assert not any(name.startswith("base_msgs/") for name in files)
+
+
+@pytest.mark.parametrize("package", ["far_msgs", "near_msgs"])
+@pytest.mark.parametrize("build", [built, lambda _: compile_interfaces("demo_msgs")])
+def test_a_build_says_where_to_name_folders_of_packages(
+    build, package, source, tmp_path, capfd, monkeypatch
+):
+    write(tmp_path / "near_msgs", {"package.xml": "<package/>", "msg/A.msg": "bool a\n"})
+    write(source, {"msg/Drive.msg": f"{package}/A a\n", "setup.py": ""})
+    monkeypatch.setattr("sys.argv", ["setup.py", "build"])
+    with pytest.raises(SystemExit):
+        build(tmp_path / "dist")
+    said = capfd.readouterr().err
+    assert "IDL202" in said
+    assert "-I " not in said
+    (folder,) = re.findall(r"add `(.*)` to `include` in \[tool.idlc\] of pyproject.toml", said)
+    if package == "near_msgs":
+        with (source / "pyproject.toml").open("a") as file:
+            file.write(f"[tool.idlc]\ninclude = ['{folder}']\n")
+        built(tmp_path / "dist")
+    # a run from a shell has options
+    main(["check", "--package", "demo_msgs", "."])
+    assert "of pyproject.toml" not in capfd.readouterr().out

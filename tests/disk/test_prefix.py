@@ -69,7 +69,7 @@ def test_what_is_not_in_the_index_is_not_looked_for(here, said):
     for kind in ("packages", "rosidl_interfaces"):
         (here / "share/ament_index/resource_index" / kind / "arm").unlink()
     (here / LIBRARY).unlink()
-    assert said() == (0, [])
+    assert said() == (2, [])
 
 
 def test_the_index_is_compared_with_what_is_installed(here, capsys):
@@ -191,3 +191,14 @@ def test_hostile_files_are_read_without_harm(here):
             at = chance.choice((chance.randrange(64), chance.randrange(table, len(data))))
             data[at] = chance.choice((0, 1, 0x7F, 0xFF, chance.randrange(256)))
         inspect(bytes(data))
+
+
+def test_a_prefix_without_interfaces_is_not_a_success(here, capsys):
+    bare = here.parent / "install/bare/share/ament_index/resource_index/packages"
+    bare.mkdir(parents=True)
+    (bare / "bare").touch()
+    for folder in ("install", "install/bare"):
+        assert main(["check", "--prefix", folder]) != 0
+        assert f"no package with interfaces is registered in `{folder}`" in capsys.readouterr().out
+    shutil.copytree(here, here.parent / "install/arm")
+    assert main(["check", "--prefix", "install"]) == 0

@@ -388,3 +388,12 @@ def test_interfaces_for_a_package_that_has_others_are_reported(tmp_path, monkeyp
     assert main(shlex.split(commands[2])) == 0
     monkeypatch.chdir(tmp_path)
     assert main([*words, "srv/Ask"]) == 0
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_comes_next_installs_pytest_if_need_be(is_there, package, capsys, monkeypatch):
+    name = "idlc.cli.commands.scaffold_node.find_spec"
+    monkeypatch.setattr(name, lambda name: object() if is_there or name != "pytest" else None)
+    assert main(NODE) == 0
+    hints = re.findall("next: .* -m (.*)", capsys.readouterr().out)
+    assert hints == [*(() if is_there else ["pip install pytest"]), "pytest test/test_talker.py"]
