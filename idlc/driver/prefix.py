@@ -25,7 +25,7 @@ from idlc.native.library import FIELDS_CPP, MACHINES, OWN, symbol, told
 if TYPE_CHECKING:
     from idlc.model.link import Model
 
-_AGAIN = "build the package again, with idlc installed, or run `idlc gen --ament` again"
+_AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
 
 
 def check_prefix(folder: str, report: Report) -> Checked:

@@ -88,3 +88,47 @@ def test_hashes_are_those_of_the_first_distribution_that_has_any(capsys):
     write_all({"pyproject.toml": '[tool.idlc]\ndistro = ["humble", "jazzy"]\n'})
     assert main(["hash", "std_msgs/msg/Header"]) == 0
     assert main(["hash", "std_msgs/msg/Header", "--distro", "humble"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ("ws/bot", []),
+        ("ws", ["bot/msg", "-o", "an out"]),
+        ("ws", ["bot", "--exclude", "B.msg", "--distro", "humble", "-o", "out"]),
+        ("ws", ["-o", "out", "--package", "other", "--", "-odd"]),
+        ("ws", ["bot", "--ament", "prefix"]),
+        ("ws/set", []),
+    ],
+)
+def test_the_hint_at_a_difference_is_a_command(place, words, monkeypatch, capsys):
+    settings = '[tool.idlc]\npaths = ["msg"]\nout = "set"\n'
+    write_all(
+        {
+            **FILES,
+            "ws/-odd/A.msg": "bool a\n",
+            "ws/set/pyproject.toml": settings,
+            "ws/set/msg/A.msg": "bool a\n",
+        }
+    )
+    monkeypatch.chdir(place)
+    check = ["gen", "--check", *words]
+
+    def hints():
+        capsys.readouterr()
+        assert main(check) == 1
+        return {*re.findall(r"hint: (?:run )?`idlc (.*?)`", capsys.readouterr().err)}
+
+    (hint,) = hints()
+    assert main(shlex.split(hint)) == 0
+    assert main(check) == 0
+    for file in Path().rglob("*.msg"):
+        file.write_text("bool b\n")
+    (hint,) = hints()
+    assert main(shlex.split(hint)) == 0
+    (edited, *_) = [file for file in Path().rglob("__init__.py") if "msg" in file.parts]
+    edited.write_text("")
+    (hint,) = hints()
+    assert hint.endswith(" --force")
+    assert main(shlex.split(hint)) == 0
+    assert main(check) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -80,7 +81,9 @@ def command(style: str, watch: bool, **given: Any) -> int:
         return output.status(report)
     package = given["package"]
     words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
-    wanted = in_package(with_settings(GenOptions(**given, scope=scope(settings, *words)), settings))
+    again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
+    asked = GenOptions(**given, scope=scope(settings, *words), again=again)
+    wanted = in_package(with_settings(asked, settings))
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")

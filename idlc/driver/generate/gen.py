@@ -29,7 +29,8 @@ from idlc.syntax.tree import OPTIONAL
 class GenOptions(NamedTuple):
     """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both.
 
-    `topics` are those of recordings whose types are wanted; none means all.
+    `topics` are those of recordings whose types are wanted; none means all. `again` is the command
+    that writes what `check` compares, for hints.
     """
 
     paths: tuple[str, ...]
@@ -40,6 +41,7 @@ class GenOptions(NamedTuple):
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
+    again: str = "idlc gen"
 
 
 def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
@@ -182,7 +184,7 @@ def _made(
         ]
         if all(current):
             done = [one for each in current for one in each]
-            return with_needs(done, wanted, library.distro, report)
+            return with_needs(done, wanted, library.distro, report, options.again)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -195,11 +197,11 @@ def _made(
         )
     if options.check:
         for one in packages:
-            one.target.drift(one.plan, one.lock)
+            one.target.drift(one.plan, one.lock, options.again)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     targets = wanted if packages else ()
-    return with_needs(map(generated, packages), targets, library.distro, report)
+    return with_needs(map(generated, packages), targets, library.distro, report, options.again)
 
 
 def _may_be_refused(given: Iterable[inputs.Inputs], distro: Distro) -> bool:
