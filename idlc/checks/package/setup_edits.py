@@ -16,9 +16,9 @@ from idlc.checks.package.setup_py import Setup
 from idlc.diagnostics.report import Edit
 from idlc.diagnostics.source import Source, Span
 
-_STEP = "    "
+STEP = "    "
 #: The widest line that the linters of ROS 2 accept.
-_WIDTH = 99
+WIDTH = 99
 
 
 def insertion(source: Source, at: int, text: str) -> Edit:
@@ -61,7 +61,7 @@ def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[E
         return (insertion(source, last, before + ", ".join(new) + behind),)
     ends = [start_of(source, element) for element in (node.elts[:1] + node.elts[-1:])]
     margins = [indent_of(source, at) for at in ends if _begins_line(source, at)]
-    margin = margins[-1] if margins else bracket + _STEP
+    margin = margins[-1] if margins else bracket + STEP
     lines = "".join(f"\n{_broken(margin, element)}," for element in new)
     edits = () if comma or not node.elts else (insertion(source, last, ","),)
     return (*edits, insertion(source, last + tail.start(), lines))
@@ -70,7 +70,7 @@ def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[E
 def _broken(margin: str, element: str) -> str:
     """Return an element on a line of its own, on two if it is long."""
     line = margin + element
-    return line if len(line) < _WIDTH else line.replace(", ", f",\n{margin}{_STEP}", 1)
+    return line if len(line) < WIDTH else line.replace(", ", f",\n{margin}{STEP}", 1)
 
 
 def _begins_line(source: Source, at: int) -> bool:

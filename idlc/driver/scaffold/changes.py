@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from idlc.checks.package.long_lines import wrapped
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.cache import templates as template_cache
@@ -108,6 +109,8 @@ def accepted(
     for path, outcome in edits.items():
         if isinstance(outcome, Edited):
             edited[path] = outcome.text
+            if path == "setup.py":
+                edited[path] = wrapped(project.text(path) or "", outcome.text)
             continue
         shown_path = project.shown(path)
         report.add(
