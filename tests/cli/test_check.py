@@ -347,6 +347,37 @@ def test_an_entry_point_that_leads_nowhere_is_found(capsys):
     ]
 
 
+def test_entry_points_of_modules_that_setup_py_places_elsewhere_are_not_judged(capsys):
+    scripts = ["a = demo.node:main", "b = tool:main", "nowhere"]
+    for placed in ("package_dir={'': 'src'}", "package_dir=where", "py_modules=['tool']"):
+        write_all(
+            {
+                "package.xml": "<package>\n  <name>demo</name>\n</package>\n",
+                "setup.py": "from setuptools import setup\n"
+                f"setup({placed}, entry_points={{'console_scripts': {scripts!r}}})\n",
+                "src/demo/node.py": "def main():\n    pass\n",
+                "tool.py": "def main():\n    pass\n",
+                "msg/A.msg": "int8 a\n",
+            }
+        )
+        _, out = check(capsys)
+        assert re.findall(r"IDL457\]: (.*)", out) == ["`nowhere` is not an entry point"]
+
+
+def test_a_hint_calls_find_packages_as_setup_py_can(capsys):
+    write_all(
+        {
+            "package.xml": "<package>\n  <name>demo</name>\n"
+            "  <export><build_type>ament_python</build_type></export>\n</package>\n",
+            "setup.py": "import setuptools as tools\ntools.setup(packages=['demo'])\n",
+            "demo/__init__.py": "",
+            "msg/A.msg": "int8 a\n",
+        }
+    )
+    _, out = check(capsys)
+    assert "write `packages=tools.find_packages(exclude=['test'])`; --fix does" in out
+
+
 def test_files_that_are_not_python_or_xml_are_not_judged(capsys):
     write_all(
         {

@@ -236,13 +236,14 @@ def _with_packages(
         name and name.partition(".")[0] == package for name in names
     )
     edits: tuple[Edit, ...] = ()
-    hint = f"write `packages={_FIND}`"
     find, imports = imported(setup, "setuptools", "find_packages")
+    call = _FIND.replace("find_packages", find)
+    hint = f"write `packages={call}`"
     if setup.list_of("packages") is listed and "package_dir" not in setup.arguments:
         target = setup.value(node)
         if target is not None and (known or listed is None) and tops <= {package, "test"}:
             start, end = range_of(setup.source, target)
-            text = _FIND.replace("find_packages", find).replace("'", quote_of(setup.source, target))
+            text = call.replace("'", quote_of(setup.source, target))
             edits = (*imports, Edit(Span(setup.source, start, end), text))
         elif listed is not None:
             own = f"*{find}(include=['{package}', '{package}.*'])"
@@ -281,14 +282,20 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
         return
     from idlc.checks.package.python_files import span_of
 
-    for text, node in _read(facts.setup_py).scripts:
-        problem = _problem(text, facts)
+    setup = _read(facts.setup_py)
+    elsewhere = bool({"package_dir", "py_modules"} & setup.arguments.keys())
+    for text, node in setup.scripts:
+        problem = _problem(text, facts, elsewhere=elsewhere)
         if problem:
             place = span_of(facts.setup_py, node)
             report.add(codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1]))
 
 
-def _problem(text: str, facts: Facts) -> tuple[str, str] | None:
+def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
+    """Return what is wrong with an entry point, and a hint.
+
+    `elsewhere` is whether modules may lie where they are not looked for.
+    """
     from idlc.checks.package.python_files import defines
 
     script, equals, target = text.partition("=")
@@ -296,6 +303,8 @@ def _problem(text: str, facts: Facts) -> tuple[str, str] | None:
     if not equals or not colon or not function:
         what = f"`{text}` is not an entry point"
         return what, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
+    if elsewhere:
+        return None
     if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
         return (
             f"there is no Python package `{module.partition('.')[0]}` here",
