@@ -2,85 +2,66 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from idlc.cli import output
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.suggest import building
 from idlc.disk.find import look
-from idlc.disk.output.project import Project
+from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.packages.inputs import packages
+from idlc.disk.read import is_file, read_bytes
 from idlc.disk.scope import scope
 from idlc.disk.settings import pyproject
 from idlc.disk.setup_command import distribution_class
 from idlc.driver.generate.gen import GenOptions, gen
-from idlc.driver.generate.libraries import Libraries, libraries_of
+from idlc.driver.generate.libraries import libraries_of
+from idlc.driver.generate.share import shared
 from idlc.driver.stages import models_of
-from idlc.model.link import Model
-from idlc.scaffold import new_interface
+from idlc.emit.render import support_packages
 
 
 def compile_interfaces(package: str) -> dict[str, type]:
-    """Bring the package's classes, and what ROS 2 installs beside interfaces, up to date.
+    """Bring the package's classes up to date, and install what rosidl installs beside them.
 
-    Returns what setup() is to be given besides, for its libraries: `setup(..., **compiled)`.
+    Returns further arguments for setup(), `setup(..., **compiled)`: with them it installs the
+    interfaces, their descriptions, libraries for C++ tools and the entries in ROS 2's index. These
+    replace what `data_files` lists for the same places.
 
-    Works in the folder of the setup.py that is run, and writes nothing where nothing changed. A
-    rejected interface ends the build with a report.
+    Works in the folder of the setup.py that is run, and writes only classes there, and only where
+    they changed. A rejected interface ends the build with a report.
     """
     if "--dry-run" in sys.argv:
         return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
     here, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
-        installed, libraries = _compile(package)
+        with building():
+            return {"distclass": _compiled(package)}
     finally:
         os.chdir(here)
-    if source != here:
-        _link(installed, source, here)
-    return {"distclass": distribution_class(package, libraries.files, libraries.missing)}
 
 
-def _link(paths: Iterable[str], source: Path, here: Path) -> None:
-    """Link to files of the source where colcon builds: with --symlink-install, among links.
-
-    Those links it makes before there are any compiled files.
-    """
-    for path in paths:
-        if not (here / path).exists():
-            (here / path).unlink(missing_ok=True)
-            (here / path).parent.mkdir(parents=True, exist_ok=True)
-            (here / path).symlink_to(source / path)
-
-
-def _compile(package: str) -> tuple[Iterable[str], Libraries]:
-    """Compile the package in the working folder; return the files that ROS 2's tools read."""
+def _compiled(package: str) -> type:
+    """Compile the package in the working folder; return a class for setup(distclass=...)."""
     report = Report()
-    where = scope(pyproject.load(report), package)
-    found = packages(look((".",), Report(), where.exclude).files, where, report)
-    if not found:
-        return (), Libraries({})
-    (given,) = found
-    gen(GenOptions(paths=(".",), out=package, scope=where), report)
-    ((_, model),) = models_of(found, where, Report())
-    files = dict([new_interface.index(package, given.digests)])
-    if not report.had_errors:
-        files |= dict(_described(model))
-        project = Project(".", report)
-        planned = project.plan({}, files)
-        if planned is not None:
-            project.apply(planned[0])
-    output.show(report, "text", sys.stderr)
+    settings = pyproject.load(report)
+    where = scope(settings, package)
+    given = packages(look((".",), Report(), where.exclude).files, where, report)
+    if not given:
+        return distribution_class(package, {})
+    gen(GenOptions((".",), package, scope=where, vendor_deps=settings.vendor_deps), report)
+    manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
+        output.show(report, "text", sys.stderr)
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    return files, libraries_of(model)
-
-
-def _described(model: Model) -> Iterator[tuple[str, str]]:
-    """Yield the description of each interface that ROS 2 installs, and its path."""
-    for own in model.own:
-        content = json.dumps(model.describer.installed(str(own.name)), indent=2)
-        yield f"{new_interface.RESOURCE}/{own.name.kind}/{own.name.name}.json", content + "\n"
+    ((_, model),) = models_of(given, where, Report())
+    libraries = libraries_of(model)
+    files = shared(model, manifest, libraries, report)
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    parts = {*support_packages(), *(key.partition("/")[0] for key in given[0].digests)}
+    generated = (package, *(f"{package}.{part}" for part in parts))
+    return distribution_class(package, files, generated, libraries.build_tag)

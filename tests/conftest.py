@@ -63,7 +63,8 @@ def pytest_terminal_summary(terminalreporter, config):
     passed = {report.nodeid for report in terminalreporter.getreports("passed")}
     if config.getoption("left_out"):
         passed.update(config.cache.get(PASSED, []))
-    config.cache.set(PASSED, sorted(passed))
+    if hasattr(config, "cache"):  # without -p no:cacheprovider
+        config.cache.set(PASSED, sorted(passed))
     for report in terminalreporter.getreports("passed"):
         for name, value in report.user_properties:
             if name == "found":

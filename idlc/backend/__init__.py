@@ -27,11 +27,12 @@ get_requires_for_build_sdist = get_requires_for_build_wheel
 get_requires_for_build_editable = get_requires_for_build_wheel
 
 
-def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:  # noqa: ARG001
+def build_sdist(sdist_directory: str, config_settings: Settings = None) -> str:
     """Write the archive of the source folder, and return its name."""
     from idlc.backend.hooks import finished, sdist
 
-    return finished(lambda report: sdist(sdist_directory, report))
+    settings = dict(config_settings or {})
+    return finished(lambda report: sdist(sdist_directory, settings, report))
 
 
 def build_wheel(
@@ -41,8 +42,9 @@ def build_wheel(
 ) -> str:
     """Compile the package in the working folder into a wheel, and return its name.
 
-    The setting `distro` names the distribution of ROS 2 whose C++ tools are to know the package;
-    without it that is the one that is installed here.
+    The setting `distro` names the distribution of ROS 2 that the package is for, and whose C++
+    tools are to know it; without it that is the one that is installed here. `libraries=no` makes
+    a wheel for every machine, without libraries for these tools.
     """
     from idlc.backend.hooks import finished, wheel
 

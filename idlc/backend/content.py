@@ -10,45 +10,64 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.disk.find import look, nothing_in
 from idlc.disk.machine.distribution import Distribution
+from idlc.disk.machine.environment import INDEX
+from idlc.disk.output.lock_file import load
 from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.packages.inputs import Inputs, packages
-from idlc.disk.read import is_folder, read_bytes
+from idlc.disk.read import is_folder, read_bytes, shown
 from idlc.disk.scope import Scope, scope
 from idlc.disk.settings import pyproject
+from idlc.disk.settings.table import Place
 from idlc.driver.generate.gen import GenOptions, gen
-from idlc.driver.generate.libraries import libraries_of
-from idlc.driver.generate.share import INTERFACES, shared
+from idlc.driver.generate.libraries import Libraries, build_tag, libraries_of
+from idlc.driver.generate.share import shared
 from idlc.driver.stages import models_of
+
+
+class Options(NamedTuple):
+    """What a frontend says: for which distribution libraries are, and whether there are any."""
+
+    distribution: Distribution | None
+    libraries: bool = True
 
 
 class Content(NamedTuple):
     """The folder with the classes, and the files of the prefix by their paths in it.
 
-    `native` is whether some are for one kind of processor.
+    `libraries` are those among them.
     """
 
     classes: Path
     prefix: Mapping[str, bytes]
-    native: bool
+    libraries: Libraries
 
 
-def compiled(
-    name: str, classes: Path, distribution: Distribution | None, report: Report
-) -> Content | None:
+def compiled(name: str, classes: Path, options: Options, report: Report) -> Content | None:
     """Compile the package in the working folder, its classes into a folder of their own.
 
     Returns `None` after a problem.
     """
-    settings = scope(pyproject.load(report))
+    config = pyproject.load(report)
+    if config.source:
+        place = Place(config.source, "tool.idlc", "[tool.idlc]")
+        if config.vendor_deps:
+            message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
+            hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
+            place.wrong("vendor-deps", message, report, hint)
+        if config.package not in (None, name):
+            message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
+            place.wrong("package", message, report, "remove `package` from [tool.idlc]")
+    settings = scope(config, distro=options.distribution and options.distribution.name)
     where = msgspec.structs.replace(
         settings, package=None, include=(*settings.include, *_required_prefixes())
     )
     given = _package(name, where, report)
     if given is None:
         return None
+    _refuse_code(name, report)
     made = Report()
     gen(GenOptions(paths=(".",), out=str(classes), scope=where), made)
     # who builds a package need not be able to import it
@@ -57,12 +76,24 @@ def compiled(
     if report.had_errors or manifest is None:
         return None
     ((_, model),) = models_of((given,), where, Report())
-    libraries = libraries_of(model, distribution)
-    files = shared(model, manifest, libraries, report)
-    prefix = {
-        path: text.encode() if isinstance(text, str) else text for path, text in files.items()
-    }
-    return Content(classes, prefix, bool(libraries.files))
+    if options.libraries:
+        libraries = libraries_of(model, options.distribution)
+    else:
+        libraries = Libraries({}, "the build was told `libraries=no`", build_tag(model))
+    return Content(classes, shared(model, manifest, libraries, report), libraries)
+
+
+def _refuse_code(name: str, report: Report) -> None:
+    """Report Python modules beside committed classes: the wheel would not have them."""
+    lock = load(Path(name), name, report)
+    # where classes are committed, people write what the package is for into the first of these
+    generated = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
+    own = sorted({*Path(name).rglob("*.py")} - generated)
+    if own:
+        files = first_few((f"`{shown(path)}`" for path in own), 3)
+        message = f"idlc.backend builds interfaces alone, and here is {files}"
+        hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
+        report.add(codes.BAD_CONFIG.of(pyproject.FILE, message, hint=hint))
 
 
 def _required_prefixes() -> list[str]:
@@ -73,7 +104,7 @@ def _required_prefixes() -> list[str]:
     ends = ("site-packages", "dist-packages")
     places = dict.fromkeys(Path(path) for path in sys.path if path.endswith(ends))
     prefixes = [place.parents[2] for place in places if len(place.parents) > 2]
-    found = [path for path in prefixes if is_folder(path / INTERFACES)]
+    found = [path for path in prefixes if is_folder(path / INDEX)]
     return [f"{path}/share" for path in found if path != Path(sys.prefix)]
 
 

@@ -7,16 +7,18 @@ its traceback.
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from idlc.cli import output
 from idlc.cli.exit_status import ended
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.suggest import building, did_you_mean
 from idlc.disk.machine import environment
 from idlc.disk.machine.distribution import Distribution
 from idlc.disk.packages.enclosing import MANIFEST
@@ -24,9 +26,9 @@ from idlc.disk.read import reason
 from idlc.disk.settings import pyproject
 
 if TYPE_CHECKING:
-    from hatchling.builders.plugin.interface import BuilderInterface
+    from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
 
-    from idlc.backend.content import Content
+    from idlc.backend.content import Content, Options
 
 #: What a workspace or an earlier build left in the folder.
 _NO_SOURCES = ["/build", "/dist", "/install", "/log"]
@@ -47,7 +49,8 @@ def finished(build: Callable[[Report], str | None]) -> str:
             )
             return 2
         try:
-            built.extend(filter(None, [build(report)]))
+            with building():
+                built.extend(filter(None, [build(report)]))
         except OSError as error:
             message = f"cannot write the archive: {reason(error)}"
             report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
@@ -62,27 +65,57 @@ def finished(build: Callable[[Report], str | None]) -> str:
     return built[0]
 
 
-def sdist(directory: str, report: Report) -> str | None:
-    """Write the archive of the working folder, without what version control ignores."""
-    from hatchling.builders.sdist import SdistBuilder
+def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+    """Write the archive of the working folder, without what version control ignores.
 
-    found = _declared(report)
-    if found is None:
+    Links that lead out of the folder are left out, and noted: an archive is given to others.
+    """
+    from hatchling.builders.sdist import SdistBuilder, SdistBuilderConfig
+
+    here = Path.cwd().resolve()
+    outside: set[str] = set()
+
+    def leads_out(path: str) -> bool:
+        is_outside = not Path(os.path.realpath(path)).is_relative_to(here)  # of circles, too
+        if is_outside:
+            outside.add(Path(os.path.relpath(path, here)).as_posix())
+        return is_outside
+
+    class Config(SdistBuilderConfig):
+        def directory_is_excluded(self, name: str, relative_path: str) -> bool:
+            left_out: bool = super().directory_is_excluded(name, relative_path)
+            return left_out or leads_out(str(here / relative_path / name))
+
+    class Builder(SdistBuilder):
+        @classmethod
+        def get_config_class(cls) -> type[SdistBuilderConfig]:
+            return Config
+
+        def recurse_included_files(self) -> Iterator[IncludedFile]:
+            files = super().recurse_included_files()
+            yield from (file for file in files if not leads_out(file.path))
+
+    found, _ = _declared(report), _options(settings, report)
+    if found is None or report.had_errors:
         return None
     settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
-    return _written(SdistBuilder(str(Path.cwd()), config=settings), directory, report)
+    name = _written(Builder(str(here), config=settings), directory, report)
+    if outside:
+        names = first_few((f"`{one}`" for one in sorted(outside)), 5)
+        report.notes.append(f"left out, because they lead out of the project: {names}")
+    return name
 
 
 def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
     """Compile the package in the working folder into a wheel."""
     from idlc.backend.content import compiled
 
-    found, distribution = _declared(report), _distribution(settings, report)
+    found, options = _declared(report), _options(settings, report)
     if found is None or report.had_errors:
         return None
     name, project = found
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-        content = compiled(name, Path(folder) / "classes" / name, distribution, report)
+        content = compiled(name, Path(folder) / "classes" / name, options, report)
         if content is None:
             return None
         return _packed(name, project, content, Path(folder) / "prefix", directory, report)
@@ -104,18 +137,23 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     return None if report.had_errors else (declared["name"], project)
 
 
-def _distribution(settings: Mapping[str, Any], report: Report) -> Distribution | None:
-    """Return the distribution that the frontend was told; report IDL611 for one not known."""
+def _options(settings: Mapping[str, Any], report: Report) -> Options:
+    """Return what a frontend's settings say; report IDL611 for each that is wrong."""
+    from idlc.backend.content import Options
     from idlc.native.layouts import LAYOUTS
 
+    known = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
+    for key, value in settings.items():
+        if key not in known:
+            message = f"unknown setting `{key}` of idlc.backend"
+            hint = did_you_mean(key, known) or f"the settings are {', '.join(known)}"
+            report.add(codes.BAD_CONFIG.of("", message, hint=hint))
+        elif value not in known[key]:
+            message = f"the setting `{key}` is {value!r}, which idlc does not know"
+            report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(known[key])}"))
     wanted = settings.get("distro")
-    if isinstance(wanted, str) and wanted in LAYOUTS:
-        return Distribution(wanted, f"distro={wanted}")
-    if wanted is None:
-        return None
-    message = f"the setting `distro` is {wanted!r}, which idlc does not know"
-    report.add(codes.BAD_CONFIG.of("", message, hint=f"it is one of {', '.join(LAYOUTS)}"))
-    return None
+    distribution = Distribution(wanted, f"distro={wanted}") if wanted else None
+    return Options(distribution, settings.get("libraries") != "no")
 
 
 def _packed(
@@ -131,7 +169,8 @@ def _packed(
 
     class Builder(WheelBuilder):
         def get_default_build_data(self) -> dict[str, Any]:
-            tag = f"py3-none-{environment.wheel_platform() if content.native else 'any'}"
+            native = content.libraries.files
+            tag = f"py3-none-{environment.wheel_platform() if native else 'any'}"
             return {**super().get_default_build_data(), "tag": tag}
 
     for path, data in content.prefix.items():
@@ -141,12 +180,23 @@ def _packed(
         "wheel",
         **{
             "bypass-selection": True,
+            "exclude": [f"/{name}", f"/src/{name}"],  # committed classes: these are new ones
             "force-include": {str(content.classes): name},
             "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
         },
     )
     builder = Builder(str(Path.cwd()), config={"project": project, **target})
-    return _written(builder, directory, report)
+    # hatchling knows no build tags, and its file must not replace a wheel without one
+    Path(directory).mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:
+        built = _written(builder, beside, report)
+        if built is None:
+            return None
+        stem, python, rest = built.partition("-py3-")
+        tag = content.libraries.build_tag
+        name = f"{stem}-{tag}{python}{rest}" if tag else built
+        Path(beside, built).replace(Path(directory, name))
+    return name
 
 
 def _target(name: str, **settings: Any) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from idlc.diagnostics.source import Span
 Level: TypeAlias = Literal["wire", "hash", "source", "behaviour"]
 
 #: What a change can break, the worst first: bytes written before are read wrongly or not at all;
-#: RIHS01 differs, so endpoints of the two versions do not talk; Python or C++ code that used it
-#: fails; the same code does something else.
+#: RIHS01 differs, so a middleware may not deliver messages between the two versions; Python or C++
+#: code that used it fails; the same code does something else.
 LEVELS: tuple[Level, ...] = ("wire", "hash", "source", "behaviour")
 
 

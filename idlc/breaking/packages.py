@@ -21,12 +21,14 @@ CANDIDATES = 50
 class Comparison(NamedTuple):
     """What breaks something, and what was added and breaks nothing.
 
-    `differs` is whether anything at all is different, comments included.
+    `differs` is whether anything at all is different, comments included, in what could be
+    compared; `left_out` could not be.
     """
 
     changes: tuple[Change, ...]
     additions: tuple[str, ...] = ()
     differs: bool = False
+    left_out: tuple[str, ...] = ()
 
     def placed(self, prefix: str) -> Comparison:
         """Return it with what was removed in the files whose names follow a prefix."""

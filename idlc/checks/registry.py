@@ -97,7 +97,7 @@ def advice() -> tuple[Rule, ...]:
 
 def package_advice() -> tuple[PackageRule, ...]:
     """Return the rules on the package around the interfaces: the tutorials' troubleshooting."""
-    from idlc.checks.package import installation, manifest
+    from idlc.checks.package import cmake, installation, manifest
 
     return (
         PackageRule(manifest.declared_dependencies, (codes.MISSING_DEPENDENCY,)),
@@ -105,9 +105,9 @@ def package_advice() -> tuple[PackageRule, ...]:
         PackageRule(manifest.interface_group, (codes.NOT_IN_INTERFACE_GROUP,)),
         PackageRule(manifest.generators, (codes.NO_INTERFACE_GENERATORS,)),
         PackageRule(manifest.declared_imports, (codes.UNDECLARED_IMPORT,)),
-        PackageRule(installation.installed_interfaces, (codes.INTERFACES_NOT_INSTALLED,)),
+        PackageRule(cmake.listed_dependencies, (codes.MISSING_CMAKE_DEPENDENCY,)),
+        PackageRule(installation.installed, installation.CODES),
         PackageRule(installation.resource_marker, (codes.NO_RESOURCE_MARKER,)),
-        PackageRule(installation.installed_libraries, (codes.NO_LIBRARY_INSTALLED,)),
         PackageRule(installation.entry_points, (codes.BAD_ENTRY_POINT,)),
         PackageRule(installation.names, (codes.NAME_MISMATCH,)),
         PackageRule(installation.current_output, (codes.STALE_GENERATED_CODE,)),

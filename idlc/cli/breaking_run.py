@@ -71,7 +71,7 @@ def compare(typed: BreakingWishes) -> int:
         verdict = _compared(wanted, recordings, typed, report)
         if recordings:
             output.notes(report, sys.stderr)
-    _show(report, verdict, typed.style)
+    _show(report, verdict, typed)
     return output.status(report)
 
 
@@ -100,8 +100,11 @@ def _compared(
 
 
 def _show(
-    report: Report, verdict: Verdict | GraphVerdict | RecordedVerdict | None, style: str
+    report: Report,
+    verdict: Verdict | GraphVerdict | RecordedVerdict | None,
+    typed: BreakingWishes,
 ) -> None:
+    style = typed.style
     if style == "json":
         output.show(report, style, sys.stdout)
         facts = verdict._asdict() if verdict else {}
@@ -111,16 +114,26 @@ def _show(
     elif style == "text":
         output.show(report, style, sys.stdout)
         if verdict:
-            sys.stdout.write(f"{_summary(verdict)}\n")
+            sys.stdout.write(f"{_summary(verdict, typed.levels)}\n")
     else:
         reports.write(report, style, Checked(()), sys.stdout, command="breaking")
         if style == "github" and verdict:
-            sys.stdout.write(notice("idlc breaking", _summary(verdict)))
+            sys.stdout.write(notice("idlc breaking", _summary(verdict, typed.levels)))
 
 
-def _summary(verdict: Verdict | GraphVerdict | RecordedVerdict) -> str:
+def _summary(
+    verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...] = ()
+) -> str:
+    """Return the last line of the text: it says what was not looked at, or not shown."""
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
+    left_out = verdict.not_compared if isinstance(verdict, Verdict) else ()
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
+    if verdict.hidden:
+        at = "" if parts else f" at level {', '.join(levels)}"
+        text += f"{at}; --level hides {counted(verdict.hidden, 'change')}"
+    if left_out:
+        within = "" if parts or verdict.hidden else " in what was compared"
+        text += f"{within}; not compared: {len(left_out)}"
     if verdict.allowed:
         text += f"; allowed: {verdict.allowed}"
     return text + (_next(verdict) if isinstance(verdict, Verdict) else _seen(verdict))
@@ -142,7 +155,8 @@ def _next(verdict: Verdict) -> str:
     """Return what was added, and which version comes next."""
     text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
     if verdict.part is None:
-        same = not (any(verdict.levels.values()) or verdict.allowed or verdict.added)
+        facts = (verdict.allowed, verdict.added, verdict.not_compared, verdict.hidden)
+        same = not any((*verdict.levels.values(), *facts))
         return f"{text}; the versions are the same" if same else text
     if verdict.next_version:
         return f"{text}; the next version after {verdict.version} is {verdict.next_version}"

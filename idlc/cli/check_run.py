@@ -50,5 +50,6 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
             fix=wishes.fix,
         )
         checked = check(wanted, report)
-    reports.write(report, wishes.style, checked, sys.stdout, numbers=wishes.statistics)
+    numbers, strict = wishes.statistics, wishes.strict
+    reports.write(report, wishes.style, checked, sys.stdout, numbers=numbers, strict=strict)
     return output.status(report) or int(wishes.strict and bool(len(report)))

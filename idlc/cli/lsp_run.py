@@ -14,4 +14,6 @@ def run() -> int:
     # a thread may still read when the program ends, so it is not sys.stdin that it waits in, and
     # what it waits in is never closed
     reader = open(sys.stdin.fileno(), "rb", closefd=False)  # noqa: SIM115
-    return serve(reader, sys.stdout.buffer)
+    # nor does anything stay in sys.stdout that cannot be written when the program ends
+    writer = open(sys.stdout.fileno(), "wb", closefd=False)  # noqa: SIM115
+    return serve(reader, writer)

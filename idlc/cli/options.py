@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import click
+from click.core import ParameterSource
 
 from idlc.cli import completion
 from idlc.diagnostics.formats import DOCUMENTS
@@ -14,6 +15,26 @@ FORMATS = ("text", "json")
 REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def typed(*without: str) -> tuple[str, ...]:
+    """Return the words that were typed after the command that runs, `without` these parameters."""
+    context = click.get_current_context()
+    arguments: list[str] = []
+    words: list[str] = []
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name in without:
+            continue
+        value = context.params[name]
+        if isinstance(parameter, click.Argument):
+            arguments += (f"./{word}" if word.startswith("-") else word for word in value)
+        elif value is True:
+            words.append(parameter.opts[0])
+        else:
+            for word in value if isinstance(value, tuple) else (value,):
+                words += (parameter.opts[0], word)
+    return (*arguments, *words)
 
 
 def package(command: Command) -> Command:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
 
+#: How many differences between two messages are listed; pytest shows few of them without -vv.
+MOST = 1000
 SUFFIXES = frozenset({".msg", ".srv", ".action"})
 
 
@@ -36,6 +39,42 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     if not asked or file_path.suffix not in SUFFIXES:
         return None
     return InterfaceFile.from_parent(parent, path=file_path)
+
+
+def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
+    """Explain which fields of two messages differ.
+
+    pytest does so for dataclasses whose `__eq__` was made by `dataclass` alone.
+    """
+    bases = [kind for kind in type(left).__mro__ if kind.__module__.endswith("._idlc.message")]
+    base: Any = next((kind for kind in bases if kind.__name__ == "Message"), None)
+    if op != "==" or base is None or type(left) is not type(right):
+        return None
+    try:  # a field may have the name of a method
+        found = _differences(base.to_dict(left), base.to_dict(right), "")
+    except (AttributeError, TypeError, ValueError):  # values that the fields cannot hold
+        return None
+    name = type(left).__name__
+    return [f"{name}(...) == {name}(...)", "", "Differing fields:", *islice(found, MOST)]
+
+
+def _differences(left: object, right: object, path: str) -> Iterator[str]:
+    """Yield where two messages differ, given as dictionaries."""
+    if isinstance(left, dict) and isinstance(right, dict):
+        for name in left:
+            yield from _differences(left[name], right[name], f"{path}.{name}" if path else name)
+    elif isinstance(left, list) and isinstance(right, list):
+        if len(left) != len(right):
+            yield f"  {path}: {len(left)} elements != {len(right)} elements"
+        for index, pair in enumerate(zip(left, right, strict=False)):
+            yield from _differences(*pair, f"{path}[{index}]")
+    elif left != right:
+        yield f"  {path}: {_short(left)} != {_short(right)}"
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 class InterfaceFile(pytest.File):

@@ -22,10 +22,12 @@ def write(
     *,
     command: str = "check",
     numbers: bool = False,
+    strict: bool = False,
 ) -> None:
     """Write a report on what was looked at; formats for machines are one whole document.
 
-    `numbers` leaves out of the text what was found, and only says how often.
+    `numbers` leaves out of the text what was found, and only says how often; with `strict`,
+    warnings fail as errors do.
     """
     files, fixed = checked.files, checked.fixed
     match style:
@@ -47,4 +49,4 @@ def write(
             facts |= {"distros": list(checked.distros)} if checked.distros else {}
             output.fact(stream, "summary", **output.counts(report), **facts)
         case _:
-            stream.write(document(style, report, Run(command, __version__, files)))
+            stream.write(document(style, report, Run(command, __version__, files, strict)))

@@ -7,7 +7,7 @@ Messages are lower-case, without a final stop, with the user's words in backtick
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import msgspec
 
@@ -126,6 +126,11 @@ class Report:
     def had_errors(self) -> bool:
         """Whether any problem rejects its file."""
         return self._had_errors
+
+
+def enumerated(texts: Sequence[str]) -> str:
+    """Return texts as a sentence lists them: `a`, `a and b`, `a, b and c`."""
+    return " and ".join(filter(None, (", ".join(texts[:-1]), *texts[-1:])))
 
 
 def first_few(texts: Iterable[str], most: int) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shlex
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 
 def edit_distance(left: str, right: str) -> int:
@@ -43,16 +46,36 @@ def closest(name: str, known: Iterable[str]) -> str | None:
 
 def package_hint(name: str, known: Iterable[str]) -> str:
     """Return the hint for a package that is nowhere to be found."""
-    near = _closest_package(name, known)
+    near = closest_package(name, known)
     if near is not None:
         return f"did you mean `{near}`?"
     return (
-        f"`{name}` is not built in; add `-I DIR` with the folder of its sources, "
+        f"`{name}` is not built in; {including('DIR')} with the folder of its sources, "
         "or source the ROS 2 workspace that has it"
     )
 
 
-def _closest_package(name: str, known: Iterable[str]) -> str | None:
+_IN_BUILD: ContextVar[bool] = ContextVar("in_build", default=False)
+
+
+@contextmanager
+def building() -> Iterator[None]:
+    """Let hints within speak to someone who builds a package and types no options of idlc."""
+    before = _IN_BUILD.set(True)
+    try:
+        yield
+    finally:
+        _IN_BUILD.reset(before)
+
+
+def including(folder: str) -> str:
+    """Return the advice to look for packages in a folder, too."""
+    if _IN_BUILD.get():
+        return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
+    return f"add `-I {shlex.quote(folder)}`"
+
+
+def closest_package(name: str, known: Iterable[str]) -> str | None:
     """Return the package of the nearest name, or `None` if none is near.
 
     Digits are no slips of the pen: `nav2_msgs` is not `nav_msgs`.

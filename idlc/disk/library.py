@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
+from idlc.diagnostics.suggest import including
 from idlc.disk.exclude import Exclusions
 from idlc.disk.find import KIND_FOLDERS, KINDS, NOTHING, root_of, walk
 from idlc.disk.machine import environment
@@ -231,13 +232,13 @@ class Library:
         return self._packages
 
     def nearby(self, package: str) -> str | None:
-        """Return which -I finds a package that lies beside one of those being compiled."""
+        """Return what finds a package that lies beside one of those being compiled."""
         for root in (root for roots in self._own.values() for root in roots):
             declared = manifest(root)
             beside = (declared.parent if declared else root).parent
             if _NAME.fullmatch(package) and _has_interfaces(beside / package):
                 folder = os.path.relpath(beside)
-                return f"it is in `{Path(folder, package).as_posix()}`: add `-I {folder}`"
+                return f"it is in `{Path(folder, package).as_posix()}`: {including(folder)}"
         return None
 
     def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:

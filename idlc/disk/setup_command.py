@@ -1,69 +1,111 @@
-"""What a setup.py installs besides what it lists: libraries for C++ tools, commands for `ros2 run`.
+"""What a setup.py installs besides what it lists: what ROS 2 installs of interfaces, commands.
 
-Both are made in the folder of the build, and are no part of a source distribution.
+All of it is written into the build folder, and is not part of a source distribution.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PurePath
+from typing import Any, TypeAlias
 
 from idlc.disk.machine import environment
-from idlc.disk.read import reason
+from idlc.disk.read import is_file, reason
 
-#: By an entry here, recorders and others take a package for one whose library can be loaded.
-INDEX = f"{environment.INDEX}/packages"
 #: How a file is called until it is whole.
 NEW = ".new"
 #: The commands of setup.py by which pip installs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
+_BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
+_NOT_INSTALLED = """\
+{package}: setup() is given `packages` without {absent}, so that the classes of the interfaces \
+would not be installed; write `packages=find_packages(exclude=['test'])`, or run \
+`idlc check --fix`"""
 _COMMAND = re.compile(r"\s*([\w.-]+)\s*=")
 _LAUNCHER = """\
 #!/bin/sh
 # pip installs commands into bin, and ROS 2 starts what is here.
 exec "$(dirname "$0")/../../bin/{name}" "$@"
 """
+#: What setup() takes as `data_files`: files for the prefix itself, or a folder in it and its files.
+_DataFile: TypeAlias = str | tuple[str, Iterable[str]]
 
 
-def distribution_class(package: str, libraries: Mapping[str, bytes], missing: str) -> type:
-    """Return a class for setup(distclass=...) that installs libraries, by paths in a prefix.
+def distribution_class(
+    package: str, files: Mapping[str, bytes], packages: Iterable[str] = (), build_tag: str = ""
+) -> type:
+    """Return a class for setup(distclass=...) that installs files, by their paths in a prefix.
 
-    With a reason why they are `missing`, the package is not entered in ROS 2's index.
+    They replace what `data_files` lists for the same paths. A package with interfaces whose files
+    have no entries in ROS 2's index gets none from `data_files` either. The build stops unless
+    setup() was given all Python `packages` that were generated. `build_tag` is for the names of
+    wheels.
     """
     base = import_module("setuptools").Distribution
+    index = {f"{environment.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
 
     def run_commands(self: Any) -> None:
+        absent = sorted({*packages}.difference(self.packages or ()))
+        if absent and _BUILDS & {*self.commands}:
+            raise SystemExit(_NOT_INSTALLED.format(package=package, absent=", ".join(absent)))
         place = Path(self.get_option_dict("build").get("build_base", ("", "build"))[1], "idlc")
-        added = dict(libraries)
+        self.sources = list(self.data_files or ())
+        listed, added = _merged(self.sources, files, index if files else set())
         if _WHEELS & set(self.commands):
             added |= _launchers(package, self.entry_points)
-        if libraries:
-            tag = ("idlc", environment.wheel_platform())
-            self.get_option_dict("bdist_wheel").setdefault("plat_name", tag)
-        listed = list(self.data_files or ())
-        if missing:
-            sys.stderr.write(f"{package}: not entered in the index of ROS 2: {missing}\n")
-            listed = [one for one in listed if not _enters(one)]
+        if any(path.endswith(".so") for path in files):
+            options = self.get_option_dict("bdist_wheel")
+            options.setdefault("plat_name", ("idlc", environment.wheel_platform()))
+            if build_tag:
+                options.setdefault("build_number", ("idlc", build_tag))
         try:
             made = _made(place, added)
         except OSError as error:
             raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
-        self.data_files = made + listed  # the index comes after what it leads to
+        self.data_files = made + listed
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
         base.run_commands(self)
 
+    def run_command(self: Any, command: str) -> None:
+        installed = self.data_files
+        if command == "egg_info" and self.sources is not None:  # lists what is in an sdist
+            self.data_files = self.sources
+        base.run_command(self, command)
+        self.data_files = installed
+
     # editable installations leave data files out, because they ask for them by this other name
-    added = {"run_commands": run_commands, "has_data": base.has_data_files}
-    return type("Distribution", (base,), added)
+    added = {"has_data": base.has_data_files, "sources": None}
+    methods = {"run_commands": run_commands, "run_command": run_command}
+    return type("Distribution", (base,), {**methods, **added})
 
 
-def _enters(entry: str | tuple[str, Iterable[str]]) -> bool:
-    return not isinstance(entry, str) and entry[0].rstrip("/") == INDEX
+def _merged(
+    listed: Iterable[_DataFile], files: Mapping[str, bytes], index: set[str]
+) -> tuple[list[_DataFile], dict[str, bytes]]:
+    """Return `data_files` without those that others replace, and these others.
+
+    A listed file that has the content already stays: colcon's links lead to it. Without a new
+    entry in the index there is no old one either.
+    """
+    kept: list[_DataFile] = []
+    new = dict(files)
+    for entry in listed:
+        if isinstance(entry, str):
+            kept.append(entry)
+            continue
+        others = []
+        for path in entry[1]:
+            target = PurePath(entry[0], PurePath(path).name).as_posix()
+            if target in files and is_file(path) and Path(path).read_bytes() == files[target]:
+                new.pop(target, None)
+            elif target in files or target in index:
+                continue
+            others.append(path)
+        kept.append((entry[0], others))
+    return kept, new
 
 
 def _launchers(package: str, entry_points: Any) -> dict[str, bytes]:
@@ -82,7 +124,7 @@ def _made(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]
             target.parent.mkdir(parents=True, exist_ok=True)
             beside = target.with_name(f"{target.name}{NEW}")
             beside.write_bytes(content)
-            beside.chmod(0o755)
+            beside.chmod(0o755 if path.startswith("lib/") else 0o644)
             beside.replace(target)
     return [(os.path.dirname(path), [(place / path).as_posix()]) for path in files]  # noqa: PTH120
 

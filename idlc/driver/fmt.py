@@ -1,4 +1,4 @@
-"""The pipeline of `idlc fmt`: lay each sound file out, and write it if that changed anything."""
+"""The pipeline of `idlc fmt`: lay each file out, and write it if that changed anything."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
 
 
+#: How the codes begin of syntax errors, and of files that are too large.
+_UNREADABLE = ("IDL1", "IDL6")
+
+
 class Formatted(NamedTuple):
-    """A file before and after; both are `None` if it is left alone because of its errors."""
+    """A file before and after; both are `None` if its syntax errors forbid a layout."""
 
     path: str
     old: str | None = None
@@ -35,7 +39,7 @@ def fmt(
 ) -> Iterator[Formatted]:
     """Yield each file that paths mean, laid out; with `write`, after writing it.
 
-    Files with errors are reported and left alone.
+    Files with syntax errors are reported and left alone.
     """
     for file in find(paths, report, exclude):
         source = read_source(file.path, file.shown, report)
@@ -54,7 +58,7 @@ def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
 
 
 def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
-    """Return a text laid out; report its errors and return `None` if it has any."""
+    """Return a text laid out; report and return `None` if it cannot be parsed."""
     from idlc.diagnostics.source import Source
     from idlc.model.distro import NEWEST
     from idlc.model.lowering.file import lower
@@ -65,12 +69,20 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     problems, again = Report(), Report()
     tree = parse(source)
     before = lower(tree, name, problems, NEWEST)
-    if problems.had_errors:
-        report.extend(one for one in problems if one.severity is Severity.ERROR)
+    errors = [one for one in problems if one.severity is Severity.ERROR]
+    unreadable = [one for one in errors if one.code.startswith(_UNREADABLE)]
+    if unreadable:
+        report.extend(unreadable)
         return None
     new = format_file(tree)
-    if new != source.text:
-        after = lower(parse(Source(source.path, new)), name, again, NEWEST)
-        if again.had_errors or meaning(after) != meaning(before):
-            raise AssertionError("the layout would change the meaning; the file was left alone")
-    return new
+    if new == source.text:
+        return new
+    after = lower(parse(Source(source.path, new)), name, again, NEWEST)
+    same = [one.code for one in errors] == [
+        one.code for one in again if one.severity is Severity.ERROR
+    ]
+    if same and meaning(after) == meaning(before):
+        return new
+    if errors:  # what a wrong definition means cannot be compared for sure
+        return source.text
+    raise AssertionError("the layout would change the meaning; the file was left alone")

@@ -10,9 +10,9 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.disk.find import look
 from idlc.disk.machine import environment
 from idlc.disk.machine.distribution import distribution
-from idlc.disk.machine.prefix import Installed, installed, prefixes
+from idlc.disk.machine.prefix import Installed, inconsistencies, installed, prefixes
 from idlc.disk.packages import inputs
-from idlc.disk.read import absolute
+from idlc.disk.read import absolute, shown
 from idlc.disk.scope import Scope
 from idlc.driver.check import Checked
 from idlc.driver.stages import models_of, stage
@@ -25,7 +25,7 @@ from idlc.native.library import FIELDS_CPP, MACHINES, OWN, symbol, told
 if TYPE_CHECKING:
     from idlc.model.link import Model
 
-_AGAIN = "build the package again, with idlc installed, or run `idlc gen --ament` again"
+_AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
 
 
 def check_prefix(folder: str, report: Report) -> Checked:
@@ -35,6 +35,11 @@ def check_prefix(folder: str, report: Report) -> Checked:
         message = f"no packages are installed in `{folder}`: there is no share/ament_index"
         hint = "name the folder that is in AMENT_PREFIX_PATH, or colcon's `install`"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
+    for prefix in found:
+        for package, why in inconsistencies(prefix):
+            message = f"`{package}`, which is in ROS 2's index, {why}"
+            place = shown(prefix / environment.INDEX)
+            report.add(codes.INCONSISTENT_INDEX.of(place, message, hint=_AGAIN))
     files = []
     for one in (one for prefix in found for one in installed(prefix)):
         model = _model(one)
@@ -46,6 +51,10 @@ def check_prefix(folder: str, report: Report) -> Checked:
             if why:
                 message = f"`{name}` {why}: C++ tools fail at the types of `{one.package}`"
                 report.add(codes.UNUSABLE_LIBRARY.of(files[-1], message, hint=_AGAIN))
+    if found and not files and not len(report):
+        message = f"no package with interfaces is registered in `{folder}`"
+        hint = "build one with idlc, or name the prefix in which it is installed"
+        report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
     return Checked(tuple(files), len(files))
 
 

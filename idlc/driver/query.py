@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.find import find, is_path
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
     """Return type hash and full name of what paths and type names mean, derived types included."""
     found: list[tuple[str, str]] = []
+    scope = _with_hashes(scope)
     if not _has_hashes(scope.distro, report):
         return found
     for model, names in wanted_models(wanted, scope, report):
@@ -35,6 +38,7 @@ def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[st
 
 def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
+    scope = _with_hashes(scope)
     if not _has_hashes(scope.distro, report):
         return None
     found = list(wanted_models((wanted,), scope, report))
@@ -49,6 +53,12 @@ def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | N
         return None
     with stage("describe", tops[0]):
         return {**model.describer.installed(tops[0])}
+
+
+def _with_hashes(scope: Scope) -> Scope:
+    """Return a scope for the first of its distributions that has type hashes, if any has."""
+    able = tuple(distro for distro in scope.distros if distro.has_hashes)
+    return msgspec.structs.replace(scope, distros=able or scope.distros)
 
 
 def _has_hashes(distro: Distro, report: Report) -> bool:

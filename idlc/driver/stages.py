@@ -178,13 +178,8 @@ def sound_models(
     Interfaces with errors, and those that hold them, are left out, which is noted.
     """
     models = list(models_of(packages, scope, report))
-    errors = [one for one in report if one.severity is Severity.ERROR]
-    broken = {one.where[0] for one in errors}
     found, left_out = [], []
-    for given, model in models:
-        sound = model.sound(broken) if errors else model
-        if any(one.code == codes.INVALID_PACKAGE_NAME.id for one in errors):
-            sound = sound.only(())
+    for (given, _), sound in zip(models, without_errors(models, report), strict=True):
         mine = sound.only(given.names).own
         found.append((sound, [name for one in mine for name in derived_names(one)]))
         left_out += sorted(given.names - {one.name for one in mine})
@@ -192,6 +187,24 @@ def sound_models(
         names = first_few((f"`{name}`" for name in left_out), 5)
         report.notes.append(f"left out, because of errors: {names}")
     return found
+
+
+def without_errors(
+    models: Iterable[tuple[inputs.Inputs, Model]],
+    report: Report,
+    also: Mapping[str, str] = MappingProxyType({}),
+) -> Iterator[Model]:
+    """Yield models without the interfaces that a report has errors of, and those that hold them.
+
+    An error in a file counts for the file that `also` has for it, too.
+    """
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    broken = {one.where[0] for one in errors}
+    broken |= {also[path] for path in broken & also.keys()}
+    is_all = any(one.code == codes.INVALID_PACKAGE_NAME.id for one in errors)
+    for _, model in models:
+        sound = model.sound(broken) if errors else model
+        yield sound.only(()) if is_all or model.package in broken else sound
 
 
 def derived_names(interface: ir.Interface) -> list[str]:

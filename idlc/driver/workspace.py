@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Edit
     from idlc.diagnostics.source import Source, Span
     from idlc.disk.library import Library
+    from idlc.driver.compare.breaking import Side
     from idlc.driver.compare.earlier import Earlier
     from idlc.model.link import Model
 
@@ -234,9 +235,9 @@ class Workspace:
             self._earlier[against] = found
         return self._earlier[against]
 
-    def before(self, against: str = "") -> Mapping[str, Model]:
-        """Return the packages' models as they were; empty if they cannot be compiled."""
-        return self.earlier(against).models(self._packages)
+    def before(self, against: str = "") -> Side:
+        """Return the packages as they were."""
+        return self.earlier(against).side(self._packages)
 
     @property
     def _library(self) -> Library:

@@ -54,11 +54,19 @@ Purposes = Mapping[ir.TypeName, str]
 
 
 def message(
-    structure: ir.Message, references: References, purposes: Purposes, file: str
+    structure: ir.Message,
+    references: References,
+    purposes: Purposes,
+    file: str,
+    *,
+    converts: bool,
 ) -> MessageView:
     """Return the view of a structure's class; `file` is the one that defines it."""
     naming = Naming.of(structure)
-    views = tuple(fields.view(field, references, naming, file) for field in structure.fields)
+    views = tuple(
+        fields.view(field, references, naming, file, converts=converts)
+        for field in structure.fields
+    )
     names = tuple_of(*(f'"{view.name}"' for view in views))
     entries = tuple(view.description for view in views)
     doubt = views[0].doubt if views else ()

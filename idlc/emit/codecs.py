@@ -35,9 +35,12 @@ def codec(structure: ir.Message, references: References, messages: wire_plan.Mes
     tables = Tables(names)
     writing = encode(steps, tables, 8)
     makers = _makers(structure.name, steps, references, tables)
+    foreign = {
+        type_: references.name(type_) for type_ in makers if type_.package != references.package
+    }
     bulk = is_bulk(steps)
     reading = statements.text_of(
-        decode(steps, tables, makers[structure.name], makers, bulk=bulk), 8
+        decode(steps, tables, makers[structure.name], makers, foreign, bulk=bulk), 8
     )
     constants = tuple(line for name, value in tables.definitions for line in assign(name, value, 4))
     inside, outside = references.imports(set(makers) - {structure.name}, 4)

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import msgspec
 
 from idlc.emit import documentation, literals, pynames
+from idlc.emit.codec.wire_plan import LIST_PRIMITIVES
 from idlc.emit.python_lines import WIDTH, Group, Node, assign, call, flat, tuple_of
 from idlc.emit.references import References
 from idlc.model import ir
 
 ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}
-LISTS = frozenset({"bool", "byte"})
 BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
 
 
@@ -74,7 +74,7 @@ def support(type_: ir.FieldType) -> str:
     if (
         isinstance(type_, (ir.Sequence, ir.Array))
         and isinstance(type_.element, ir.Primitive)
-        and type_.element.name not in LISTS
+        and type_.element.name not in LIST_PRIMITIVES
     ):
         return "sequence" if isinstance(type_, ir.Sequence) else "array"
     return ""
@@ -106,11 +106,16 @@ def idl_text(type_: ir.FieldType) -> str:
             raise ValueError("an unknown type cannot be emitted")
 
 
-def view(field: ir.Field, references: References, naming: Naming, file: str) -> FieldView:
-    """Return the view of a field; `file` is the one that defines it."""
+def view(
+    field: ir.Field, references: References, naming: Naming, file: str, *, converts: bool
+) -> FieldView:
+    """Return the view of a field; `file` is the one that defines it.
+
+    With `converts`, `None` is the default of any field, and a list is made of any iterable.
+    """
     name = pynames.field(field.name)
     slot = f"{naming.receiver}.{pynames.slot(field.name)}"
-    shape = _shape(field, references, naming)
+    shape = _shape(field, references, naming, converts=converts)
     words = documentation.words(field)
     return FieldView(
         name=name,
@@ -138,13 +143,17 @@ class _Shape(NamedTuple):
     doubt: tuple[str, ...] = ()
 
 
-def _shape(field: ir.Field, references: References, naming: Naming) -> _Shape:
+def _shape(field: ir.Field, references: References, naming: Naming, *, converts: bool) -> _Shape:
     name = pynames.field(field.name)
     kind = f"{name}.__class__"  # faster than a call, and no field can hide it
     if isinstance(field.type, (ir.Primitive, ir.String)):
         annotation = naming.builtins + _element(field.type, references)
-        parameter = f"{annotation} = {_scalar_default(field)}"
-        return _Shape(annotation, parameter, name, doubt=(f"{kind} is not {annotation}",))
+        default = _scalar_default(field)
+        unlike = f"{kind} is not {annotation}"
+        if not converts:
+            return _Shape(annotation, f"{annotation} = {default}", name, doubt=(unlike,))
+        parameter = f"{annotation} | None = None"
+        return _Shape(annotation, parameter, name, default, (f"{name} is not None", unlike))
     if support(field.type):
         return _numbers(field, name)
     if isinstance(field.type, ir.Ref):
@@ -158,6 +167,16 @@ def _shape(field: ir.Field, references: References, naming: Naming) -> _Shape:
         annotation = f"{known}[{inner}]"
         fresh = _fresh_list(field, references)
     doubt = (f"{name} is not None", *([f"{kind} is not {known}"] if known else []))
+    if converts and not isinstance(field.type, ir.Ref):
+        inside = getattr(ir.element_of(field.type), "name", "")
+        read = [f"_idlc.read_{LIST_PRIMITIVES[inside]}"] if inside in LIST_PRIMITIVES else []
+        stored = call("_idlc.to_list", name, f'"{name}"', *read)
+        declared = assign(f"{name}: _idlc.ListOf[{inner}]", f"_idlc.ListOf({', '.join(read)})", 4)
+        annotation = "\n".join(declared).strip().removeprefix(f"{name}: ")
+        parameter = f"_idlc.Iterable[{inner}] | None = None"
+        if len(name) + len(parameter) + 11 > WIDTH:
+            parameter = parameter.replace(" |", "\n        |")
+        return _Shape(annotation, parameter, stored, fresh, doubt)
     return _Shape(annotation, f"{annotation} | None = None", name, fresh, doubt)
 
 

@@ -44,7 +44,8 @@ def module_files(
     interface: ir.Interface, model: link.Model, modules: pynames.Modules, around: str = ""
 ) -> Iterator[RenderedFile]:
     """Yield the modules of one interface."""
-    for module in view.modules(interface, model.messages, modules, around):
+    converts = model.distro.converts_values
+    for module in view.modules(interface, model.messages, modules, around, converts=converts):
         template = _template(f"message/{module.template}.py.jinja")
         yield RenderedFile(module.path, template.render(module=module))
 

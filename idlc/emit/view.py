@@ -53,6 +53,7 @@ class _Part(NamedTuple):
     references: References
     module: pynames.ModuleName
     is_added: bool
+    converts: bool
 
 
 def modules(
@@ -60,15 +61,20 @@ def modules(
     messages: wire_plan.Messages,
     names: pynames.Modules,
     around: str = "",
+    *,
+    converts: bool = False,
 ) -> Iterator[ModuleView]:
-    """Yield the views of an interface's modules; `names` has the modules of all its package."""
+    """Yield the views of an interface's modules; `names` has the modules of all its package.
+
+    `converts` is whether classes convert values as those of Lyrical do.
+    """
     homes = Homes(interface, names, around)
     written = derive.sections(interface)
     added = derive.messages(interface)[len(written) :]
     for structures, module in ((written, homes.classes), (added, homes.protocol)):
         if structures:
             references = References(interface, structures, messages, homes)
-            part = _Part(interface, structures, references, module, structures is added)
+            part = _Part(interface, structures, references, module, structures is added, converts)
             yield _classes(part, homes)
             yield _codecs(part, messages)
 
@@ -89,7 +95,10 @@ def _classes(part: _Part, homes: Homes) -> ModuleView:
         ),
         title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
         imports=tuple(_imports(references, part.structures)),
-        messages=tuple(classes.message(one, references, purposes, file) for one in part.structures),
+        messages=tuple(
+            classes.message(one, references, purposes, file, converts=part.converts)
+            for one in part.structures
+        ),
         # a service's own class is its author's; those of an action's services are not
         services=classes.services(interface, purposes) if part.is_added == is_action else (),
         action=classes.action(interface) if isinstance(interface, ir.Action) else None,

@@ -148,6 +148,10 @@ class Projects:
             for project in self:
                 project.follow(path, None)
 
+    def have(self, path: Path) -> bool:
+        """Return whether a file is one of those that are checked, as far as was looked."""
+        return any(one.has(path) for one in self)
+
     def all(self) -> list[Project]:
         """Return every project, with those that open files need which are in no other."""
         strays: dict[Path, list[tuple[str, ...]]] = {}

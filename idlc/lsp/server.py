@@ -10,6 +10,7 @@ import gc
 import json
 import queue
 import threading
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, BinaryIO, TypeAlias
 
@@ -48,8 +49,12 @@ class Server:
         self._reader = reader
         self._writer = writer
         self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        #: How many requests of an id wait for their answer, and which of the ids are cancelled.
+        self._waiting: Counter[int | str | None] = Counter()
         self._cancelled: set[int | str] = set()
-        self._asked: list[Answer | None] = []
+        self._lock = threading.Lock()
+        self._count = 0
+        self._asked: dict[int, Answer] = {}
         self._session = Session(self._notify, self._ask)
 
     def run(self) -> int:
@@ -98,9 +103,15 @@ class Server:
                     break
                 message = _message(body)
                 if message.get("method") == "$/cancelRequest":
-                    self._cancelled.add(_cancelled(message))
-                else:
-                    self._arrivals.put(message)
+                    id_ = _cancelled(message)
+                    with self._lock:
+                        if id_ in self._waiting:
+                            self._cancelled.add(id_)
+                    continue
+                if "method" in message and "id" in message:
+                    with self._lock:
+                        self._waiting[message["id"]] += 1
+                self._arrivals.put(message)
             except framing.TooLongError:
                 self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
             except RequestError as error:
@@ -123,24 +134,32 @@ class Server:
     def _take_answer(self, arrival: Message) -> None:
         """Take an answer to what was asked of the client; one to nothing that was is left."""
         asked = arrival.get("id")
-        known = isinstance(asked, int) and 0 <= asked < len(self._asked)
-        take = self._asked[asked] if known and isinstance(asked, int) else None
+        take = self._asked.pop(asked, None) if isinstance(asked, int) else None
         if take is not None and "result" in arrival:
             self._attempt("answer", lambda: take(arrival["result"]))
 
     def _answer(self, request: Message) -> None:
         id_, name = request["id"], request["method"]
-        if id_ in self._cancelled:
-            self._cancelled.discard(id_)
+        if self._is_cancelled(id_):
             self._fail(id_, RequestError(CANCELLED, "cancelled"))
             return
-        failure, result = self._result(lambda: self._session.answer(name, request.get("params")))
+        failure, result = self._result(lambda: self._session.answer(name, _params(request)))
         if failure is None:
             self._write({"jsonrpc": "2.0", "id": id_, "result": result})
             return
         if failure.code == INTERNAL_ERROR:
             self._log(f"{name}: {failure.message}")
         self._fail(id_, failure)
+
+    def _is_cancelled(self, id_: int | str) -> bool:
+        """Return whether the request that is to be answered now was cancelled."""
+        with self._lock:
+            self._waiting[id_] -= 1
+            if not self._waiting[id_]:
+                del self._waiting[id_]
+            is_cancelled = id_ in self._cancelled
+            self._cancelled.discard(id_)
+        return is_cancelled
 
     def _attempt(self, what: str, action: Callable[[], object]) -> None:
         """Do what needs no answer; only the log says if that fails."""
@@ -173,8 +192,10 @@ class Server:
 
     def _ask(self, method: str, params: object, answer: Answer | None = None) -> None:
         """Ask the client something."""
-        self._asked.append(answer)
-        id_ = len(self._asked) - 1
+        id_ = self._count
+        self._count += 1
+        if answer is not None:
+            self._asked[id_] = answer
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
 
     def _write(self, message: object) -> None:
@@ -191,9 +212,26 @@ def _message(body: bytes) -> Message:
         raise RequestError(INVALID_REQUEST, "a message is an object")
     if not isinstance(message.get("method", ""), str):
         raise RequestError(INVALID_REQUEST, "the name of a method is a string")
-    if type(message.get("id")) not in (int, str, type(None)):
+    id_ = message.get("id")
+    if type(id_) not in (int, str, type(None)) or not _is_text(id_):
         raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
     return message
+
+
+def _params(request: Message) -> object:
+    """Return what a request asks with; raises RequestError for text that is none."""
+    if not _is_text(request):
+        raise RequestError(INVALID_PARAMS, "a string has one half of a surrogate pair")
+    return request.get("params")
+
+
+def _is_text(value: object) -> bool:
+    """Return whether all strings in a value of JSON can be encoded, as halves of pairs cannot."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except (UnicodeEncodeError, RecursionError):
+        return False
+    return True
 
 
 def _cancelled(message: Message) -> int | str:

@@ -88,7 +88,10 @@ class Session:
             return json.dumps(message).encode()
         import msgspec
 
-        return msgspec.json.encode(message)
+        try:
+            return msgspec.json.encode(message)
+        except UnicodeEncodeError:  # words of a client that are no text
+            return json.dumps(msgspec.to_builtins(message)).encode()
 
     def idle(self) -> None:
         """Do what can be done while the client says nothing."""
@@ -96,10 +99,13 @@ class Session:
             self.workbench.idle()
 
     def prepare(self) -> None:
-        """Import what answers, so that the first time takes no longer than others."""
-        if "workbench" in self.__dict__ and any(True for _ in self.workbench.world.documents):
+        """Import what answers, so that the first time takes no longer than others; look around."""
+        if "workbench" not in self.__dict__ or self.is_shut_down:
+            return
+        if any(True for _ in self.workbench.world.documents):
             for method in METHODS.values():
                 method.prepare()
+        self.workbench.rest()
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import msgspec
@@ -11,6 +11,7 @@ from idlc.lsp.documents import Document
 from idlc.lsp.protocol import capabilities, uris
 from idlc.lsp.protocol.errors import INVALID_REQUEST, RequestError
 from idlc.lsp.protocol.parts import (
+    AskedFileRenames,
     DidChange,
     DidChangeFiles,
     DidChangeFolders,
@@ -27,6 +28,8 @@ WATCHED = (
     "**/*.{msg,srv,action}",
     "**/{package.xml,pyproject.toml,CMakeLists.txt,setup.py,setup.cfg,idlc.lock}",
 )
+#: What is shown in a document that may change with another.
+_SHOWN = ("inlayHint", "codeLens", "semanticTokens")
 
 
 class Workbench:
@@ -40,12 +43,15 @@ class Workbench:
         self._changed = False
         #: The problems that were told of each document, and the version that they were of.
         self._told: dict[str, tuple[int | None, bytes]] = {}
+        #: What features show of each document, as a number, and the version that they show.
+        self._prints: dict[str, tuple[int | None, int]] = {}
         self._taken: dict[str, tuple[type, Callable[[Any], None]]] = {
             "textDocument/didOpen": (DidOpen, self._open),
             "textDocument/didChange": (DidChange, self._change),
             "textDocument/didSave": (OfDocument, self._save),
             "textDocument/didClose": (OfDocument, self._close),
             "workspace/didChangeWatchedFiles": (DidChangeFiles, self._change_files),
+            "workspace/didRenameFiles": (AskedFileRenames, self._rename_files),
             "workspace/didChangeWorkspaceFolders": (DidChangeFolders, self._change_folders),
             "workspace/didChangeConfiguration": (DidChangeSettings, self._change_settings),
             "initialized": (dict, self._initialized),
@@ -151,16 +157,48 @@ class Workbench:
         self.world.projects.changed_on_disk(paths - gits)
         self._changed = True
 
+    def _rename_files(self, given: AskedFileRenames) -> None:
+        moved = (uris.to_path(uri) for one in given.files for uri in (one.old_uri, one.new_uri))
+        self.world.projects.changed_on_disk(filter(None, moved))
+        self._changed = True
+
     def idle(self) -> None:
         """Look for what a client does not tell, while it says nothing."""
         if not self.world.supports("workspace", "didChangeWatchedFiles", RELATIVE):
             self.world.lenses_moved()
+
+    def rest(self) -> None:
+        """Do what can wait until the client says nothing."""
+        if self.world.notice_rename():
+            self._changed = True
+            self.settle()
+        self._refresh()
+
+    def _refresh(self) -> None:
+        """Have the client ask again for what it shows where another document changed that."""
+        before = self._prints
+        self._prints = self._fingerprints(self.world.documents)
+        for uri, (version, found) in self._prints.items():
+            old_version, old = before.get(uri, (None, found))
+            if old_version == version and old != found:  # or the client asks by itself
+                for one in _SHOWN:
+                    self.world.refresh(one)
+                return
+
+    def _fingerprints(self, documents: Iterable[Document]) -> dict[str, tuple[int | None, int]]:
+        if not any(self.world.supports("workspace", one, "refreshSupport") for one in _SHOWN):
+            return {}
+        from idlc.lsp.features.fingerprint import fingerprints
+
+        return {one.uri: (one.version, found) for one, found in fingerprints(self.world, documents)}
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
         if not self._changed:
             return
         self._changed = False
+        new_documents = [one for one in self.world.documents if one.uri not in self._prints]
+        self._prints |= self._fingerprints(new_documents) if new_documents else {}
         from idlc.lsp.publish import diagnostics
 
         found = diagnostics(self.world)

@@ -10,6 +10,7 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.built_in_files import file_of, inside
+from idlc.disk.read import is_file
 from idlc.driver.workspace import State, Wishes
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
@@ -44,6 +45,18 @@ class Known(NamedTuple):
     source: Source
 
 
+class Renaming(NamedTuple):
+    """A file that the client was last told to rename, with the edits of its users.
+
+    `text` is what the document at `uri`, where the user asked for it, holds after the edits.
+    """
+
+    old: Path
+    new: Path
+    uri: str
+    text: str
+
+
 class World:
     """The state of a server."""
 
@@ -60,14 +73,18 @@ class World:
         self.encoding = DEFAULT_ENCODING
         self.settings = Settings()
         self.client: dict[str, Any] = {}
+        self.renaming: Renaming | None = None
         #: Folders that lenses compare with a revision, with those in which git notes what it is.
         self.repositories: dict[Path, tuple[Path, ...]] = {}
 
     def supports(self, *path: str) -> bool:
-        """Return whether the client says that it can do something."""
+        """Return whether the client says that it can do something, or names it in a list."""
         found: Any = self.client
         for name in path:
-            found = found.get(name) if isinstance(found, dict) else None
+            if isinstance(found, list):
+                found = name in found
+            else:
+                found = found.get(name) if isinstance(found, dict) else None
         return found not in (None, False)
 
     def follow_git(self, folder: Path, repository: Callable[[], Iterable[Path]]) -> None:
@@ -100,8 +117,13 @@ class World:
             for one in self.projects
             if one.folder in self.repositories and one.is_loaded
         ]
-        if any(moved) and self.supports("workspace", "codeLens", "refreshSupport"):
-            self.ask("workspace/codeLens/refresh", None)
+        if any(moved):
+            self.refresh("codeLens")
+
+    def refresh(self, what: str) -> None:
+        """Have the client ask for something again, such as `codeLens`, if it can."""
+        if self.supports("workspace", what, "refreshSupport"):
+            self.ask(f"workspace/{what}/refresh", None)
 
     def settle(self, given: object) -> str:
         """Take the client's settings; return what is wrong with them, empty if nothing is."""
@@ -113,6 +135,17 @@ class World:
         wishes = {name: getattr(self.settings, name) for name in Wishes.__struct_fields__}
         self.projects.settle(Wishes(**wishes))
         return ""
+
+    def notice_rename(self) -> bool:
+        """Look whether the client has renamed the file that it was told to, and return that.
+
+        An editor that has the file in no buffer says nothing of it.
+        """
+        one = self.renaming
+        is_new = one is not None and self.projects.have(one.old) and not is_file(one.old)
+        if one is not None and is_new:
+            self.projects.changed_on_disk((one.old, one.new))
+        return is_new
 
     def known(self, uri: str) -> Known | None:
         """Return what is known of an interface file; `None` if it is not looked at."""

@@ -13,13 +13,16 @@ class Distro(msgspec.Struct, frozen=True):
     """A distribution, by the name that ROS 2 has for it in paths.
 
     `has_hashes` is whether it has type hashes and descriptions, `reads_optional` whether
-    `@optional` is no error, `has_wheels` whether pip can install its packages.
+    `@optional` is no error, `has_wheels` whether pip can install its packages. `converts_values` is
+    whether its message classes take `None` for the default of any field, and any iterable for a
+    list.
     """
 
     name: str
     has_hashes: bool = True
     reads_optional: bool = False
     has_wheels: bool = False
+    converts_values: bool = False
 
     @property
     def title(self) -> str:
@@ -38,8 +41,8 @@ DISTROS = (
     Distro("iron"),
     Distro("jazzy", has_wheels=True),
     Distro("kilted", has_wheels=True),
-    Distro("lyrical", reads_optional=True),
-    Distro("rolling", reads_optional=True),
+    Distro("lyrical", reads_optional=True, converts_values=True),
+    Distro("rolling", reads_optional=True, converts_values=True),
 )
 BY_NAME = {distro.name: distro for distro in DISTROS}
 #: What is meant where nothing says otherwise.

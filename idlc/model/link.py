@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
-from idlc.diagnostics.suggest import did_you_mean, package_hint
+from idlc.diagnostics.suggest import did_you_mean, including, package_hint
 from idlc.model import catalog, derive, ir, names
 from idlc.model.circles import check_recursion
 from idlc.model.distro import DEFAULT, Distro, titles
@@ -268,7 +268,7 @@ def _missing(target: ir.TypeName, library: Library) -> str:
     if known and known == set(catalog.names(package, distro)):
         return (
             f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`; "
-            "if yours does, add `-I DIR` with its sources, or source your ROS 2"
+            f"if yours does, {including('DIR')} with its sources, or source your ROS 2"
         )
     return f"there is no `{name}.msg` in package `{package}`"
 
@@ -279,6 +279,6 @@ def _of_others(target: ir.TypeName) -> str | None:
     if not others:
         return None
     return (
-        f"it is built in for {titles(others)}; if your ROS 2 has it, add `-I DIR` with its "
+        f"it is built in for {titles(others)}; if your ROS 2 has it, {including('DIR')} with its "
         "sources, or source your ROS 2"
     )

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from idlc.model import ir
+
+_NUMBER = r"[+-]?(?:\d+(?:\.\d+)?(?:[eE][+-]?\d+)?|\d*(?:pi|π)(?:/\d+)?|inf|∞)%?"
+_RANGE = re.compile(
+    rf"\s*(?:{_NUMBER}\s*(?:\.\.\.?|…|-|\u2013|to)\s*{_NUMBER}|(?:[<>]=?|≤|≥)\s*{_NUMBER})\s*"
+)
 
 
 def spell(type_: ir.FieldType, package: str = "") -> str:
@@ -32,3 +39,8 @@ def spell_value(value: ir.Value) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value)
+
+
+def is_range(unit: str) -> bool:
+    """Return whether the text in the brackets of a comment is a range, and no unit."""
+    return _RANGE.fullmatch(unit) is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 from idlc.recordings.errors import RecordingError
 
@@ -11,8 +12,9 @@ SUFFIXES = (".mcap", ".db3")
 #: Files that rosbag2 compressed as a whole.
 COMPRESSED = (".mcap.zstd", ".db3.zstd")
 METADATA = "metadata.yaml"
-#: No recorder writes more.
-MOST_OF_METADATA = 1 << 26
+#: No recorder writes more, or deeper.
+MOST_OF_METADATA = 1 << 23
+DEEPEST = 100
 
 
 def files_of(folder: Path) -> tuple[list[Path], list[str]]:
@@ -25,7 +27,12 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
     notes = []
     metadata = folder / METADATA
     if metadata.is_file():
-        named = dict.fromkeys(_names(metadata))
+        try:
+            paths = _names(metadata)
+        except RecordingError as error:
+            paths = []
+            notes.append(f"{error.message}: all files of the folder are read")
+        named = dict.fromkeys(path if path in present else _own_name(path) for path in paths)
         missing = [name for name in named if name not in present]
         others = [name for name in present if name not in named]
         notes += [f"`{name}` is named in {METADATA} and missing" for name in missing]
@@ -46,35 +53,48 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
 
 
 def _names(metadata: Path) -> list[str]:
-    """Return the names of files in `relative_file_paths`, without the folders in front of them.
+    """Return what `relative_file_paths` has; raise RecordingError if that cannot be read."""
+    import yaml
 
-    This is all that is needed of the file, and one list of texts needs no YAML library. Older
-    versions put the bag's own folder in front.
-    """
     try:
         with metadata.open("rb") as file:
-            text = str(file.read(MOST_OF_METADATA), "utf-8", "replace")
+            text = file.read(MOST_OF_METADATA + 1)
     except OSError as error:
-        raise RecordingError(f"`{metadata}` cannot be read: {error.strerror}") from None
-    names, inside = [], False
-    for line in text.splitlines():
-        stripped = line.strip()
-        if stripped.startswith("relative_file_paths:"):
-            inside = True
-            _, _, rest = stripped.partition(":")
-            names += [_plain(one) for one in rest.strip(" []").split(",") if one.strip()]
-        elif inside and (stripped == "-" or stripped.startswith("- ")):
-            names.append(_plain(stripped[1:]))
-        elif stripped and not stripped.startswith("#"):
-            inside = False
-    return [name for name in names if name]
+        raise RecordingError(f"`{METADATA}` cannot be read: {error.strerror}") from None
+    if len(text) > MOST_OF_METADATA:
+        raise RecordingError(f"`{METADATA}` is larger than {MOST_OF_METADATA >> 20} MiB")
+    # the nodes of the file are all that is needed: nothing is made of them, and nothing is merged
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        depth = 0
+        for event in yaml.parse(text, loader):
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > DEEPEST:
+                raise RecordingError(f"`{METADATA}` nests more than {DEEPEST} levels deep")
+        root = yaml.compose(text, loader)
+    except (yaml.YAMLError, ValueError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
+        raise RecordingError(f"`{METADATA}{where}` is not YAML") from None
+    lists = [
+        paths
+        for information in _values(root, "rosbag2_bagfile_information")
+        for paths in _values(information, "relative_file_paths")
+    ]
+    nodes = [node for one in lists if isinstance(one, yaml.SequenceNode) for node in one.value]
+    return [str(node.value) for node in nodes if isinstance(node, yaml.ScalarNode)]
 
 
-def _plain(text: str) -> str:
-    text = text.strip()
-    if len(text) > 1 and text[0] == text[-1] and text[0] in "'\"":
-        text = text[1:-1]
-    return text.replace("\\", "/").rpartition("/")[2]
+def _values(node: Any, key: str) -> list[Any]:
+    """Return the nodes at a key of a mapping, which may be there twice."""
+    pairs = node.value if getattr(node, "id", "") == "mapping" else ()
+    return [value for name, value in pairs if name.value == key]
+
+
+def _own_name(path: str) -> str:
+    """Return a file's name in the bag: older versions put the bag's own folder in front."""
+    return path.replace("\\", "/").rpartition("/")[2]
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:

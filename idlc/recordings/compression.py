@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from idlc.recordings.errors import RecordingError
@@ -13,6 +13,11 @@ from idlc.recordings.errors import RecordingError
 PIECE = 1 << 22
 #: A chunk may not be larger, whatever it says: no writer makes chunks that come near.
 MOST_IN_A_CHUNK = 1 << 29
+#: How many times larger than the file all that is compressed in it may be, and how much in any
+#: case: images that are all black come near.
+MOST_GROWTH, ANY_GROWTH = 10_000, MOST_IN_A_CHUNK
+#: How many records there may be for each byte of a file, and in any case.
+MOST_RECORDS, ANY_RECORDS = 2, 1 << 20
 #: Has one decompressor of zstd: making one for each chunk takes a tenth of the time, and threads
 #: cannot share it.
 _THREAD = threading.local()
@@ -25,14 +30,27 @@ def check_size(size: int) -> None:
         raise RecordingError(f"a chunk declares {size:,} bytes, more than {MOST_IN_A_CHUNK:,}")
 
 
-def decompressed(data: memoryview, compression: str, size: int) -> memoryview:
-    """Return the `size` bytes that a chunk declares; raise RecordingError if it has others."""
-    check_size(size)
-    if not compression and len(data) == size:
-        return data
-    target = memoryview(bytearray(size))
-    decompress(data, compression, target)
-    return target
+class Room:
+    """How much compressed parts of a file may still hold, so that reading it takes linear time."""
+
+    def __init__(self, size: int) -> None:
+        self._bytes = ANY_GROWTH + MOST_GROWTH * size
+        self._records = ANY_RECORDS + MOST_RECORDS * size
+
+    def take(self, size: int) -> None:
+        """Make room for so many bytes; raise RecordingError if there is none."""
+        check_size(size)
+        self._bytes -= size
+        if self._bytes < 0:
+            what = f"more than {MOST_GROWTH:,} times as much as the file"
+            raise RecordingError(f"what is compressed in it holds {what}")
+
+    def each(self) -> Iterator[None]:
+        """Yield for each record for which there is room; raise RecordingError after the last."""
+        while self._records > 0:
+            self._records -= 1
+            yield
+        raise RecordingError(f"it has more than {MOST_RECORDS} records for each of its bytes")
 
 
 def decompress(data: memoryview, compression: str, target: memoryview) -> None:
@@ -81,15 +99,16 @@ def _zstd(data: memoryview, target: memoryview) -> int:
         raise RecordingError(f"a chunk cannot be decompressed: {error}") from None
 
 
-def zstd_frame(data: bytes) -> bytes:
+def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
     """Return what a message holds that is compressed by itself, and says how large it is."""
     size = _declared(data)
+    room.take(size)
     target = bytearray(size)
     decompress(memoryview(data), "zstd", memoryview(target))
     return bytes(target)
 
 
-def _declared(data: bytes) -> int:
+def _declared(data: bytes | memoryview) -> int:
     """Return the size that the head of a zstd frame declares (RFC 8878, 3.1.1.1)."""
     flags = data[4] if len(data) > 4 else 0
     single = flags >> 5 & 1
@@ -97,9 +116,7 @@ def _declared(data: bytes) -> int:
     start = 5 + (not single) + (0, 1, 2, 4)[flags & 3]
     if not width or len(data) < start + width:
         raise RecordingError("a compressed message does not declare its size")
-    size = int.from_bytes(data[start : start + width], "little") + (256 if width == 2 else 0)
-    check_size(size)
-    return size
+    return int.from_bytes(data[start : start + width], "little") + (256 if width == 2 else 0)
 
 
 def _newer_zstd(data: memoryview, target: memoryview) -> int:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from array import array
+from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,10 +15,11 @@ from idlc.recordings import bag
 from idlc.recordings.compression import ZSTD_MAGIC
 from idlc.recordings.db3 import MAGIC as DB3_MAGIC
 from idlc.recordings.db3 import Db3, Rows
+from idlc.recordings.encapsulation import CDR, Unread, unread
 from idlc.recordings.errors import RecordingError, of_file
-from idlc.recordings.mcap import McapFacts, read_facts
+from idlc.recordings.mcap import McapFacts, first_messages, read_facts
+from idlc.recordings.mcap_records import INDEX_OFFSET, Chunk
 from idlc.recordings.mcap_records import MAGIC as MCAP_MAGIC
-from idlc.recordings.mcap_records import Chunk
 from idlc.recordings.source import first_bytes, is_local, source_of
 
 if TYPE_CHECKING:
@@ -22,6 +27,8 @@ if TYPE_CHECKING:
 
 Opened = TypeVar("Opened", bound="File")
 DB3 = ".db3"
+#: The encoding of definitions that are .msg files.
+MSG = "ros2msg"
 
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
@@ -33,6 +40,11 @@ class Schema:
     name: str
     encoding: str
     text: str
+
+    @property
+    def is_blank(self) -> bool:
+        """Whether it says nothing, as that of a message without fields does."""
+        return not self.text.strip()
 
 
 @dataclass(frozen=True)
@@ -84,7 +96,7 @@ class McapFile(File):
         channel = facts.channels[number]
         found = facts.schemas.get(channel.schema)
         name = full_name(found.name) if found else ""
-        schema = Schema(name, found.encoding, found.text) if found and found.text else None
+        schema = _schema(name, found.encoding, found.text) if found else None
         count = facts.counts.get(number, 0)
         digest = channel.metadata.get("topic_type_hash") or None
         return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
@@ -94,11 +106,56 @@ class McapFile(File):
         """When the first message came."""
         return self.facts.start
 
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield channels with how their first messages begin."""
+        return first_messages(self.source, self.facts, self.facts.channels)
+
     def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
-        """Return where messages of some channels may be."""
+        """Return where messages of some channels may be, with no more indexes than of these."""
         from idlc.recordings.mcap_messages import may_have
 
-        return [one for one in self.facts.chunks if may_have(one, channels, window)]
+        mine: dict[int, bytes] = {}
+        for channel in channels:
+            entries = self._indexes.get(channel, ())
+            for number, at in zip(entries[::2], entries[1::2], strict=True):
+                mine[number] = mine.get(number, b"") + INDEX_OFFSET.pack(channel, at)
+        found = [
+            chunk._replace(indexes=mine.get(number))
+            for number, chunk in enumerate(self.facts.chunks)
+            if number in mine or chunk.indexes is None
+        ]
+        if window != (None, None):
+            found = self._checked(found, channels)
+        return [one for one in found if may_have(one, window)]
+
+    @cached_property
+    def _indexes(self) -> dict[int, array[int]]:
+        """Of each channel the numbers of chunks, each followed by where its MessageIndex is."""
+        found: dict[int, array[int]] = defaultdict(lambda: array("Q"))
+        for number, chunk in enumerate(self.facts.chunks):
+            for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
+                found[channel].extend((number, at))
+        return found
+
+    def _checked(self, chunks: list[Chunk], channels: Collection[int]) -> list[Chunk]:
+        """Return chunks of some channels, without their indexes if these may be incomplete.
+
+        Raises RecordingError if they are: otherwise, messages would be missing from a window. In
+        stores that is not looked for, because each index is a request there.
+        """
+        from idlc.recordings.mcap_messages import count
+
+        loose, counts = self.facts.loose, self.facts.counts
+        whole = [one for one in chunks if one.compression is not None]
+        if loose is None or not is_local(self.place):
+            return chunks
+        if any(one.indexes is None for one in whole):
+            return [one._replace(indexes=None) for one in self.facts.chunks]
+        with of_file(self.name):
+            told = sum(counts.get(one, 0) - loose.get(one, 0) for one in channels)
+            name = self.facts.channels[next(iter(channels))].topic
+            check_count(name, told, sum(count(self.source, one) for one in whole))
+        return chunks
 
     def messages(
         self, channels: Collection[int], pieces: Iterable[Chunk], window: Window
@@ -120,11 +177,11 @@ class Db3File(File):
         self.place = str(path)
         self.name = str(path)
         self.database = Db3(path)
-        self.notes: list[str] = []
+        self.notes = self.database.notes
         self.topics: list[tuple[Topic, int]] = []
         for one in self.database.topics() if read else ():
             name = full_name(one.type)
-            schema = Schema(name, one.schema_encoding, one.text) if one.text.strip() else None
+            schema = _schema(name, one.schema_encoding, one.text)
             topic = Topic(one.name, name, one.messages, one.hash or None, one.encoding, schema)
             self.topics.append((topic, one.id))
 
@@ -132,6 +189,10 @@ class Db3File(File):
     def start(self) -> int | None:
         """When the first message came."""
         return self.database.start()
+
+    def first_messages(self) -> Iterator[tuple[int, bytes]]:
+        """Yield topics with how their first messages begin."""
+        return self.database.first_messages()
 
     def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
         """Return where messages of some topics may be."""
@@ -159,24 +220,46 @@ class Container(File):
         self.notes = (*notes, *(note for file in files for note in file.notes))
         self.topics: tuple[Topic, ...] = tuple(_merged(files))
 
-    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int]]]:
-        """Yield each file that has messages of a topic, and what it calls the topic."""
-        for file in self.files:
-            ids = [number for one, number in file.topics if _is_part_of(one, topic)]
-            if ids:
-                yield file, ids
+    @cached_property
+    def _places(self) -> dict[tuple[str, str, str], list[tuple[int, Topic, int]]]:
+        """Of each topic, whatever its definition: number of the file, and what that says of it."""
+        found: dict[tuple[str, str, str], list[tuple[int, Topic, int]]] = {}
+        for index, file in enumerate(self.files):
+            for topic, number in file.topics:
+                found.setdefault(_key(topic), []).append((index, topic, number))
+        return found
+
+    def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int], int]]:
+        """Yield each file with messages of a topic, what it calls the topic, and their count."""
+        mine: dict[int, dict[int, int]] = {}
+        for index, one, number in self._places.get(_key(topic), ()):
+            if one.schema == topic.schema or _is_bare(one):
+                mine.setdefault(index, {})[number] = one.count
+        for index, counts in mine.items():
+            yield self.files[index], list(counts), sum(counts.values())
 
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""
-        for file, ids in self.ids_of(topic):
+        for file, ids, told in self.ids_of(topic):
             found = 0
             for some in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
                 found += len(some)
                 yield some
-            told = sum(one.count for one, number in file.topics if number in ids)
-            if window == (None, None) and found != told:
-                what = f"{told:,} messages of `{topic.name}` are counted, and there are {found:,}"
-                raise RecordingError(f"`{file.name}`: {what}")
+            if window == (None, None):
+                with of_file(file.name):
+                    check_count(topic.name, told, found)
+
+    def unread(self) -> list[Unread]:
+        """Return which topics cannot be read, by the first message of each."""
+        found: dict[Unread, None] = {}
+        for file in self.files:
+            names = {number: one.name for one, number in file.topics if one.encoding == CDR}
+            with suppress(RecordingError):  # reading the messages says what is wrong
+                for number, start in file.first_messages():
+                    why = unread(names[number], start) if number in names else None
+                    if why:
+                        found[why] = None
+        return list(found)
 
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""
@@ -255,10 +338,28 @@ def full_name(name: str) -> str:
     return f"{package}/msg/{rest}" if slash and "/" not in rest else name
 
 
-def _is_part_of(one: Topic, whole: Topic) -> bool:
-    """Return whether a channel belongs to a topic: definitions may be left out."""
-    same = (one.name, one.type, one.encoding) == (whole.name, whole.type, whole.encoding)
-    return same and one.schema in (whole.schema, None)
+def _schema(name: str, encoding: str, text: str) -> Schema | None:
+    """Return a definition; where a recorder has none, it writes an empty one of no encoding."""
+    schema = Schema(name, encoding, text)
+    return None if schema.is_blank and encoding != MSG else schema
+
+
+def _is_bare(topic: Topic) -> bool:
+    """Return whether a channel has no definition, or an empty one, which others may complete."""
+    return topic.schema is None or topic.schema.is_blank
+
+
+def _key(topic: Topic) -> tuple[str, str, str]:
+    """Return what is the same of all channels that may belong to a topic."""
+    return topic.name, topic.type, topic.encoding
+
+
+def check_count(topic: str, told: int, found: int) -> None:
+    """Raise RecordingError if there are other messages than are counted."""
+    if told != found:
+        hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
+        what = f"{told:,} messages of `{topic}` are counted, and there are {found:,}"
+        raise RecordingError(what, hint)
 
 
 def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
@@ -266,15 +367,18 @@ def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     found: dict[tuple[str, str, str], list[Topic]] = {}
     for file in files:
         for topic, _ in file.topics:
-            found.setdefault((topic.name, topic.type, topic.encoding), []).append(topic)
+            found.setdefault(_key(topic), []).append(topic)
     for same in found.values():
-        texts = dict.fromkeys(topic.schema for topic in same if topic.schema)
-        for schema in texts or [None]:
-            whole = replace(same[0], schema=schema)
-            mine = [one for one in same if _is_part_of(one, whole)]
-            hashes = [one.hash for one in mine if one.hash]
-            yield replace(
-                whole,
-                count=sum(one.count for one in mine),
-                hash=hashes[0] if hashes else None,
-            )
+        by_schema: dict[Schema | None, list[Topic]] = {}
+        for topic in same:
+            by_schema.setdefault(None if _is_bare(topic) else topic.schema, []).append(topic)
+        # without a definition, a channel belongs to each of the others
+        bare = _joined(sorted(by_schema.pop(None, []), key=lambda one: one.schema is None))
+        for mine in by_schema.values() or [[]]:
+            yield _joined([*mine, *bare])[0]
+
+
+def _joined(same: list[Topic]) -> list[Topic]:
+    """Return what channels have in common, if there is any, the first definition and hash of it."""
+    digest = next((one.hash for one in same if one.hash), None)
+    return [replace(one, count=sum(x.count for x in same), hash=digest) for one in same[:1]]

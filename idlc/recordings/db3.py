@@ -6,18 +6,25 @@ tables is accepted, and values are taken only of the types that a recorder write
 
 from __future__ import annotations
 
+import shlex
 import sqlite3
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Generator, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from idlc.recordings.encapsulation import START
 from idlc.recordings.errors import RecordingError
+from idlc.recordings.source import first_bytes
 
 MAGIC = b"SQLite format 3\0"
 #: Hidden columns of these kinds are computed by the file.
 COMPUTED = {2, 3}
+#: What the header says at byte 18 of a database that is written by way of a log, `-wal`.
+WRITES_A_LOG = 2
+#: Seconds to wait for a writer that has locked the file.
+PATIENCE = 5.0
 
 
 class Db3Topic(NamedTuple):
@@ -45,37 +52,88 @@ class Db3:
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
+        self._path = path.resolve()
+        self._log = self._path.with_name(self._path.name + "-wal")
         self.size = path.stat().st_size
-        # what a recorder has not yet written back stands in a second file
-        written_back = not _has_content(path.with_name(path.name + "-wal"))
-        mode = "mode=ro&immutable=1" if written_back else "mode=ro"
+        # SQLite makes files beside a database that has a log, even to read it
+        log = first_bytes(path, 19)[18:] == bytes([WRITES_A_LOG])
+        self._lone = log and not self._is_in_use()
+        self._state = self._path.stat()
         with self.errors():
-            location = f"file:{quote(str(path.resolve()))}?{mode}"
-            self._db = sqlite3.connect(location, uri=True, check_same_thread=False)
-            for pragma in ("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON"):
+            location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
+            self._db = sqlite3.connect(location, PATIENCE, uri=True, check_same_thread=False)
+            # a mapped file that somebody cuts off would end the process
+            for pragma in (
+                *("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON", "mmap_size=0"),
+            ):
                 self._db.execute(f"PRAGMA {pragma}")
         try:
             self.columns = self._tables()
+            self._check_size()
         except RecordingError:
             self._db.close()
             raise
 
+    @property
+    def notes(self) -> list[str]:
+        """What is unusual about the file."""
+        if not self._lone:
+            return []
+        name, log = self._path.name, self._log.name
+        why = f"it was written by way of `{log}`, which is not there"
+        return [f"{name}: {why}: if that was left behind, the last messages are missing"]
+
     def close(self) -> None:
         """Close the file."""
         self._db.close()
+
+    def _is_in_use(self) -> bool:
+        """Return whether a journal or log has something that the file has not, or may have."""
+        journal = self._path.with_name(self._path.name + "-journal")
+        return _begins(self._log) or _begins(journal)
 
     @contextmanager
     def errors(self) -> Iterator[None]:
         """Turn what SQLite finds wrong into an error about the recording."""
         try:
             yield
-        except (sqlite3.Error, OverflowError, UnicodeError) as error:
-            raise RecordingError(f"`{self.name}` cannot be read: {error}") from None
+        except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
+            raise self._error(str(error)) from None
 
-    def rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-        """Yield what a query finds."""
-        with self.errors():
-            yield from self._db.execute(query, values)
+    def _error(self, what: str) -> RecordingError:
+        """Return an error that says what can be done about what SQLite found."""
+        repair = f"sqlite3 {shlex.quote(self.name)} .schema"
+        if "readonly" in what:  # it would have to write to roll back
+            why = "is not whole: its writer stopped in the middle of a transaction"
+            return RecordingError(f"`{self.name}` {why}", f"SQLite undoes it: {repair}")
+        if "locked" in what:
+            why = "is locked by the program that writes it"
+            return RecordingError(f"`{self.name}` {why}", "try again when that has ended")
+        if "unable to open" in what and self._is_in_use():
+            why = f"cannot be read with its `{self._log.name}`, which needs a file beside it"
+            return RecordingError(f"`{self.name}` {why}", "copy both to a folder of your own")
+        return RecordingError(f"`{self.name}` cannot be read: {what}")
+
+    def rows(
+        self, query: str, values: tuple[Any, ...] = ()
+    ) -> Generator[tuple[Any, ...], None, None]:
+        """Yield what a query finds; the file is locked until it is exhausted or closed."""
+        with self.errors(), closing(self._db.execute(query, values)) as found:
+            yield from found
+            if self._lone:
+                self._check_unchanged()
+
+    def _check_unchanged(self) -> None:
+        """Raise RecordingError if somebody wrote to a file that was read without a lock."""
+        now, then = self._path.stat(), self._state
+        if self._is_in_use() or (now.st_mtime_ns, now.st_size) != (then.st_mtime_ns, then.st_size):
+            raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
+
+    def _check_size(self) -> None:
+        """Raise RecordingError if the last page is cut off, which SQLite fills with zeros."""
+        ((page,),) = self.rows("PRAGMA page_size")
+        if rest := self._path.stat().st_size % page:
+            raise RecordingError(f"`{self.name}` is cut off after {rest:,} bytes of a page")
 
     def _tables(self) -> dict[str, set[str]]:
         """Return each table's columns; raise RecordingError if there are others than plain ones."""
@@ -120,6 +178,14 @@ class Db3:
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics
 
+    def first_messages(self) -> Iterator[tuple[Any, bytes]]:
+        """Yield topics with how their first messages begin; few pages of large ones are read."""
+        query = "SELECT topic_id, MIN(rowid) FROM messages NOT INDEXED GROUP BY topic_id"
+        for topic, row in list(self.rows(query)):
+            for (data,) in self.rows("SELECT data FROM messages WHERE rowid = ?", (row,)):
+                if isinstance(data, bytes):
+                    yield topic, data[:START]
+
     def rows_of_messages(self) -> list[Rows]:
         """Return the rows that there are, in one piece; none if there are no messages."""
         # one query for both would go over all rows
@@ -157,8 +223,6 @@ class Db3:
         )
 
 
-def _has_content(path: Path) -> bool:
-    try:
-        return path.stat().st_size > 0
-    except OSError:
-        return False
+def _begins(path: Path) -> bool:
+    """Return whether there is a journal or log that is not empty, or marked as done with zeros."""
+    return path.is_file() and first_bytes(path, 1) not in (b"", b"\0")

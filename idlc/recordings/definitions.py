@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from idlc.diagnostics.source import Source
 from idlc.disk.read import MAX_LINES
 from idlc.model import ir, names
-from idlc.recordings.container import Topic
+from idlc.recordings.container import Schema, Topic
 from idlc.syntax.grammar import LINE_ENDS
 
 IDL = "ros2idl"
@@ -53,19 +53,46 @@ class Recorded(NamedTuple):
     repeated: tuple[tuple[ir.TypeName, Source], ...] = ()
 
 
-def recorded(topic: Topic, recording: str) -> Recorded:
-    """Return what a recording, as it is called in messages, says of a topic."""
+#: What came with topics, by definition and interface.
+Known: TypeAlias = dict[
+    tuple[Schema | None, ir.TypeName],
+    tuple[dict[ir.TypeName, Source], tuple[tuple[ir.TypeName, Source], ...]],
+]
+
+
+def recorded(topic: Topic, recording: str, known: Known | None = None) -> Recorded:
+    """Return what a recording, as it is called in messages, says of a topic.
+
+    What is `known` of other topics of the recording is used again, and added to.
+    """
     name = type_name(topic.type)
     if name is None:
         return Recorded(recording, topic, None, None, {})
     interface = interface_of(name)
+    key = topic.schema, interface
+    known = {} if known is None else known
+    if key not in known:
+        known[key] = _texts(topic, interface, recording)
+    return Recorded(recording, topic, name, interface, *known[key])
+
+
+def _texts(
+    topic: Topic, interface: ir.TypeName, recording: str
+) -> tuple[dict[ir.TypeName, Source], tuple[tuple[ir.TypeName, Source], ...]]:
+    """Return the texts that came with a topic, and others of the same names.
+
+    Where a recorder finds no .msg file that it can use, it writes an empty one and then the IDL.
+    """
     texts: dict[ir.TypeName, Source] = {}
     repeated = []
     for one, extension, text in _definitions(topic, interface):
         source = Source(f"{recording}: topic {topic.name}: {one}.{extension}", text, recording)
-        if texts.setdefault(one, source).text != text:
+        first = texts.setdefault(one, source)
+        if not first.text and source.is_idl:
+            texts[one] = source
+        elif first.text != text and (text or not first.is_idl):
             repeated.append((one, source))
-    return Recorded(recording, topic, name, interface, texts, tuple(repeated))
+    return texts, tuple(repeated)
 
 
 def type_name(text: str, kind: ir.Kind = "msg") -> ir.TypeName | None:

@@ -7,26 +7,33 @@ out. It is believed only if it accounts for all that its own statistics count.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 from idlc.recordings import mcap_records as mcap
-from idlc.recordings.compression import decompressed
+from idlc.recordings.compression import Room, decompress
+from idlc.recordings.encapsulation import START
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.mcap_records import HEAD, MAGIC, Channel, Chunk, McapSchema
 from idlc.recordings.source import Source
 
 END_OF_TIME = (1 << 64) - 1
+#: Bytes of a Message record before the message itself.
+MESSAGE_HEAD = 22
 
 
 @dataclass
 class McapFacts:
-    """What a file holds; `counts` is by channel, and `start` is when the first message came."""
+    """What a file holds; `start` is when the first message came.
+
+    `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
+    """
 
     schemas: dict[int, McapSchema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
     counts: dict[int, int] = field(default_factory=dict)
+    loose: dict[int, int] | None = None
     start: int | None = None
     notes: list[str] = field(default_factory=list)
 
@@ -51,9 +58,58 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> McapF
     if index:
         try:
             return _summary(source, check)
+        except ContradictionError as error:
+            reason, index = error.message, False
         except RecordingError as error:
             reason = error.message
     return _walk(source, reason, index)
+
+
+def first_messages(
+    source: Source, facts: McapFacts, channels: Collection[int]
+) -> Iterator[tuple[int, bytes]]:
+    """Yield channels with how their first messages begin; each chunk is opened at most once."""
+    waiting = {one for one in channels if facts.counts.get(one)}
+    room = Room(source.size)
+    for chunk in facts.chunks:
+        named = {channel for channel, _ in mcap.INDEX_OFFSET.iter_unpack(chunk.indexes or b"")}
+        mine = waiting if chunk.indexes is None else waiting & named
+        if not mine:
+            continue
+        for data, _ in zip(_contents(source, chunk, room), room.each(), strict=False):
+            number = int.from_bytes(data[:2], "little")
+            if number in mine:
+                yield number, bytes(data[MESSAGE_HEAD:])
+                mine.remove(number)
+                waiting.discard(number)
+                if not mine:
+                    break
+
+
+def _contents(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
+    """Yield how each message of a chunk, or of a stretch outside of any, begins."""
+    most = MESSAGE_HEAD + START
+    if chunk.compression is None:
+        for op, at, size in mcap.heads(source, chunk.at, chunk.at + chunk.size):
+            if op == mcap.MESSAGE_OP:
+                yield source.view(at + HEAD.size, min(size - HEAD.size, most))
+        return
+    for op, _, data in mcap.records(_content(source, chunk, room)):
+        if op == mcap.MESSAGE_OP:
+            yield data[:most]
+
+
+def _content(source: Source, chunk: Chunk, room: Room) -> memoryview:
+    """Return the records of a chunk."""
+    head = mcap.chunk_head(source, chunk.at, chunk.size)
+    room.take(head.size)
+    target = memoryview(bytearray(head.size))
+    decompress(source.view(head.start, head.stored), head.compression, target)
+    return target
+
+
+class ContradictionError(RecordingError):
+    """A summary is not only incomplete but wrong, and what was written with it may be, too."""
 
 
 def _summary(source: Source, check: bool) -> McapFacts:
@@ -70,7 +126,7 @@ def _summary(source: Source, check: bool) -> McapFacts:
     if check and crc:
         covered = source.view(start, source.size - len(MAGIC) - 4 - start)
         if zlib.crc32(covered) != crc:
-            raise RecordingError("the checksum of its summary is wrong")
+            raise ContradictionError("the checksum of its summary is wrong")
     facts, statistics = McapFacts(), None
     for op, _, content in mcap.records(data):
         facts.add(op, content)
@@ -78,34 +134,60 @@ def _summary(source: Source, check: bool) -> McapFacts:
             facts.chunks.append(mcap.chunk_index(content))
         elif op == mcap.STATISTICS_OP:
             statistics = mcap.statistics(content)
-    _believe(facts, statistics, start)
+    _believe(facts, statistics)
+    _add_loose(source, facts, start)
     return facts
 
 
-def _believe(facts: McapFacts, statistics: mcap.Statistics | None, start: int) -> None:
+def _believe(facts: McapFacts, statistics: mcap.Statistics | None) -> None:
     """Raise RecordingError if a summary leaves something out, by its own count."""
     if statistics is None:
         raise RecordingError("its summary has no statistics")
     if statistics.chunks != len(facts.chunks):
-        raise RecordingError("its summary names other chunks than it counts")
+        raise ContradictionError("its summary names other chunks than it counts")
     if not statistics.counts.keys() <= facts.channels.keys():
         raise RecordingError("its summary does not name all channels")
     if any(one.schema and one.schema not in facts.schemas for one in facts.channels.values()):
         raise RecordingError("its summary does not name all schemas")
     if statistics.messages != sum(statistics.counts.values()):
-        raise RecordingError("its summary counts messages in two ways")
-    facts.chunks.sort(key=lambda chunk: chunk.at)
-    end = len(MAGIC)
-    for chunk in facts.chunks:
-        if chunk.at < end:
-            raise RecordingError("its summary names a chunk twice")
-        end = chunk.at + chunk.size
-    if end > start:
-        raise RecordingError("its summary names chunks that are not there")
-    if statistics.messages and not facts.chunks:
-        facts.chunks = [Chunk(len(MAGIC), start - len(MAGIC), 0, END_OF_TIME, None, None)]
+        raise ContradictionError("its summary counts messages in two ways")
     facts.counts = statistics.counts
     facts.start = statistics.start if statistics.messages else None
+
+
+def _add_loose(source: Source, facts: McapFacts, start: int) -> None:
+    """Add the stretches that no chunk covers and that have messages, in a file with a summary.
+
+    Raises RecordingError if the chunks are not where there is room for them.
+    """
+    facts.chunks.sort(key=lambda chunk: chunk.at)
+    end, gaps = len(MAGIC), []
+    for at, following in [
+        *((chunk.at, chunk.at + chunk.size + chunk.index_size) for chunk in facts.chunks),
+        (start, start),
+    ]:
+        if at < end:
+            raise ContradictionError("its summary names chunks that are not there")
+        gaps.append((end, at))
+        end = following
+    facts.loose = {}
+    for first, last in gaps:
+        facts.chunks += _loose(source, facts.loose, first, last)
+    facts.chunks.sort(key=lambda chunk: chunk.at)
+
+
+def _loose(source: Source, counts: dict[int, int], at: int, end: int) -> Iterator[Chunk]:
+    """Yield the stretch of messages in a gap between chunks, if there is one."""
+    first, last = None, at
+    for op, place, size in mcap.heads(source, at, end):
+        if op == mcap.CHUNK_OP:
+            raise ContradictionError("its summary does not name all chunks")
+        if op == mcap.MESSAGE_OP:
+            first, last = place if first is None else first, place + size
+            number = int.from_bytes(source.view(place + mcap.HEAD.size, min(2, size)), "little")
+            counts[number] = counts.get(number, 0) + 1
+    if first is not None:
+        yield Chunk(first, last - first, 0, END_OF_TIME, None, None)
 
 
 class _Walk:
@@ -122,18 +204,7 @@ class _Walk:
         self.last: Chunk | None = None
         self.offsets = bytearray()
         self.entries: dict[int, int] = {}
-
-    def heads(self) -> Iterator[tuple[int, int, int]]:
-        """Yield kind, place and size, with the head, of each record that is there as a whole."""
-        at = len(MAGIC)
-        while at + HEAD.size <= self.source.size:
-            op, size = HEAD.unpack(self.source.view(at, HEAD.size))
-            if not op or at + HEAD.size + size > self.source.size:
-                return
-            yield op, at, HEAD.size + size
-            at += HEAD.size + size
-            if op == mcap.DATA_END_OP:
-                return
+        self.room = Room(source.size)
 
     def content(self, at: int, size: int) -> memoryview:
         """Return what a record holds."""
@@ -168,7 +239,7 @@ class _Walk:
 
     def chunk(self, at: int, size: int) -> None:
         """Take note of a chunk."""
-        head = mcap.chunk_head(self.content(at, size))
+        head = mcap.chunk_head(self.source, at, size)
         self.last = Chunk(at, size, head.first, head.last, head.compression, None)
 
     def index(self, at: int, size: int) -> None:
@@ -196,8 +267,8 @@ class _Walk:
 
     def open(self, chunk: Chunk, counting: bool) -> None:
         """Take note of what stands in a chunk."""
-        head = mcap.chunk_head(self.content(chunk.at, chunk.size))
-        for op, _, data in mcap.records(decompressed(head.records, head.compression, head.size)):
+        content = _content(self.source, chunk, self.room)
+        for (op, _, data), _ in zip(mcap.records(content), self.room.each(), strict=False):
             self.facts.add(op, data)
             if counting and op == mcap.MESSAGE_OP:
                 self.count_one(data)
@@ -209,7 +280,7 @@ def _walk(source: Source, reason: str, index: bool) -> McapFacts:
     Without `index`, those of chunks are not used either.
     """
     walk, ended, end = _Walk(source, index), False, len(MAGIC)
-    for op, at, size in walk.heads():
+    for op, at, size in mcap.heads(source, end, source.size):
         end = at + size
         if op == mcap.MESSAGE_INDEX_OP and walk.last:
             if walk.uses_index:
@@ -223,7 +294,10 @@ def _walk(source: Source, reason: str, index: bool) -> McapFacts:
             walk.chunk(at, size)
         elif op in (mcap.SCHEMA_OP, mcap.CHANNEL_OP):
             walk.facts.add(op, walk.content(at, size))
-        ended = op == mcap.DATA_END_OP
+        # a summary follows, and nothing keeps a writer from going on
+        ended = op == mcap.DATA_END_OP or (ended and op not in (mcap.MESSAGE_OP, mcap.CHUNK_OP))
+        if op == mcap.FOOTER_OP:
+            break
     walk.end_of_chunk(cut_off=not ended)
     walk.end_of_loose()
     if ended:

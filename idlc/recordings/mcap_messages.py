@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from idlc.recordings import mcap_records as mcap
-from idlc.recordings.compression import check_size, decompress
+from idlc.recordings.compression import ZSTD_MAGIC, Room, decompress, zstd_frame
 from idlc.recordings.errors import RecordingError, of_file
-from idlc.recordings.mcap_records import HEAD, Chunk, ChunkHead
-from idlc.recordings.messages import Messages, Ranges, Window, times_of
-from idlc.recordings.source import Source
+from idlc.recordings.mcap_records import HEAD, INDEX_OFFSET, Chunk, ChunkHead
+from idlc.recordings.messages import Messages, Ranges, Raw, Separate, Window, times_of
+from idlc.recordings.source import LocalFile, Read, Source, within
 
 #: What stands before the bytes of a message.
 MESSAGE = np.dtype(
@@ -36,9 +36,10 @@ MESSAGE = np.dtype(
 )
 MESSAGE_HEAD = Struct("<BQH")
 LEAST = MESSAGE.itemsize - HEAD.size
-#: Neighbours are opened together up to so many bytes: few calls, and memory stays bounded. What is
-#: read in place takes no memory of its own.
-GROUP, GROUP_IN_PLACE = 1 << 24, 1 << 26
+#: Neighbours are opened together up to so many bytes: few calls, and memory stays bounded.
+GROUP = 1 << 24
+#: Where chunks are not compressed, what lies between messages is read too if it is smaller.
+NEAR = 1 << 15
 
 
 class Opened(NamedTuple):
@@ -58,90 +59,120 @@ def messages(
 ) -> Iterator[Messages]:
     """Yield the messages of some channels in chunks, those of neighbours together."""
     with of_file(source.name):
-        wanted = (chunk for chunk in chunks if may_have(chunk, channels, window))
-        for group in _groups(source, wanted):
-            buffer, opened = _opened(source, group, check)
-            array = np.frombuffer(buffer, np.uint8)
-            offsets = [_offsets(source, array, one, channels) for one in opened]
-            made = _messages(buffer, array, opened, offsets, channels).within(window)
+        room = Room(source.size)
+        wanted = (chunk for chunk in chunks if may_have(chunk, window))
+        for group in _groups(source, wanted, room):
+            buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
+            opened, offsets, at = [], [], 0
+            for chunk, head in group:
+                one = Opened(chunk, at, at := at + head.size)
+                found = _indexed(source, one, channels)
+                _fill(source, one, head, buffer, found, check)
+                if found is None:
+                    found = np.array(_walked(buffer, one, channels, room), np.int64)
+                opened.append(one)
+                offsets.append(found)
+            made = _messages(buffer, opened, offsets, channels).within(window)
             if len(made):
-                yield made
-            last = group[-1][0]
-            source.forget(group[0][0].at, last.at + last.size)
+                yield unpacked(made, room)
 
 
-def may_have(chunk: Chunk, channels: Collection[int], window: Window) -> bool:
-    """Return whether wanted messages may be in a chunk, by what its index says."""
-    if chunk.compression is not None and not window.overlaps(chunk.first, chunk.last):
-        return False
-    return chunk.indexes is None or any(chunk.index_of(one) is not None for one in channels)
+def may_have(chunk: Chunk, window: Window) -> bool:
+    """Return whether messages of a time may be in a chunk, by what its index says."""
+    return chunk.compression is None or window.overlaps(chunk.first, chunk.last)
+
+
+def count(source: Source, chunk: Chunk) -> int:
+    """Return how many messages the indexes of a chunk name."""
+    places = INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
+    return sum(_entries(source, channel, at) // 16 for channel, at in places)
 
 
 def _head(source: Source, chunk: Chunk) -> ChunkHead:
-    """Return what stands before the records of a chunk, with these."""
+    """Return what stands before the records of a chunk."""
     if chunk.compression is None:
-        return ChunkHead(0, 0, chunk.size, 0, "", chunk.at, source.view(chunk.at, chunk.size))
-    data = source.view(chunk.at, chunk.size)
-    if chunk.size < HEAD.size or HEAD.unpack_from(data) != (mcap.CHUNK_OP, chunk.size - HEAD.size):
+        return ChunkHead(0, 0, chunk.size, 0, "", chunk.at, chunk.size)
+    head = source.view(chunk.at, HEAD.size)
+    if HEAD.unpack(head) != (mcap.CHUNK_OP, chunk.size - HEAD.size):
         raise RecordingError(f"there is no chunk at byte {chunk.at}, where an index has one")
-    head = mcap.chunk_head(data[HEAD.size :])
-    check_size(head.size)
-    return head._replace(start=chunk.at + HEAD.size + head.start)
+    return mcap.chunk_head(source, chunk.at, chunk.size)
 
 
-def _groups(source: Source, chunks: Iterable[Chunk]) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
-    """Yield neighbours that are opened together: all of them in place, or none."""
+def _groups(
+    source: Source, chunks: Iterable[Chunk], room: Room
+) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
+    """Yield neighbours that are opened together."""
     group: list[tuple[Chunk, ChunkHead]] = []
-    size = most = 0
-    for chunk in chunks:
-        head = _head(source, chunk)
-        room = GROUP_IN_PLACE if _in_place(source, head) else GROUP
-        if group and (room != most or size + head.size > room):
-            yield group
-            group, size = [], 0
-        most = room
-        group.append((chunk, head))
-        size += head.size
+    size = 0
+    for whole in chunks:
+        for chunk in _divided(source, whole) if whole.compression is None else (whole,):
+            head = _head(source, chunk)
+            if head.compression:
+                room.take(head.size)
+            elif head.size != head.stored:
+                raise RecordingError("a chunk that is not compressed declares another size")
+            if group and size + head.size > GROUP:
+                yield group
+                group, size = [], 0
+            group.append((chunk, head))
+            size += head.size
     if group:
         yield group
 
 
-def _in_place(source: Source, head: ChunkHead) -> bool:
-    """Return whether the records of a chunk are read where they are in the file."""
-    return source.mapped is not None and not head.compression
+def _divided(source: Source, stretch: Chunk) -> Iterator[Chunk]:
+    """Yield parts of a stretch of records outside of chunks, which may be the whole file."""
+    start, end = stretch.at, stretch.at + stretch.size
+    if stretch.size > GROUP:
+        for _, at, size in mcap.heads(source, start, end):
+            if start < at and at + size - start > GROUP:
+                yield stretch._replace(at=start, size=at - start)
+                start = at
+    yield stretch._replace(at=start, size=end - start)
 
 
-def _opened(
-    source: Source, group: list[tuple[Chunk, ChunkHead]], check: bool
-) -> tuple[Any, list[Opened]]:
-    """Return a buffer with the records of chunks: the file itself if they are in place."""
-    in_place = _in_place(source, group[0][1])
-    buffer: Any = source.mapped
-    if not in_place:
-        buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
-    opened, at = [], 0
-    for chunk, head in group:
-        if in_place:
-            at = head.start
-            if head.size != len(head.records):
-                raise RecordingError("a chunk that is not compressed declares another size")
-        else:
-            decompress(head.records, head.compression, buffer[at : at + head.size])
-        if check and head.crc and zlib.crc32(buffer[at : at + head.size]) != head.crc:
-            raise RecordingError(f"the checksum of the chunk at byte {chunk.at} is wrong")
-        opened.append(Opened(chunk, at, at + head.size))
-        at += head.size
-    return buffer, opened
+def _fill(
+    source: Source, one: Opened, head: ChunkHead, buffer: memoryview, offsets: Any, check: bool
+) -> None:
+    """Put the records of a chunk into a buffer, or those at some offsets if that suffices."""
+    target = buffer[one.start : one.stop]
+    check = check and head.crc != 0
+    if head.compression:
+        decompress(source.view(head.start, head.stored), head.compression, target)
+    else:
+        with source.opened() as read:
+            if offsets is None or check or not isinstance(source, LocalFile):
+                read(head.start, target)
+            else:
+                _read_some(read, head.start, target, offsets - one.start)
+    if check and zlib.crc32(target) != head.crc:
+        raise RecordingError(f"the checksum of the chunk at byte {one.chunk.at} is wrong")
 
 
-def _offsets(source: Source, array: Any, one: Opened, channels: Collection[int]) -> Any:
-    """Return where in the buffer the messages of some channels are, in their order."""
+def _read_some(read: Read, start: int, target: memoryview, offsets: Any) -> None:
+    """Read messages of a chunk that begins at `start`, neighbours together."""
+    for near in np.split(offsets, np.flatnonzero(np.diff(offsets) > NEAR) + 1):
+        if not len(near):
+            return
+        first, last = int(near[0]), int(near[-1])
+        stop = min(last + NEAR, len(target))
+        read(start + first, target[first:stop])
+        _, size = HEAD.unpack_from(target, last)
+        end = min(last + HEAD.size + size, len(target))
+        if end > stop:
+            read(start + stop, target[stop:end])
+
+
+def _indexed(source: Source, one: Opened, channels: Collection[int]) -> Any:
+    """Return where in the buffer the messages of some channels are; None without an index."""
     if one.chunk.indexes is None:
-        return np.array(_walked(array, one, channels), np.int64)
-    places = [one.chunk.index_of(channel) for channel in channels]
-    pairs = zip(channels, places, strict=True)
-    found = [_indexed(source, channel, at) for channel, at in pairs if at is not None]
-    offsets = np.concatenate(found)
+        return None
+    found = [
+        np.frombuffer(source.view(at + HEAD.size + 6, _entries(source, channel, at)), "<u8")[1::2]
+        for channel, at in INDEX_OFFSET.iter_unpack(one.chunk.indexes)
+        if channel in channels
+    ]
+    offsets = np.concatenate([np.zeros(0, "<u8"), *found])
     last = one.stop - one.start - MESSAGE.itemsize
     if len(offsets) and (last < 0 or int(offsets.max()) > last):
         raise RecordingError("an index of messages leaves its chunk")
@@ -151,26 +182,28 @@ def _offsets(source: Source, array: Any, one: Opened, channels: Collection[int])
     return offsets + one.start
 
 
-def _indexed(source: Source, channel: int, at: int) -> Any:
-    """Return the offsets that the MessageIndex at a place has."""
+def _entries(source: Source, channel: int, at: int) -> int:
+    """Return how many bytes of entries the MessageIndex at a place has, by its head."""
     op, size = HEAD.unpack(source.view(at, HEAD.size))
     if op != mcap.MESSAGE_INDEX_OP:
         raise RecordingError(f"there is no index of messages at byte {at}, where another has one")
-    fields = mcap.Fields(source.view(at + HEAD.size, size), "an index of messages")
+    within(source, at + HEAD.size, size)
+    fields = mcap.Fields(source.view(at + HEAD.size, min(size, 6)), "an index of messages")
     if fields.number(2) != channel:
         raise RecordingError(f"the index of messages at byte {at} is of another channel")
-    entries = fields.part().data
-    if len(entries) % 16:
+    entries = fields.number(4)
+    if entries % 16 or entries > size - 6:
         raise RecordingError(f"the index of messages at byte {at} is cut off")
-    return np.frombuffer(entries, "<u8")[1::2]
+    return entries
 
 
-def _walked(array: Any, one: Opened, channels: Collection[int]) -> list[int]:
+def _walked(view: memoryview, one: Opened, channels: Collection[int], room: Room) -> list[int]:
     """Return where messages are, found by a walk from record to record."""
-    view = memoryview(array)
     unpack, ahead = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size
     found, at, stop = [], one.start, one.stop
-    while at + ahead <= stop:
+    for _ in room.each():
+        if at + ahead > stop:
+            break
         op, size, channel = unpack(view, at)
         if op == mcap.MESSAGE_OP and channel in channels:
             found.append(at)
@@ -181,9 +214,10 @@ def _walked(array: Any, one: Opened, channels: Collection[int]) -> list[int]:
 
 
 def _messages(
-    buffer: Any, array: Any, opened: list[Opened], offsets: list[Any], channels: Collection[int]
+    buffer: memoryview, opened: list[Opened], offsets: list[Any], channels: Collection[int]
 ) -> Ranges:
     """Return the messages at some offsets of a buffer, or fail if there are none."""
+    array: Any = np.frombuffer(buffer, np.uint8)
     at = np.concatenate(offsets)
     counts = [len(one) for one in offsets]
     ends = np.repeat(np.array([one.stop for one in opened], np.int64), counts)
@@ -202,3 +236,21 @@ def _messages(
         raise RecordingError("an index names messages that overlap")
     log, publish = times_of(heads["log"], "log time"), times_of(heads["publish"], "publish time")
     return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)
+
+
+def unpacked(found: Ranges, room: Room) -> Messages:
+    """Return messages without the compression that each may have by itself.
+
+    None begins like a zstd frame otherwise.
+    """
+    array = np.frombuffer(found.buffer, np.uint8)
+    candidates = found.starts[found.stops > found.starts]
+    if not (array[candidates] == ZSTD_MAGIC[0]).any():
+        return found
+    raws = [plain(one, room) for one in found.views()]
+    return Separate(found.log_times, found.publish_times, raws)
+
+
+def plain(data: Raw, room: Room) -> Raw:
+    """Return a message that may be compressed by itself."""
+    return zstd_frame(data, room) if data[:4] == ZSTD_MAGIC else data

@@ -7,12 +7,15 @@ from struct import Struct
 from typing import NamedTuple
 
 from idlc.recordings.errors import RecordingError
+from idlc.recordings.source import Source
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = Struct("<BQ")
 #: At the end of a file: the record, and the magic bytes once more.
 FOOTER = Struct("<BQQQI")
 INDEX_OFFSET = Struct("<HQ")
+#: The head of a chunk has the name of a compression, of which none is long.
+LONGEST_HEAD = 256
 
 FOOTER_OP, SCHEMA_OP, CHANNEL_OP, MESSAGE_OP, CHUNK_OP = 2, 3, 4, 5, 6
 MESSAGE_INDEX_OP, CHUNK_INDEX_OP, STATISTICS_OP = 7, 8, 0x0B
@@ -42,6 +45,7 @@ class Chunk(NamedTuple):
     """Where messages are: a chunk, or records outside of any, whose `compression` is None.
 
     `indexes` has channels and places of its MessageIndex records, packed; None if it has none.
+    They take `index_size` bytes behind it.
     """
 
     at: int
@@ -50,13 +54,7 @@ class Chunk(NamedTuple):
     last: int
     compression: str | None
     indexes: bytes | None
-
-    def index_of(self, channel: int) -> int | None:
-        """Return where a channel's MessageIndex is, if it has one."""
-        for found, at in INDEX_OFFSET.iter_unpack(self.indexes or b""):
-            if found == channel:
-                return int(at)
-        return None
+    index_size: int = 0
 
 
 class Statistics(NamedTuple):
@@ -109,10 +107,22 @@ def records(data: memoryview) -> Iterator[tuple[int, int, memoryview]]:
             raise RecordingError(f"a record is cut off after {end - at} bytes")
         op, size = HEAD.unpack_from(data, at)
         start = at + HEAD.size
+        if not op:
+            raise RecordingError("a record is of no kind")
         if size > end - start:
             raise RecordingError(f"a record of {size} bytes is cut off after {end - start}")
         yield op, at, data[start : start + size]
         at = start + size
+
+
+def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
+    """Yield kind, place and size, with the head, of each record that is there as a whole."""
+    while at + HEAD.size <= end:
+        op, size = HEAD.unpack(source.view(at, HEAD.size))
+        if not op or at + HEAD.size + size > end:
+            return
+        yield op, at, HEAD.size + size
+        at += HEAD.size + size
 
 
 def schema(data: memoryview) -> McapSchema:
@@ -147,7 +157,7 @@ def chunk_index(data: memoryview) -> Chunk:
     if len(indexes) % INDEX_OFFSET.size:
         raise RecordingError("the index of a chunk is broken: its offsets are cut off")
     index_size = fields.number(8)
-    return Chunk(at, size, first, last, fields.name(), indexes if index_size else None)
+    return Chunk(at, size, first, last, fields.name(), indexes or None, index_size)
 
 
 def statistics(data: memoryview) -> Statistics:
@@ -165,7 +175,7 @@ def statistics(data: memoryview) -> Statistics:
 
 
 class ChunkHead(NamedTuple):
-    """What stands before the records of a chunk, and these; they begin at `start`."""
+    """What stands before the records of a chunk: these take `stored` bytes, from `start`."""
 
     first: int
     last: int
@@ -173,13 +183,16 @@ class ChunkHead(NamedTuple):
     crc: int
     compression: str
     start: int
-    records: memoryview
+    stored: int
 
 
-def chunk_head(data: memoryview) -> ChunkHead:
-    """Read a Chunk record."""
+def chunk_head(source: Source, at: int, size: int) -> ChunkHead:
+    """Read how a Chunk record begins."""
+    data = source.view(at + HEAD.size, min(size - HEAD.size, LONGEST_HEAD))
     fields = Fields(data, "a chunk")
-    first, last, size, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
-    compression = fields.name()
-    found = fields.take(fields.number(8))
-    return ChunkHead(first, last, size, crc, compression, fields.at - len(found), found)
+    first, last, large, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
+    compression, stored = fields.name(), fields.number(8)
+    left = size - HEAD.size - fields.at
+    if stored > left:
+        raise RecordingError(f"a chunk is broken: {stored} bytes expected, {left} left")
+    return ChunkHead(first, last, large, crc, compression, at + HEAD.size + fields.at, stored)

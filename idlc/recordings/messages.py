@@ -41,9 +41,9 @@ class Window(NamedTuple):
         if self.start is None and self.end is None:
             return None
         # numpy compares numbers of 64 bits, and what is asked for may have more
-        inside = np.ones(len(times), bool)
-        if self.start is not None and self.start > 0:
-            inside &= times >= min(self.start, END_OF_TIME - 1)
+        inside = np.full(len(times), self.start is None or self.start < END_OF_TIME)
+        if self.start is not None and 0 < self.start < END_OF_TIME:
+            inside &= times >= self.start
         if self.end is not None and self.end < END_OF_TIME:
             inside &= times < max(self.end, 0)
         return inside

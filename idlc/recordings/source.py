@@ -1,65 +1,100 @@
-"""The bytes of a file, wherever it is: mapped into memory, or read in ranges."""
+"""The bytes of a file, wherever it is, read in ranges."""
 
 from __future__ import annotations
 
-import mmap
+import os
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from io import FileIO
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 from idlc.recordings.errors import RecordingError
 
+#: What is smaller is read with so much of what follows, which is mostly wanted next.
+BLOCK = 1 << 16
+
+
+Read: TypeAlias = Callable[[int, memoryview], None]
+
 
 class Source(Protocol):
-    """A file that does not change."""
+    """A file that may grow, and otherwise does not change."""
 
     name: str
     size: int
-    #: The whole file, if it is read where it is.
-    mapped: memoryview | None
 
     def view(self, start: int, size: int) -> memoryview:
         """Return so many bytes; raise RecordingError if the file has fewer."""
 
-    def forget(self, start: int, stop: int) -> None:
-        """Let memory go in which bytes were kept; views of them read these again."""
+    def opened(self) -> AbstractContextManager[Read]:
+        """Give what fills a buffer with the bytes that begin at a place."""
 
     def close(self) -> None:
         """Release the file; views that somebody holds stay valid."""
 
 
-class MappedFile:
-    """A local file, of which nothing is copied."""
+class LocalFile:
+    """A local file, opened whenever a piece of it is read: a recording may have thousands of files.
+
+    It is not mapped into memory, because whoever cuts off a mapped file ends the process.
+    """
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
+        self._path = path.absolute()
+        self._known: os.stat_result | None = None
+        self._block = (0, memoryview(b""))
+        with self._file() as file:
+            self.size = file.seek(0, 2)
+
+    @contextmanager
+    def _file(self) -> Iterator[FileIO]:
         try:
-            with path.open("rb") as file:
-                self.size = file.seek(0, 2)
-                self._map = (
-                    mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if self.size else None
-                )
+            with FileIO(self._path) as file:
+                now = os.fstat(file.fileno())
+                self._known = then = self._known or now
+                # some file systems number their files anew
+                same = os.path.samestat(now, then) or now.st_mtime_ns == then.st_mtime_ns
+                if not same:
+                    raise RecordingError(f"`{self.name}` was replaced while it was read")
+                yield file
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise RecordingError(f"`{path}` cannot be read: {reason}") from None
-        self.mapped: memoryview | None = memoryview(self._map or b"")
+            raise RecordingError(f"`{self.name}` cannot be read: {reason}") from None
+
+    @contextmanager
+    def opened(self) -> Iterator[Read]:
+        """Give what fills a buffer, or fails if somebody cut the file off meanwhile."""
+        with self._file() as file:
+
+            def read(start: int, target: memoryview) -> None:
+                within(self, start, len(target))
+                file.seek(start)
+                done = 0
+                while done < len(target):
+                    if not (size := file.readinto(target[done:])):
+                        why = f"it was cut off at byte {start + done} while it was read"
+                        raise RecordingError(f"`{self.name}` cannot be read: {why}")
+                    done += size
+
+            yield read
 
     def view(self, start: int, size: int) -> memoryview:
-        """Return a view of the mapped file."""
+        """Return bytes that are read now, or were with others before."""
         within(self, start, size)
-        assert self.mapped is not None
-        return self.mapped[start : start + size]
-
-    def forget(self, start: int, stop: int) -> None:
-        """Unmap pages, or the whole of a long file would count as this process's memory."""
-        first = -(-start // mmap.PAGESIZE) * mmap.PAGESIZE
-        if self._map and hasattr(mmap, "MADV_DONTNEED") and first < stop:
-            self._map.madvise(mmap.MADV_DONTNEED, first, stop - first)
+        first, block = self._block
+        if not first <= start <= start + size <= first + len(block):
+            first, block = start, memoryview(bytearray(max(size, min(BLOCK, self.size - start))))
+            with self.opened() as read:
+                read(start, block)
+            if size < BLOCK:
+                self._block = first, block
+        return block[start - first : start - first + size].toreadonly()
 
     def close(self) -> None:
-        """Forget the map, which lives as long as views of it."""
-        self._map, self.mapped = None, memoryview(b"")
-        self.size = 0
+        """Do nothing: the file is not open."""
 
 
 def is_local(place: Any) -> bool:
@@ -70,7 +105,7 @@ def is_local(place: Any) -> bool:
 def source_of(place: Any) -> Source:
     """Return a file at a path, at a URL that fsspec can open, or of an object that is one."""
     if is_local(place):
-        return MappedFile(Path(place))
+        return LocalFile(Path(place))
     name = _name(place)
     try:
         return OpenedFile(_opened(place), name)
@@ -115,8 +150,6 @@ def first_bytes(path: Path, size: int = 16) -> bytes:
 class OpenedFile:
     """A binary file object that can seek, such as fsspec's on an object store."""
 
-    mapped: memoryview | None = None
-
     def __init__(self, file: Any, name: str) -> None:
         self.name = name
         self._file = file
@@ -136,8 +169,14 @@ class OpenedFile:
             raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
         return memoryview(found)
 
-    def forget(self, start: int, stop: int) -> None:
-        """Do nothing: nothing is kept."""
+    @contextmanager
+    def opened(self) -> Iterator[Read]:
+        """Give what fills a buffer."""
+
+        def read(start: int, target: memoryview) -> None:
+            target[:] = self.view(start, len(target))
+
+        yield read
 
     def close(self) -> None:
         """Close the file."""

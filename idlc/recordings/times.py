@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
-from decimal import Decimal
+from fractions import Fraction
+from math import ceil
 from typing import Any
 
 from idlc.recordings.errors import RecordingError
@@ -19,6 +20,14 @@ LEAST_NANOSECONDS = 10**17
 MOST_DIGITS = 20
 
 UNITS = {"h": 3600, "m": 60, "s": 1}
+#: Seconds of each unit that is always as long.
+NUMPY_UNITS = {
+    "W": Fraction(604800),
+    "D": Fraction(86400),
+    "h": Fraction(3600),
+    "m": Fraction(60),
+    **{unit: Fraction(1, 1000**n) for n, unit in enumerate("s ms us ns ps fs as".split())},
+}
 NUMBER = rf"\d{{1,{MOST_DIGITS}}}(?:\.\d{{0,{MOST_DIGITS}}})?"
 _NUMBER = re.compile(NUMBER, re.ASCII)
 _LENGTH = re.compile(rf"(?:{NUMBER}[hms])+", re.ASCII)
@@ -33,43 +42,59 @@ def moment(value: Any, start: Callable[[], int]) -> int:
     """Return the nanoseconds since 1970 that a value means; `start` is asked for what is relative.
 
     An int is nanoseconds, a timedelta counts from the start, a datetime without a zone is in UTC.
+    Those of numpy and pandas are taken to the last digit. Fractions of a nanosecond are rounded
+    up: no message lies between.
     """
     if isinstance(value, str):
         return _text(value.strip(), start)
-    if isinstance(value, bool):
-        raise TypeError("a bool is no time")
-    if isinstance(value, int):
+    for precise in ("to_datetime64", "to_timedelta64"):  # pandas' know more than Python's
+        if hasattr(value, precise):
+            value = getattr(value, precise)()
+    if type(value).__module__ == "numpy":
+        return _of_numpy(value, start)
+    if isinstance(value, int) and not isinstance(value, bool):
         return value
     if isinstance(value, timedelta):
         return start() + _nanoseconds(value)
     if isinstance(value, datetime):
         return _nanoseconds(_in_utc(value) - _EPOCH)
-    if type(value).__module__ == "numpy":
-        return _of_numpy(value, start)
-    raise TypeError(f"a time is an int in nanoseconds, a text or a datetime, not {value!r}")
+    raise _no_time(value)
+
+
+def _no_time(value: Any) -> TypeError:
+    return TypeError(f"a time is an int in nanoseconds, a text or a datetime, not {value!r}")
 
 
 def _of_numpy(value: Any, start: Callable[[], int]) -> int:
-    match value.dtype.kind:
-        case "i" | "u":
-            return int(value)
-        case "M":
-            return int(value.astype("M8[ns]").astype("i8"))
-        case "m":
-            return start() + int(value.astype("m8[ns]").astype("i8"))
-    raise TypeError(f"a time is an int in nanoseconds, a text or a datetime, not {value!r}")
+    """Return the time that a number of numpy is; its own conversions wrap around."""
+    from numpy import datetime_data
+
+    kind = value.dtype.kind
+    if value.ndim == 0 and kind in "iu":
+        return int(value)
+    if value.ndim or kind not in "mM" or value != value:  # NaT is not even itself
+        raise _no_time(value)
+    count, (unit, factor) = int(value.astype("i8")), datetime_data(value.dtype)
+    if kind == "M" and unit in ("Y", "M"):
+        months = count * factor * (12 if unit == "Y" else 1)
+        year = min(max(1970 + months // 12, datetime.min.year), datetime.max.year)
+        return _nanoseconds(datetime(year, months % 12 + 1, 1, tzinfo=timezone.utc) - _EPOCH)
+    if unit not in NUMPY_UNITS:  # how long a year is depends on which
+        raise _no_time(value)
+    length = ceil(count * factor * NUMPY_UNITS[unit] * SECOND)
+    return length if kind == "M" else start() + length
 
 
 def _text(text: str, start: Callable[[], int]) -> int:
     if _NUMBER.fullmatch(text):
-        number = Decimal(text)
+        number = Fraction(text)
         if number >= LEAST_NANOSECONDS:
-            return int(number)
-        nanoseconds = int(number * SECOND)
+            return ceil(number)
+        nanoseconds = ceil(number * SECOND)
         return nanoseconds if number >= LEAST_TIME else start() + nanoseconds
     if _LENGTH.fullmatch(text):
-        seconds = sum(Decimal(number) * UNITS[unit] for number, unit in _PART.findall(text))
-        return start() + int(seconds * SECOND)
+        seconds = sum(Fraction(number) * UNITS[unit] for number, unit in _PART.findall(text))
+        return start() + ceil(seconds * SECOND)
     found = _FRACTION.search(text)  # datetime has six digits, and before Python 3.11 three or six
     digits = found[2].ljust(9, "0") if found else ""
     plain = text[: found.end(1)] + text[found.end() :] if found else text

@@ -40,6 +40,7 @@ from .sequences import (
     Int16Sequence,
     Int32Sequence,
     Int64Sequence,
+    ListOf,
     UInt8Sequence,
     UInt16Sequence,
     UInt32Sequence,
@@ -49,6 +50,7 @@ from .sequences import (
     sequence_reader,
     sequence_writer,
     to_array,
+    to_list,
 )
 from .strings import (
     ENDS,
@@ -69,13 +71,14 @@ if TYPE_CHECKING:
     from .hints import Any as Any
     from .hints import Floats as Floats
     from .hints import Integers as Integers
+    from .hints import Iterable as Iterable
     from .hints import Join as Join
     from .hints import Options as Options
     from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
 else:
-    _HINTS = ("Any", "Floats", "Integers", "Join", "Options", "TypeAlias", "Unpack")
-    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS, "hints"))
+    _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
+    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
 
 __all__ = [
     "ENDS",
@@ -97,6 +100,7 @@ __all__ = [
     "Int16Sequence",
     "Int32Sequence",
     "Int64Sequence",
+    "ListOf",
     "Message",
     "Package",
     "Reading",
@@ -138,6 +142,7 @@ __all__ = [
     "text_phases",
     "texts_reader",
     "to_array",
+    "to_list",
     "unsized",
     "wide_block",
     "wide_text",

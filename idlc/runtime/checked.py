@@ -15,7 +15,7 @@ from collections.abc import Set as AbstractSet
 from functools import cache
 from typing import Any
 
-from .errors import FieldCheckError, FieldTypeError, ValidationError
+from .errors import FieldCheckError, FieldNameError, FieldTypeError, ValidationError
 from .objects import owner_of
 from .on_demand.dictionaries import close
 from .on_demand.typeinfo import FieldInfo, Primitive, class_of, fields_of, type_name
@@ -42,18 +42,20 @@ def construct(message: Any, options: Mapping[str, Any], given: dict[str, Any]) -
         problem = (
             f"{kind.__name__}() got an unexpected keyword argument {unknown[0]!r}{hint}"
         )
-        error = FieldCheckError if check else FieldTypeError
+        error = FieldNameError if check else FieldTypeError
         raise error("", "absent", options[unknown[0]], problem)
     if check:
         _assign(message, fields, given)
     elif fields:
-        _check_first(fields[0], given[fields[0].public])
+        _check_first(owner_of(kind), fields[0], given[fields[0].public])
     return check
 
 
-def _check_first(field: FieldInfo, value: Any) -> None:
-    if value is None and (field.is_list or field.nested):
+def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
+    if value is None and owner.__init__.__defaults__[0] is None:
         return  # the default
+    if _converts(owner, field) and not isinstance(value, (str, Mapping)):
+        return
     try:
         validate_field(value, field)
     except ValidationError as error:
@@ -61,12 +63,13 @@ def _check_first(field: FieldInfo, value: Any) -> None:
 
 
 def _assign(message: Any, fields: tuple[FieldInfo, ...], given: dict[str, Any]) -> None:
-    default = owner_of(type(message))(check_fields=False)
     kind: Any = type(message)
+    owner = owner_of(kind)
+    default = owner(check_fields=False)
     message.__class__ = checked_class(kind)
-    for field in fields:
+    for field, without in zip(fields, owner.__init__.__defaults__ or (), strict=True):
         value = given[field.public]
-        if value is None and (field.is_list or field.nested):
+        if value is None and without is None:
             value = getattr(default, field.slot)
         elif field.is_sequence and field.is_numeric:
             value = array(field.primitive.code, value)  # type: ignore[union-attr]
@@ -108,9 +111,16 @@ def checked_class(kind: Any) -> Any:
         name: getattr(kind, name) for name in ("__module__", "__qualname__", "__doc__")
     }
     for field in fields_of(type_name(kind)):
-        namespace[field.public] = _property(owner.__dict__[field.slot], field)
+        name = field.public if _converts(owner, field) else field.slot
+        namespace[field.public] = _property(owner.__dict__[name], field)
     namespace["__slots__"] = ()
     return type.__new__(type(kind), kind.__name__, (kind, Checked), namespace)
+
+
+def _converts(owner: Any, field: FieldInfo) -> bool:
+    """Return whether a class makes lists of what a field is given."""
+    is_property = isinstance(owner.__dict__[field.public], property)
+    return is_property and not field.is_numeric
 
 
 def _property(slot: Any, field: FieldInfo) -> property:

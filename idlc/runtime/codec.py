@@ -52,6 +52,13 @@ class Reading:
         #: Up to this size of a message, slices of bytes are faster than those of a view.
         self.small = 8192 if copy else 0
 
+    def of(self, kind: type) -> Reading:
+        """Return how the sequences of a class of another package are made.
+
+        Classes of rosidl get copies: their `==` cannot compare views.
+        """
+        return self if hasattr(type(kind), "_message") else COPYING
+
 
 READINGS: dict[tuple[Text, bool], Reading] = {
     (text, copy): Reading(text, copy)

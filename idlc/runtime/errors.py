@@ -67,6 +67,10 @@ class FieldCheckError(ValidationError, AssertionError):
     """What `check_fields` refuses; rosidl's classes raise AssertionError."""
 
 
+class FieldNameError(FieldTypeError, FieldCheckError):
+    """A name that no field has; rosidl's `check_fields` raises AssertionError before Lyrical."""
+
+
 class importing:
     """A context that says, when an import in it fails, how to get the package."""
 

@@ -33,4 +33,13 @@ class Options(TypedDict, total=False):
     check_fields: bool
 
 
-__all__ = ["Any", "Floats", "Integers", "Join", "Options", "TypeAlias", "Unpack"]
+__all__ = [
+    "Any",
+    "Floats",
+    "Integers",
+    "Iterable",
+    "Join",
+    "Options",
+    "TypeAlias",
+    "Unpack",
+]

@@ -1,10 +1,14 @@
-"""Numeric sequences: fields that hold an `array.array` and take anything sequence-like."""
+"""Fields that convert: numeric sequences to an `array.array`, others to a `list`.
+
+Only classes for distributions whose own ones do it make lists, from Lyrical on.
+"""
 
 from __future__ import annotations
 
 from array import array
 
-from .cdr import NATIVE
+from .cdr import NATIVE, single_bytes
+from .errors import FieldTypeError
 from .names import name_of
 from .typing_stub import Generic, TypeVar
 
@@ -19,6 +23,7 @@ else:
     # functools takes longer to import than all that is here
     from _functools import partial
 
+Element = TypeVar("Element")
 Number = TypeVar("Number", int, float)
 
 #: How other buffers spell the same numbers, where C has two names for them.
@@ -158,6 +163,64 @@ class Float64Sequence(NumberSequence[float]):
     """A sequence of float64."""
 
     code = "d"
+
+
+def to_list(
+    values: Any, name: str, read: Callable[[bytes], list[Any]] | None = None
+) -> list[Any]:
+    """Return `values` if they are a list, else a new list of them; `read` makes that of bytes.
+
+    Raises FieldTypeError with the `name` of the field.
+    """
+    if isinstance(values, list):
+        return values
+    raw = single_bytes(values) if read else None
+    if read and raw is not None:
+        return read(raw)
+    try:
+        found = iter(values)
+    except TypeError:
+        raise FieldTypeError(name, "a sequence", values) from None
+    return list(found)
+
+
+class ListOf(Generic[Element]):
+    """A field that reads as a `list` and takes any iterable; `read` makes a list of bytes.
+
+    In the class body it stands for the field; the metaclass puts a property in its place.
+    """
+
+    def __init__(self, read: Callable[[bytes], list[Element]] | None = None) -> None:
+        self._read = read
+
+    def property_of(self, slot: Any) -> property:
+        """Return the property over the slot member `slot`."""
+        read = self._read
+        name = name_of(slot)
+        store = slot.__set__
+
+        def setter(message: object, values: Any) -> None:
+            store(message, to_list(values, name, read))
+
+        return property(slot.__get__, setter)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
+        """Return how pydantic checks and writes a list."""
+        return handler.generate_schema(list[source.__args__])
+
+    if TYPE_CHECKING:
+
+        def __get__(
+            self, message: object, owner: type | None = None
+        ) -> list[Element]: ...
+        def __set__(self, message: object, values: Iterable[Element]) -> None: ...
+
+    else:
+
+        def __class_getitem__(cls, element):
+            """Return the class with its element, which pydantic asks for."""
+            return type(list[element])(cls, element)
 
 
 def sequence_writer(order: str, code: str) -> Callable[[Any], Any]:

@@ -19,7 +19,7 @@ def check_name(name: str) -> str:
 
 
 def text(kind: str, fields: Sequence[str], comment: str = "") -> str:
-    """Return the text of an interface file; missing parts of a service or action are empty."""
+    """Return the text of an interface file; without fields, all parts are empty."""
     parts: list[list[str]] = [[]]
     for field in fields:
         if field.strip() == SEPARATOR:
@@ -30,6 +30,11 @@ def text(kind: str, fields: Sequence[str], comment: str = "") -> str:
     if len(parts) > wanted:
         rule = f"a .{kind} file has {wanted} part{'s' * (wanted > 1)}"
         raise ValueError(f"{rule}, here are {len(parts)}: there is one `---` too many")
+    if fields and len(parts) < wanted:
+        rest = {"srv": "the response", "action": "the result and the feedback"}[kind]
+        raise ValueError(
+            f"a .{kind} file has {wanted} parts: add `---` before the fields of {rest}"
+        )
     parts += [[] for _ in range(wanted - len(parts))]
     head = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
     gap = "\n" if head and parts[0] else ""

@@ -119,6 +119,7 @@ _CMAKE_FILES = {
     "CMakeLists.txt": "package/CMakeLists.txt.jinja",
     "pyproject.toml": "package/interfaces_pyproject.toml.jinja",
     "README.md": "package/README.md.jinja",
+    ".gitignore": "package/gitignore.jinja",
 }
 #: Files of a new package that are edited later on.
 GROWING = (

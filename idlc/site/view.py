@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.model.spelling import spell, spell_value
+from idlc.model.spelling import is_range, spell, spell_value
 from idlc.site.picture import Picture, picture
 
 KINDS = {"msg": "message", "srv": "service", "action": "action"}
@@ -52,10 +52,10 @@ class Row(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Rows, and which of the columns that may be empty are not."""
+    """Rows, and which of the columns that may be empty are not; `units` is the heading of one."""
 
     rows: Sequence[Row]
-    units: bool
+    units: str
     values: bool
     meanings: bool
 
@@ -183,9 +183,10 @@ def _field(field: ir.Field, package: str, before: str, pages: Pages) -> Row:
 
 
 def _table(rows: Sequence[Row]) -> Table:
+    kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
     return Table(
         rows,
-        any(row.unit for row in rows),
+        " or ".join(sorted(kinds, reverse=True)),
         any(row.value for row in rows),
         any(row.meaning for row in rows),
     )

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import json
 import os
+import re
 import shutil
 import sys
 import tarfile
@@ -11,9 +12,13 @@ import zipfile
 from email.parser import Parser
 
 import pytest
+from packaging.utils import parse_wheel_filename
 
 from idlc import backend
+from idlc.build import compile_interfaces
+from idlc.cli.main import main
 from idlc.disk.machine import environment
+from idlc.native.layouts import LAYOUTS
 from tests.support.programs import ended
 
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
@@ -124,6 +129,14 @@ def test_a_wheel_holds_classes_and_what_ros_installs(source, tmp_path):
             assert digests[name] == f"sha256={digest.decode()}"
 
 
+def test_committed_classes_are_compiled_anew(source, tmp_path):
+    wheel = built(tmp_path).read_bytes()
+    assert main(["gen", ".", "-o", "demo_msgs"]) == 0
+    assert built(tmp_path).read_bytes() == wheel
+    (source / "demo_msgs" / "msg" / "_drive.py").write_text("edited\n")
+    assert built(tmp_path).read_bytes() == wheel
+
+
 def test_an_editable_wheel_is_like_any(source, tmp_path):
     wheel, editable = tmp_path / "wheel", tmp_path / "editable"
     assert built(wheel).read_bytes() == built(editable, backend.build_editable).read_bytes()
@@ -167,6 +180,46 @@ def test_the_source_archive_builds_the_same_wheel(source, tmp_path, monkeypatch)
     assert names == {*FILES, "PKG-INFO", ".gitignore"}
     monkeypatch.chdir(tmp_path / "unpacked" / "demo_msgs-1.2.3")
     assert built(tmp_path / "again").read_bytes() == wheel
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a right of their own")
+def test_a_source_distribution_holds_nothing_from_outside(source, tmp_path, capsys):
+    write(tmp_path, {"outside/secret.txt": "secret", "outside/Out.msg": "int8 secret\n"})
+    write(source, {"kept/here.txt": "here"})
+    for name, target in {
+        "extra": "../outside",
+        "whole": "/",
+        "note.txt": "../outside/secret.txt",
+        "NOTICE": str(tmp_path / "outside/secret.txt"),
+        "msg/Out.msg": "../../outside/Out.msg",
+        "action/by": "../extra",
+        "kept/again.txt": "here.txt",
+        "circle": ".",
+        "nowhere": "gone",
+        "loop": "loop",
+    }.items():
+        (source / name).symlink_to(target)
+    with tarfile.open(built(tmp_path, backend.build_sdist)) as sdist:
+        names = {name.removeprefix("demo_msgs-1.2.3/") for name in sdist.getnames()}
+        contents = [sdist.extractfile(one).read() for one in sdist if one.isfile()]
+    assert not any(b"secret" in one for one in contents)
+    assert names >= {*FILES, "kept/again.txt"}
+    assert not names & {"NOTICE", "note.txt", "msg/Out.msg"}
+    said = capsys.readouterr().err
+    assert "left out, because they lead out of the project: `NOTICE`, `action/by`, `extra`" in said
+
+
+def test_hooks_of_hatchling_are_not_run(source, tmp_path):
+    settings = "".join(
+        f'[tool.hatch.{table}.hooks.custom]\npath = "hook.py"\n'
+        for table in ("build", "build.targets.sdist", "build.targets.wheel", "metadata")
+    )
+    mark = f"open({str(tmp_path / 'ran')!r}, 'w')\n"
+    hooks = dict.fromkeys(("hook.py", "hatch_build.py", "setup.py", "hatchling.py"), mark)
+    write(source, {"pyproject.toml": BUILD + settings, **hooks})
+    built(tmp_path / "wheels")
+    built(tmp_path / "sdists", backend.build_sdist)
+    assert not (tmp_path / "ran").exists()
 
 
 def changed(old, new=""):
@@ -281,6 +334,18 @@ REFUSED = {
     ),
     "no TOML": ({"pyproject.toml": BUILD + "[project\n"}, "pyproject.toml:4:9"),
     "a wrong setting": ({"pyproject.toml": BUILD + "[tool.idlc]\nx = 1\n"}, "unknown setting `x`"),
+    "a setting of `idlc gen` alone": (
+        {"pyproject.toml": BUILD + "[tool.idlc]\nvendor-deps = true\n"},
+        "pyproject.toml:5:1",
+    ),
+    "modules that the wheel would not have": (
+        {"demo_msgs/node.py": "print()\n"},
+        "and here is `demo_msgs/node.py`",
+    ),
+    "another name than in package.xml": (
+        {"pyproject.toml": BUILD + '[tool.idlc]\npackage = "other"\n'},
+        "pyproject.toml:5:1",
+    ),
     "no table": ({"pyproject.toml": "project = 3\n" + BUILD}, "must be a table"),
     "no project name": (project('version = "1"'), "project.name"),
     "a wrong project name": (project('name = "a b"', 'version = "1"'), "IDL611"),
@@ -339,29 +404,77 @@ def test_the_builder_may_be_missing(source, tmp_path, capfd, monkeypatch):
     assert "pip install hatchling" in capfd.readouterr().err
 
 
-def test_without_a_library_a_package_is_not_entered_in_the_index(
-    source, tmp_path, capfd, monkeypatch
+@pytest.mark.parametrize("settings", [None, {"libraries": "no", "distro": "jazzy"}])
+def test_without_a_library_a_package_is_not_registered(
+    settings, source, tmp_path, capfd, monkeypatch
 ):
-    monkeypatch.setattr(environment, "machine", lambda: "")
-    wheel = built(tmp_path)
+    if settings is None:
+        monkeypatch.setattr(environment, "machine", lambda: "")
+    wheel = built(tmp_path, settings=settings)
     assert wheel.name == "demo_msgs-1.2.3-py3-none-any.whl"
     files, _ = read(wheel)
-    assert not [name for name in files if "/lib/" in name or "/packages/" in name]
-    assert [name for name in files if "/rosidl_interfaces/" in name]
+    data = "demo_msgs-1.2.3.data/data/"
+    kept = {path for path in PREFIX if "/packages/" not in path and "/rosidl_int" not in path}
+    assert {name.removeprefix(data) for name in files if name.startswith(data)} == {
+        path for path in kept if not path.startswith("lib/")
+    }
     assert "recorders stop at packages without a library" in capfd.readouterr().err
 
 
+def test_wheels_that_differ_have_different_names_and_a_platform_tag_of_pypi(
+    source, tmp_path, monkeypatch
+):
+    """They are for one folder: no build replaces a wheel that holds other libraries."""
+    wheels = {}
+    for distro in LAYOUTS:
+        path = built(tmp_path / "dist", settings={"distro": distro})
+        assert wheels.setdefault(path.name, path.read_bytes()) == path.read_bytes()
+    built(tmp_path / "dist", settings={"libraries": "no"})
+    names = {path.name for path in (tmp_path / "dist").iterdir()}
+    assert len(wheels) == len(LAYOUTS)
+    monkeypatch.setenv("ROS_DISTRO", "humble")
+    monkeypatch.setattr(environment, "ament_prefixes", tuple)
+    assert built(tmp_path / "dist").name in names, "it is the same as with distro=humble"
+    pure = built(tmp_path / "pure", settings={"libraries": "no"})
+    assert pure.name == "demo_msgs-1.2.3-1humble-py3-none-any.whl"
+    assert names == {*wheels, "demo_msgs-1.2.3-py3-none-any.whl"}
+    parsed = [parse_wheel_filename(name) for name in sorted(names)]
+    assert [build for _, _, build, _ in parsed if build] == [
+        (1, name) for name in sorted(LAYOUTS) if name != "jazzy"
+    ]
+    for _, _, _, tags in parsed:
+        (tag,) = tags
+        assert re.fullmatch(r"any|(manylinux_2_17|musllinux_1_1)_x86_64", tag.platform)
+    for name, content in wheels.items():
+        assert (tmp_path / "dist" / name).read_bytes() == content
+
+
+@pytest.mark.parametrize("hook", [backend.build_wheel, backend.build_sdist])
+def test_settings_of_frontends_are_checked(hook, source, tmp_path, capfd):
+    for settings, expected in (
+        ({"distr": "jazzy"}, "did you mean `distro`?"),
+        ({"foo": "bar"}, "the settings are distro, libraries"),
+        ({"--build-option": ["--x"]}, "unknown setting `--build-option`"),
+        ({"libraries": "nope"}, "use yes, no"),
+        ({"libraries": False}, "use yes, no"),
+    ):
+        with pytest.raises(SystemExit):
+            hook(str(tmp_path / "dist"), settings)
+        assert expected in capfd.readouterr().err
+    assert not (tmp_path / "dist").exists()
+
+
 def test_the_distribution_can_be_told(source, tmp_path, capfd):
-    libraries = {
-        distro: [
-            content
-            for name, content in read(built(tmp_path, settings={"distro": distro}))[0].items()
-            if name.endswith(".so")
-        ]
+    wheels = {
+        distro: built(tmp_path, settings={"distro": distro})
         for distro in ("humble", "jazzy", "kilted", "lyrical")
     }
-    assert libraries["jazzy"] == libraries["kilted"]
-    assert libraries["jazzy"] != libraries["humble"] != libraries["lyrical"]
+    assert len({wheel.name for wheel in wheels.values()}) == len(wheels)
+    libraries = {
+        distro: [content for name, content in read(wheel)[0].items() if name.endswith(".so")]
+        for distro, wheel in wheels.items()
+    }
+    assert libraries["humble"] != libraries["jazzy"] != libraries["lyrical"] != libraries["humble"]
     for unknown in ("foxy", "", ["humble", "jazzy"], True):
         with pytest.raises(SystemExit):
             built(tmp_path, settings={"distro": unknown})
@@ -388,3 +501,26 @@ def test_a_package_may_refer_to_others_and_leave_files_out(source, tmp_path):
     ]
     assert b"from base_msgs.msg import Base" in files["demo_msgs/msg/_drive.py"]
     assert not any(name.startswith("base_msgs/") for name in files)
+
+
+@pytest.mark.parametrize("package", ["far_msgs", "near_msgs"])
+@pytest.mark.parametrize("build", [built, lambda _: compile_interfaces("demo_msgs")])
+def test_a_build_says_where_to_name_folders_of_packages(
+    build, package, source, tmp_path, capfd, monkeypatch
+):
+    write(tmp_path / "near_msgs", {"package.xml": "<package/>", "msg/A.msg": "bool a\n"})
+    write(source, {"msg/Drive.msg": f"{package}/A a\n", "setup.py": ""})
+    monkeypatch.setattr("sys.argv", ["setup.py", "build"])
+    with pytest.raises(SystemExit):
+        build(tmp_path / "dist")
+    said = capfd.readouterr().err
+    assert "IDL202" in said
+    assert "-I " not in said
+    (folder,) = re.findall(r"add `(.*)` to `include` in \[tool.idlc\] of pyproject.toml", said)
+    if package == "near_msgs":
+        with (source / "pyproject.toml").open("a") as file:
+            file.write(f"[tool.idlc]\ninclude = ['{folder}']\n")
+        built(tmp_path / "dist")
+    # a run from a shell has options
+    main(["check", "--package", "demo_msgs", "."])
+    assert "of pyproject.toml" not in capfd.readouterr().out

@@ -11,6 +11,7 @@ from idlc.breaking.version import part_to_raise, raised
 from idlc.cli.main import main
 from tests.support.evolution import Evolution, compile_texts
 from tests.support.files import write
+from tests.support.tools import tool
 
 
 def found(old, new):
@@ -172,7 +173,7 @@ def test_a_lock_of_other_texts_is_not_the_same(tmp_path, monkeypatch, capsys):
 
 def git(*words):
     who = ["-c", "user.name=me", "-c", "user.email=me@example.org"]
-    command = ["git", *who, *words]
+    command = [tool("git"), *who, *words]
     return subprocess.run(command, check=True, capture_output=True).stdout
 
 

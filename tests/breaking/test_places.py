@@ -8,6 +8,7 @@ import pytest
 from idlc.cli.main import main
 from tests.support import recorded_text
 from tests.support.sarif_schema import path_of, run_of
+from tests.support.tools import tool
 
 WRONG_HASH = "RIHS01_" + "0" * 64
 
@@ -18,7 +19,7 @@ def repository(here):
     (here / "src/demo/msg").mkdir(parents=True)
     (here / "src/demo/msg/Gone.msg").write_text("int8 a\n", encoding="utf-8")
     (here / "src/demo/msg/Kept.msg").write_text("string b\n", encoding="utf-8")
-    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b"]
+    git = [tool("git"), "-c", "user.name=a", "-c", "user.email=a@b"]
     for words in (["init", "-q"], ["add", "-A"], ["commit", "-q", "-m", "first"]):
         subprocess.run([*git, *words], check=True, cwd=here)
     (here / "src/demo/msg/Gone.msg").unlink()

@@ -76,14 +76,13 @@ def from_gitlab(out):
 
 def from_junit(out):
     suite = ElementTree.fromstring(out)  # noqa: S314 - our own
-    failed = [case for case in suite if case.find("failure") is not None]
     assert suite.tag == "testsuite"
     assert int(suite.get("tests")) == len(suite)
-    assert int(suite.get("failures")) == len(failed)
-    found = [re.fullmatch(r"(IDL\d+) \S+:(\d+):\d+", case.get("name")) for case in failed]
+    assert int(suite.get("failures")) == len(suite.findall("testcase/failure"))
+    told = [case for case in suite if len(case)]
+    found = [re.fullmatch(r"(IDL\d+) \S+:(\d+):\d+", case.get("name")) for case in told]
     return [
-        (case.get("classname"), int(one[2]), one[1])
-        for case, one in zip(failed, found, strict=True)
+        (case.get("classname"), int(one[2]), one[1]) for case, one in zip(told, found, strict=True)
     ]
 
 
@@ -148,16 +147,37 @@ def test_nothing_found_is_a_whole_document_too(capsys):
     assert check(capsys, "demo", "--format", "github")[1] == ""
 
 
-def test_colcon_reads_the_junit_file(capsys):
+#: How formats say that something fails a build.
+FAILS = {
+    "json": '"severity": "error"',
+    "github": "::error",
+    "gitlab": '"severity": "major"',
+    "junit": "<failure",
+    "sarif": '"level": "error"',
+}
+
+
+@pytest.mark.parametrize("style", FAILS)
+@pytest.mark.parametrize("text", ["wstring a\n", "wstring a\nint9 b\n"])
+def test_a_format_fails_a_build_when_the_status_does(style, text, capsys):
+    write_all({"demo/msg/Wide.msg": text})
+    status, out = check(capsys, "demo", "--format", style)
+    assert (FAILS[style] in out) == (status == 1) == ("int9" in text)
+    assert "IDL421" in out
+    assert check(capsys, "demo", "--strict", "--format", "junit")[1].count("<failure") == 1 + status
+
+
+@pytest.mark.parametrize(("options", "failures"), [((), 5), (["--strict"], 10)])
+def test_colcon_reads_the_junit_file(options, failures, capsys):
     write_all(MISTAKES)
-    _, out = check(capsys, "--format", "junit")
+    _, out = check(capsys, "--format", "junit", *options)
     write_all({"build/demo/idlc.xunit.xml": out})
     code = "import sys; from colcon_core.command import main; sys.exit(main(argv=sys.argv[1:]))"
     words = ["--log-base", "/dev/null", "test-result", "--test-result-base", "build", "--verbose"]
     done = subprocess.run(
         [sys.executable, "-c", code, *words], capture_output=True, text=True, check=False
     )
-    assert "10 tests, 0 errors, 10 failures, 0 skipped" in done.stdout, done.stderr
+    assert f"10 tests, 0 errors, {failures} failures, 0 skipped" in done.stdout, done.stderr
     assert "unknown type `flot64`" in done.stdout
     assert done.returncode == 1
 
@@ -207,18 +227,18 @@ def test_what_can_be_fixed_is_fixed_once_and_nothing_else_changes(capsys):
     )
     status, out = check(capsys, "--fix", "--select", "correctness,portability,package,IDL401")
     assert status == 0
-    assert out == "7 problems fixed, no problems in 1 file\n"
+    assert out == "9 problems fixed, no problems in 1 file\n"
     assert Path("msg/A.msg").read_text() == (
         "# char is a word\nuint8[3]  a\nuint8 B=5  # a char\n"
         "std_msgs/Header h\ngeometry_msgs/Pose p\n"
     )
     assert Path("package.xml").read_text() == PACKAGE_XML.replace(
         "  <depend>std_msgs</depend>\n",
+        "  <buildtool_depend>rosidl_default_generators</buildtool_depend>\n"
+        "  <exec_depend>rosidl_default_runtime</exec_depend>\n"
         "  <depend>std_msgs</depend>\n"
         "  <depend>geometry_msgs</depend>\n"
-        "  <member_of_group>rosidl_interface_packages</member_of_group>\n"
-        "  <buildtool_depend>rosidl_default_generators</buildtool_depend>\n"
-        "  <exec_depend>rosidl_default_runtime</exec_depend>\n",
+        "  <member_of_group>rosidl_interface_packages</member_of_group>\n",
     )
     assert check(capsys, "--fix")[1] == "no problems in 1 file\n"
 
@@ -325,6 +345,37 @@ def test_an_entry_point_that_leads_nowhere_is_found(capsys):
         "there is no module `demo.noode`",
         "`demo/node.py` has no `run`",
     ]
+
+
+def test_entry_points_of_modules_that_setup_py_places_elsewhere_are_not_judged(capsys):
+    scripts = ["a = demo.node:main", "b = tool:main", "nowhere"]
+    for placed in ("package_dir={'': 'src'}", "package_dir=where", "py_modules=['tool']"):
+        write_all(
+            {
+                "package.xml": "<package>\n  <name>demo</name>\n</package>\n",
+                "setup.py": "from setuptools import setup\n"
+                f"setup({placed}, entry_points={{'console_scripts': {scripts!r}}})\n",
+                "src/demo/node.py": "def main():\n    pass\n",
+                "tool.py": "def main():\n    pass\n",
+                "msg/A.msg": "int8 a\n",
+            }
+        )
+        _, out = check(capsys)
+        assert re.findall(r"IDL457\]: (.*)", out) == ["`nowhere` is not an entry point"]
+
+
+def test_a_hint_calls_find_packages_as_setup_py_can(capsys):
+    write_all(
+        {
+            "package.xml": "<package>\n  <name>demo</name>\n"
+            "  <export><build_type>ament_python</build_type></export>\n</package>\n",
+            "setup.py": "import setuptools as tools\ntools.setup(packages=['demo'])\n",
+            "demo/__init__.py": "",
+            "msg/A.msg": "int8 a\n",
+        }
+    )
+    _, out = check(capsys)
+    assert "write `packages=tools.find_packages(exclude=['test'])`; --fix does" in out
 
 
 def test_files_that_are_not_python_or_xml_are_not_judged(capsys):
@@ -476,6 +527,7 @@ def test_interfaces_for_tests_alone_need_no_group(cmake, capsys):
         }
     )
     expected = ["IDL451", "IDL453", "IDL454"] if CMAKE[cmake] else []
+    expected += ["IDL463"] if CMAKE[cmake] and "DEPENDENCIES" not in cmake else []
     assert sorted(codes(capsys, "demo")) == expected
 
 

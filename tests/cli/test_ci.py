@@ -13,6 +13,7 @@ import pytest
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 from tests.support.sarif_schema import runs_of
+from tests.support.tools import tool
 
 LOOSE = "float64   speed# [m/s]\n"
 TIDY = "float64 speed  # [m/s]\n"
@@ -47,7 +48,8 @@ def run(*words, **environment):
 
 def git(*words):
     who = ["-c", "user.name=me", "-c", "user.email=me@example.org"]
-    return subprocess.run(["git", *who, *words], check=True, capture_output=True, text=True).stdout  # noqa: S607
+    command = [tool("git"), *who, *words]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
 
 def hooks():
@@ -179,6 +181,22 @@ def test_what_files_say_is_no_command_of_githubs(pull_request):
         elif heard and line.strip().startswith("::error"):
             assert "file=demo/msg/Drive.msg" in line
     assert heard
+
+
+def test_no_file_of_a_pull_request_is_imported_or_written_through(pull_request, here):
+    for name in sorted(sys.stdlib_module_names - {"runpy", "importlib", "pkgutil"}):
+        write(f"{name}.py", f"open({str(here / 'ran')!r}, 'a').write('{name} ')\n")
+    write("kept", "as it was")
+    (here / "idlc.sarif").symlink_to(here / "kept")
+    done = act(pull_request, paths="demo")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert not (here / "ran").exists()
+    assert (here / "kept").read_text() == "as it was"
+    assert len(runs_of((here / "idlc.sarif").read_text())) == 2
+    script = (ROOT / ".ci/action").read_text(encoding="utf-8")
+    starts = re.findall(r'(?m)^(?!#).*?(?:\bpython3?|\$IDLC_PYTHON"?) +(\S+) ', script)
+    assert len(starts) == 6
+    assert set(starts) == {"-I"}
 
 
 def test_the_actions_inputs(pull_request):

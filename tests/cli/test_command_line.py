@@ -480,3 +480,29 @@ def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monk
         assert said.out.endswith("; imports std_msgs, stereo_msgs\n")
         assert main([*words, "--check"]) == 0
         assert "imports" not in "".join(capsys.readouterr())
+
+
+def test_gen_names_the_idl_files_that_it_leaves_out(capsys, monkeypatch):
+    alone = ["msg/Keyed.idl", "msg/\x1b[31m.idl", "srv/Ask.idl", "action/B.idl"]
+    for folder in ("demo", "prefix/share/inst"):
+        for path in ("msg/A.msg", "msg/A.idl", "msg/Keyed.idl.txt", *alone):
+            write(f"{folder}/{path}", "int32 a\n")
+
+    def notes(*words):
+        assert main(["gen", *words]) == 0
+        return [line for line in capsys.readouterr().err.splitlines() if ".idl" in line]
+
+    (note,) = notes("demo", "-o", "out/demo")
+    assert note.startswith("note: ")
+    assert "`demo` lacks what these define: `action/B.idl`, `msg/" in note
+    assert "and 1 more" in note
+    assert "\x1b" not in note
+    assert notes("demo", "-o", "out/demo") == [note]
+    assert notes("demo", "-o", "out/demo", "--check") == [note]
+    assert notes("demo", "-o", "out/demo", "--exclude", "*.idl") == []
+    assert notes("demo/msg/A.msg", "-o", "out/one", "--package", "one") == []
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(Path("prefix").absolute()))
+    write("prefix/share/ament_index/resource_index/rosidl_interfaces/inst", "msg/A.msg\n")
+    assert len(notes("inst", "-o", "out/inst")) == 1
+    assert notes("inst/msg/A", "-o", "out/inst") == []
+    assert len(notes("inst/msg/A", "--ament", "overlay")) == 1

@@ -228,3 +228,17 @@ def test_what_has_errors_is_left_out_and_the_rest_written(site, capsys):
     assert "left out, because of errors: `demo/msg/Uses`, `demo/msg/Wrong`" in said
     pages = {path.name for path in Path("elsewhere").rglob("*.html")}
     assert pages == {path.name for path in site.rglob("*.html")}
+
+
+@pytest.mark.parametrize(
+    ("comments", "heading"),
+    [("[m] [0..1]", "unit or range"), ("[m]", "unit"), ("[0..1]", "range")],
+)
+def test_a_range_is_no_unit(tmp_path, capsys, comments, heading):
+    fields = "".join(f"float64 f{at}  # {text}\n" for at, text in enumerate(comments.split()))
+    (tmp_path / "demo/msg").mkdir(parents=True)
+    (tmp_path / "demo/msg/Drive.msg").write_text(fields)
+    assert main(["docs", str(tmp_path / "demo"), "-o", str(tmp_path / "site")]) == 0
+    pages = [one.read_text(encoding="utf-8") for one in (tmp_path / "site").rglob("*.html")]
+    assert any(f'<th class="unit">{heading}</th>' in text for text in pages)
+    capsys.readouterr()

@@ -61,7 +61,7 @@ def test_edits_are_fixes(capsys):
     write("demo/CMakeLists.txt", "rosidl_generate_interfaces(demo msg/A.msg)\n")
     run = sarif(capsys, "demo", "--select", "package,char-type")
     fixed = {one["ruleId"]: one["fixes"] for one in run["results"] if "fixes" in one}
-    assert sorted(fixed) == ["IDL422", "IDL451", "IDL453", "IDL454"]
+    assert sorted(fixed) == ["IDL422", "IDL451", "IDL453", "IDL454", "IDL463"]
     ((change,),) = (fix["artifactChanges"] for fix in fixed["IDL422"])
     (edit,) = change["replacements"]
     assert edit["insertedContent"] == {"text": "uint8"}

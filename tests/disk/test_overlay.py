@@ -152,12 +152,13 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
         monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "riscv64")
     else:
         strange = Distribution("", "rosidl 9.9 in /opt/ros/zazzy")
-        monkeypatch.setattr("idlc.driver.generate.overlay.distribution", lambda _: strange)
+        monkeypatch.setattr("idlc.disk.output.overlay.distribution", lambda _: strange)
     status, said = idlc("gen", "arm", "--ament", "out")
     assert status == 0
-    assert "`arm` is not entered in the index of ROS 2" in said
+    assert "`arm` is not registered in the index of ROS 2" in said
     assert "zazzy" in said or "Linux on x86_64 and aarch64" in said
-    assert not (tmp_path / "out" / INDEX / "packages" / "arm").exists()
+    for kind in ("packages", "rosidl_interfaces"):
+        assert not (tmp_path / "out" / INDEX / kind / "arm").exists()
     assert not (tmp_path / "out" / LIBRARY.format("arm")).exists()
 
 

@@ -66,9 +66,26 @@ def test_what_is_right_is_right(said):
 
 
 def test_what_is_not_in_the_index_is_not_looked_for(here, said):
-    (here / "share/ament_index/resource_index/packages/arm").unlink()
+    for kind in ("packages", "rosidl_interfaces"):
+        (here / "share/ament_index/resource_index" / kind / "arm").unlink()
     (here / LIBRARY).unlink()
-    assert said() == (0, [])
+    assert said() == (2, [])
+
+
+def test_the_index_is_compared_with_what_is_installed(here, capsys):
+    index = here / "share/ament_index/resource_index"
+    for change, expected in (
+        (lambda: (here / "share/arm/srv/Wave.srv").unlink(), "lists `srv/Wave.srv` there"),
+        (lambda: (index / "rosidl_interfaces/arm").write_bytes(b"\xff\n/etc\n" * 99), "`/etc`"),
+        (lambda: (index / "rosidl_interfaces/arm").unlink(), "`ros2 interface` misses them"),
+        (lambda: (index / "rosidl_interfaces/only").write_text("msg/X.msg\n"), "list` fails"),
+        (lambda: (index / "rosidl_interfaces/only").rename(index / "packages/nodes"), ""),
+    ):
+        change()
+        assert main(["check", "--prefix", "prefix"]) == 1
+        printed = capsys.readouterr().out
+        assert "error[IDL633]" in printed
+        assert expected in printed
 
 
 def test_a_missing_library(here, said):
@@ -122,6 +139,26 @@ def test_another_distribution(here, said, monkeypatch):
         )
 
 
+def test_the_distribution_that_is_named_is_noticed(here, said, capsys, monkeypatch):
+    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", tuple)
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    generate = ["gen", "arm", "--ament", "prefix"]
+    for words, fits in ((["--distro", "humble"], False), (["--distro", "jazzy"], True)):
+        assert main([*generate, *words]) == 0
+        noted = "prefix` gets libraries for humble, not for jazzy" in capsys.readouterr().err
+        status, found = said()
+        assert (noted, status, bool(found)) == (not fits, int(not fits), not fits)
+    assert main([*generate, "--distro", "lyrical"]) == 0
+    capsys.readouterr()
+    assert main([*generate, "--check"]) == 1
+    printed = "".join(capsys.readouterr())
+    for line in printed.splitlines():
+        if ".so`" in line:
+            assert line.endswith(".so` is out of date: it is for another distribution of ROS 2")
+    assert printed.count(".so` is out of date") == 2
+
+
 def test_colcon_makes_a_prefix_for_each_package(here, said):
     install = here.parent / "install"
     install.mkdir()
@@ -154,3 +191,14 @@ def test_hostile_files_are_read_without_harm(here):
             at = chance.choice((chance.randrange(64), chance.randrange(table, len(data))))
             data[at] = chance.choice((0, 1, 0x7F, 0xFF, chance.randrange(256)))
         inspect(bytes(data))
+
+
+def test_a_prefix_without_interfaces_is_not_a_success(here, capsys):
+    bare = here.parent / "install/bare/share/ament_index/resource_index/packages"
+    bare.mkdir(parents=True)
+    (bare / "bare").touch()
+    for folder in ("install", "install/bare"):
+        assert main(["check", "--prefix", folder]) != 0
+        assert f"no package with interfaces is registered in `{folder}`" in capsys.readouterr().out
+    shutil.copytree(here, here.parent / "install/arm")
+    assert main(["check", "--prefix", "install"]) == 0

@@ -52,6 +52,46 @@
                        (error (list (cons "failed" (error-message-string problem))))))
          seen))
 
+(defun disk ()
+  "Return the files of the two packages by path, as they are on disk."
+  (mapcar (lambda (path)
+            (cons (file-relative-name path root)
+                  (with-temp-buffer (insert-file-contents path) (buffer-string))))
+          (cl-mapcan (lambda (one) (directory-files-recursively (expand-file-name one root) "."))
+                     (list "base" "fleet"))))
+
+(defun rename-message (name)
+  "Rename the message that Robot.msg uses, and return the files."
+  (find-file (expand-file-name "fleet/msg/Robot.msg" root))
+  (goto-char (point-min))
+  (forward-char 6)
+  (eglot-rename name)
+  (disk))
+
+(defun finish ()
+  (dolist (buffer (buffer-list)) (with-current-buffer buffer (set-buffer-modified-p nil)))
+  (ignore-errors (eglot-shutdown-all))
+  (with-temp-file (getenv "SEEN") (insert (json-encode seen)))
+  (kill-emacs))
+
+(when (file-exists-p "fleet")
+  (fset 'y-or-n-p (lambda (&rest _) t))   ; the question whether to edit files that are not open
+  (find-file "base/msg/Pose.msg")
+  (apply #'eglot--connect (eglot--guess-contact))
+  (find-file "fleet/msg/Robot.msg")
+  (eglot--maybe-activate-editing-mode)
+  (look "renaming"
+        (let ((default-directory root))
+          (vector (rename-message "Waypoint")
+                  (rename-message "Pose")      ; undo
+                  (rename-message "Waypoint")  ; redo
+                  (progn (find-file (expand-file-name "base/CMakeLists.txt" root))
+                         (goto-char (point-min))
+                         (insert "# not saved\n")
+                         (rename-message "Pose")))))
+  (push (cons "buffers" (vconcat (delq nil (mapcar #'buffer-file-name (buffer-list))))) seen)
+  (finish))
+
 (find-file "msg/Drive.msg")
 (push (cons "language" (symbol-name major-mode)) seen)
 (apply #'eglot--connect (eglot--guess-contact))
@@ -115,6 +155,4 @@
       (eglot-code-actions (point-min) (point-max) "source.updateGenerated.idlc" t)
       (file-exists-p (expand-file-name "out/demo_msgs/msg/_untidy.py" root)))
 
-(dolist (buffer (buffer-list)) (with-current-buffer buffer (set-buffer-modified-p nil)))
-(ignore-errors (eglot-shutdown-all))
-(with-temp-file (getenv "SEEN") (insert (json-encode seen)))
+(finish)

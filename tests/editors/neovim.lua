@@ -4,6 +4,7 @@
 -- coroutine, or the editor could not do what it is asked for.
 
 local PATIENCE = 20000 -- milliseconds that anything may take
+local LATER = 500 -- milliseconds after which the server has heard of every buffer
 local seen = {}
 local script
 
@@ -23,6 +24,13 @@ local function wait(what, check)
   error('there was no ' .. what)
 end
 
+local function sleep(milliseconds)
+  vim.defer_fn(function()
+    coroutine.resume(script)
+  end, milliseconds)
+  coroutine.yield()
+end
+
 local function text()
   return table.concat(vim.api.nvim_buf_get_lines(0, 0, -1, false), '\n') .. '\n'
 end
@@ -40,6 +48,23 @@ local function open(path, line, word)
   vim.cmd('silent edit! ' .. path)
   local at = line and vim.fn.getline(line):find(word, 1, true)
   vim.api.nvim_win_set_cursor(0, { line or 1, (at or 1) - 1 })
+end
+
+-- All files of the workspace by path, as buffers have them, or as they are on disk.
+local function disk(of_buffers)
+  local found = {}
+  for _, path in ipairs(vim.fn.systemlist({ 'find', '.', '-type', 'f', '-not', '-path', './.git/*' })) do
+    local short = path:sub(3)
+    local buffer = of_buffers and vim.fn.bufnr('^' .. vim.fn.fnamemodify(short, ':p') .. '$') or -1
+    local is_loaded = buffer > 0 and vim.api.nvim_buf_is_loaded(buffer)
+    local lines = is_loaded and vim.api.nvim_buf_get_lines(buffer, 0, -1, false) or vim.fn.readfile(short)
+    found[short] = table.concat(lines, '\n') .. '\n'
+  end
+  return found
+end
+
+local function files()
+  return disk(true)
 end
 
 local function problems()
@@ -160,6 +185,46 @@ local look = {
       vim.lsp.buf.document_symbol()
     end)
   end,
+  -- the key for it, as the plugin leaves it
+  tag = vim.lsp.enable and function()
+    open('msg/Drive.msg', 3, 'Header')
+    type_keys('<C-]>')
+    wait('jump', function()
+      return name(vim.fn.bufname()) == 'Header.msg'
+    end)
+    return text()
+  end,
+  renaming = function()
+    local steps = {}
+    local function rename(new)
+      vim.api.nvim_set_current_buf(vim.fn.bufnr('Robot.msg'))
+      vim.api.nvim_win_set_cursor(0, { 1, 6 })
+      vim.lsp.buf.rename(new)
+      wait('rename', function()
+        return text():find('base/' .. new .. ' ', 1, true)
+          and vim.fn.filereadable('base/msg/' .. new .. '.msg') == 1
+      end)
+      table.insert(steps, { new, files() })
+      sleep(LATER)
+    end
+    local function save()
+      vim.cmd('silent wall')
+      wait('end of errors', function()
+        return #vim.diagnostic.get(nil, { severity = vim.diagnostic.severity.ERROR }) == 0
+      end)
+      table.insert(steps, { 'disk', disk() })
+    end
+    rename('Waypoint')
+    rename('Pose') -- undo, before anything is saved
+    rename('Waypoint') -- redo
+    save()
+    vim.cmd('edit base/CMakeLists.txt')
+    vim.api.nvim_buf_set_lines(0, 0, 0, false, { '# not saved' })
+    sleep(LATER)
+    rename('Pose')
+    save()
+    return steps
+  end,
   inlay_hint = vim.lsp.inlay_hint and function()
     open('msg/Drive.msg')
     vim.lsp.inlay_hint.enable(true)
@@ -191,35 +256,12 @@ local look = {
 
 local CAPABILITIES = vim.tbl_filter(function(one)
   return look[one]
-end, {
-  'diagnostic', 'fix', 'hover', 'definition', 'built_in', 'references',
-  'completion', 'rename', 'format', 'symbol', 'inlay_hint', 'update',
-})
-
--- Neovim 0.7 has neither `vim.lsp.enable`, which the plugin calls, nor `vim.lsp.start`.
-local function attach_old()
-  local client
-  vim.api.nvim_create_autocmd('FileType', {
-    pattern = 'rosmsg',
-    callback = function()
-      client = client
-        or vim.lsp.start_client({
-          name = 'idlc',
-          cmd = { 'rosidlc', 'lsp' },
-          root_dir = vim.fn.getcwd(),
-        })
-      vim.lsp.buf_attach_client(0, client)
-      vim.bo.omnifunc = 'v:lua.vim.lsp.omnifunc'
-    end,
-  })
-end
+end, vim.split(vim.env.LOOK, ' '))
 
 local function main()
-  if not vim.lsp.enable then
-    attach_old()
-  end
   vim.o.completeopt = 'menuone'
-  open('msg/Drive.msg')
+  vim.o.hidden = true -- as it is in newer ones
+  open(vim.env.FIRST)
   wait('server', function()
     local clients = vim.lsp.get_clients or vim.lsp.buf_get_clients
     for _, client in pairs(clients()) do
@@ -237,7 +279,7 @@ local function main()
       end
     end
   end
-  vim.cmd('silent edit! msg/Drive.msg')
+  vim.cmd('silent edit! ' .. vim.env.FIRST)
   seen.language = vim.bo.filetype
   seen.syntax = vim.fn.synIDattr(vim.fn.synID(4, 1, 1), 'name')
 end

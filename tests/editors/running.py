@@ -46,8 +46,21 @@ def see(
     return found
 
 
-def neovim(program: object, package: Path) -> dict[str, Any]:
+#: What is looked at in the package of the scenario, and in the workspace of its rename.
+LOOKS = (
+    "diagnostic fix hover definition built_in tag references completion rename format symbol "
+    "inlay_hint update"
+)
+
+
+def neovim(program: object, package: Path, first: str = "msg/Drive.msg", look: str = LOOKS) -> Any:
     """Return what Neovim with the plugin saw."""
     plugin = f"set runtimepath+={ROOT / 'editors' / 'neovim'} noswapfile"
     script = f"luafile {HERE / 'neovim.lua'}"
-    return see(package, program, "--headless", "--clean", "--cmd", plugin, "-c", script)
+    words = (program, "--headless", "--clean", "--cmd", plugin, "-c", script)
+    return see(package, *words, FIRST=first, LOOK=look)
+
+
+def neovim_renames(program: object, workspace: Path) -> dict[str, Any]:
+    """Return the files after each rename of a message in Neovim."""
+    return neovim(program, workspace, "fleet/msg/Robot.msg", "renaming")["renaming"]

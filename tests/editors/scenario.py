@@ -1,10 +1,10 @@
 """One package, what is done to it in every editor, and what is seen there."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 FILES = {
-    ".git/HEAD": "",
     "package.xml": '<package format="3">\n  <name>demo_msgs</name>\n'
     "  <depend>std_msgs</depend>\n</package>\n",
     "msg/Drive.msg": "# How fast to drive.\n\nstd_msgs/Header header\n"
@@ -35,11 +35,37 @@ EXPECTED: dict[str, Any] = {
     "symbol": {"header", "speed", "MODE_FAST", "mode"},
     "inlay_hint": ["@0, ≥13 B", "@≥16, 8 B", "@≥24, 1 B"],
 }
+#: Two packages, of which a message is renamed in each editor, from the file of a user.
+RENAMING = {
+    "base/package.xml": '<package format="3">\n  <name>base</name>\n</package>\n',
+    "base/CMakeLists.txt": 'rosidl_generate_interfaces(base\n  "msg/Pose.msg" "msg/Track.msg")\n',
+    "base/msg/Pose.msg": "float64 x  # [m]\n",
+    "base/msg/Track.msg": "Pose[] poses\n",
+    "fleet/package.xml": '<package format="3">\n  <name>fleet</name>\n'
+    "  <depend>base</depend>\n</package>\n",
+    "fleet/msg/Robot.msg": "base/Pose pose\nbase/Pose[2] before\n",
+    "fleet/srv/Where.srv": "---\nbase/Pose pose\n",
+}
+RENAMED = {
+    path.replace("Pose", "Waypoint"): text.replace("Pose", "Waypoint")
+    for path, text in RENAMING.items()
+}
+#: Each name that the message gets in turn, with the files as buffers have them or `disk` has.
+_CMAKE = "base/CMakeLists.txt"
+EDITED = {**RENAMING, _CMAKE: "# not saved\n" + RENAMING[_CMAKE]}
+NEOVIM_RENAMES = [
+    ["Waypoint", RENAMED],
+    ["Pose", RENAMING],
+    ["Waypoint", RENAMED],
+    ["disk", RENAMED],
+    ["Pose", EDITED],
+    ["disk", EDITED],
+]
 
 
-def write(folder: Path) -> Path:
-    """Write the package into a folder, and return that."""
-    for path, text in FILES.items():
+def write(folder: Path, files: Mapping[str, str] = FILES) -> Path:
+    """Write files into a folder, with what makes it a repository, and return that."""
+    for path, text in {".git/HEAD": "", **files}.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
     return folder
@@ -67,3 +93,8 @@ def normal(seen: dict[str, Any]) -> dict[str, Any]:
         elif name == "inlay_hint":
             found[name] = [label for _, label in value]
     return found
+
+
+def steps(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, object]:
+    """Return what VS Code has on disk after each step, and which dialogs are left at the end."""
+    return {"renamed": after, "undone": before, "redone": after, "dialogs": 0}

@@ -6,7 +6,7 @@
 import re
 
 from tests.editors import running, scenario
-from tests.support.paths import DOCS
+from tests.support.paths import DOCS, ROOT
 
 
 def expected(seen):
@@ -19,7 +19,7 @@ def expected(seen):
 
 
 def test_neovim_of_debian(package):
-    """An old one: problems are pushed to it, and it starts the server in another way."""
+    """An old one: problems are pushed to it, and the plugin starts the server in another way."""
     seen = running.neovim("/usr/bin/nvim", package)
     assert scenario.normal(seen) == expected(seen)
     assert seen["syntax"] == "rosmsgPrimitive"
@@ -28,14 +28,29 @@ def test_neovim_of_debian(package):
     assert seen["update"] is True
 
 
-def test_emacs(package, tmp_path):
+def test_neovim_of_debian_renames_a_message(workspace):
+    assert running.neovim_renames("/usr/bin/nvim", workspace) == scenario.NEOVIM_RENAMES
+
+
+def emacs(package):
+    """Return what Emacs saw with the lines of the document."""
     text = (DOCS / "editors.md").read_text(encoding="utf-8")
     (lines,) = re.findall(r"^```elisp\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    (tmp_path / "lines.el").write_text(lines, encoding="utf-8")
+    path = package.parent / "lines.el"
+    path.write_text(lines.replace("/path/to/idlc", str(ROOT)), encoding="utf-8")
     script = running.HERE / "emacs.el"
-    seen = running.see(
-        package, "/usr/bin/emacs", "--batch", "-l", script, LINES=str(tmp_path / "lines.el")
-    )
+    return running.see(package, "/usr/bin/emacs", "--batch", "-l", script, LINES=str(path))
+
+
+def test_emacs_renames_a_message(workspace):
+    seen = emacs(workspace)
+    expected = [scenario.RENAMED, scenario.RENAMING, scenario.RENAMED, scenario.EDITED]
+    assert seen["renaming"] == expected
+    assert str(workspace / "base/msg/Pose.msg") in seen["buffers"]
+
+
+def test_emacs(package):
+    seen = emacs(package)
     assert scenario.normal(seen) == expected(seen)
     assert seen["language"] == "rosmsg-mode"
     assert "builtin_interfaces/Time stamp" in seen["built_in"]

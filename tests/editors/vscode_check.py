@@ -18,13 +18,15 @@ PATIENCE = 1500
 
 def test_vscode(package):
     # VS Code asks a login shell for PATH, which knows nothing of the tests
-    (package / ".venv").symlink_to(sys.prefix, target_is_directory=True)
+    workspace = scenario.write(package.parent / "renaming", scenario.RENAMING)
+    for one in (package, workspace):
+        (one / ".venv").symlink_to(sys.prefix, target_is_directory=True)
     for one in FOLDER.glob("*.png"):
         one.unlink()
     extension = ROOT / "build" / "idlc.vsix"
     script = FOLDER / "see.mjs"
     program = os.environ.get("NODE", "node")
-    words = (program, script, package, extension, browser.command())
+    words = (program, script, package, extension, browser.command(), workspace)
     seen = running.see(package, *words, patience=PATIENCE)
     for one in package.parent.glob("*.png"):
         shutil.copy(one, FOLDER)
@@ -34,6 +36,10 @@ def test_vscode(package):
     assert "uint32 nanosec" in seen["show"]
     assert seen["lens"]
     assert seen["update"]
+    steps = seen["rename_message"]
+    assert steps["closed"] == scenario.steps(scenario.RENAMING, scenario.RENAMED)
+    assert steps["open"] == scenario.steps(scenario.RENAMED, scenario.RENAMING)
+    assert seen["rename_file"] == {"renamed": scenario.RENAMED, "back": scenario.RENAMING}
     assert seen["gen"]
     assert seen["scaffold"]
     assert seen["errors"] == 0

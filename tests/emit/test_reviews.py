@@ -4,9 +4,17 @@ import shutil
 import subprocess
 import sys
 
+import pytest
+
 from tests.support.paths import EXAMPLE
+from tests.support.tools import tool
 
 MODULE = "my_robot_controller/action/_countdown.py"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _git():
+    tool("git")
 
 
 def run(*command, cwd):

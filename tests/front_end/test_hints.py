@@ -72,6 +72,13 @@ REPLACED = {
     "UInt8 a": "uint8 a",
     "timestamp a": "builtin_interfaces/Time a",
     "flot32 a": "float32 a",
+    "flot a": "float32 a",
+    "doubel a": "float64 a",
+    "std_msgs/Header.msg a": "std_msgs/Header a",
+    "std_msgs/msg/Header.msg a": "std_msgs/Header a",
+    "std_msgs.msg.String a": "std_msgs/String a",
+    "std_msgs::msg::String a": "std_msgs/String a",
+    "Other.msg a": "Other a",
     "Header a": "std_msgs/Header a",
     "Othr a": "Other a",
     "std_msg/Header a": "std_msgs/Header a",
@@ -103,6 +110,21 @@ def test_what_a_hint_says_to_write_is_right(line, right):
     assert not errors(right + "\n")
 
 
+@pytest.mark.parametrize("name", [*ir.PRIMITIVES, "string", "wstring", "float", "double"])
+def test_a_letter_left_out_doubled_or_swapped_leads_to_a_basic_type(name):
+    for at in range(1, len(name)):
+        for typo in (
+            name[:at] + name[at + 1 :],
+            name[:at] + name[at] + name[at:],
+            name[: at - 1] + name[at] + name[at - 1] + name[at + 1 :],
+        ):
+            if typo == name or not typo[0].isalpha():
+                continue
+            for found in errors(f"{typo} a\n"):
+                assert found.hint, typo
+                assert not found.hint.startswith("write `"), (typo, found.hint)
+
+
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
@@ -119,6 +141,7 @@ def test_what_a_hint_says_to_write_is_right(line, right):
         ("dict a", "no maps"),
         ("Cfg_Block a", "write `CfgBlock`"),
         ("enum a", "no enums"),
+        ("any a", "a field has one type"),
         ("Do a", "`Do` is a service"),
         ("std_srvs/SetBool a", "`SetBool` is a service"),
         ("std_srvs/srv/SetBool a", "only messages"),

@@ -15,7 +15,7 @@ import time
 
 import pytest
 
-from tests.support.machine import GEN, running, tree
+from tests.support.machine import GEN, another_user, running, tree
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n", "msg/B.msg": "int8 b\n"}
 NEW = {"msg/A.msg": "int16 a\n", "action/Come.action": "---\n---\n", "msg/B.msg": "int8 b\n"}
@@ -152,12 +152,9 @@ def test_folders_removed_meanwhile(where, machine, versions):
 
 @pytest.mark.parametrize("mode", ["read-only files", "read-only folders", "no access", "another's"])
 def test_without_permission(mode, machine, versions):
-    if os.getuid() == 0:
-        other = {"user": 65534}
-    else:
-        other = {}
-        if mode == "another's":
-            return  # what is another's cannot be made without being root; the modes say the same
+    other = another_user(machine.folder)
+    if not other and mode == "another's":
+        return  # what is another's cannot be made without being root; the modes say the same
     machine.write(NEW)
     machine.reset(versions[0])
     out = machine.folder / "out"

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.support.machine import running, tree
+from tests.support.machine import another_user, running, tree
 
 pytestmark = pytest.mark.long
 
@@ -188,7 +188,7 @@ def test_the_folder_is_removed_meanwhile(scene):
 def test_without_permission(scene):
     scene.reset()
     scene.work.mkdir(exist_ok=True)
-    other = {"user": 65534} if os.getuid() == 0 else {}
+    other = another_user(scene.machine.folder)
     folders = [scene.work, *(path for path in scene.work.rglob("*") if path.is_dir())]
     for folder in folders:
         folder.chmod(0o555)

@@ -3,6 +3,12 @@
 import pytest
 from lsprotocol import types as lsp
 
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source
+from idlc.lsp.features import suggestions
+from idlc.model.ir import PRIMITIVES, TypeName
+from idlc.model.lowering.file import lower
+from idlc.syntax.parse import parse
 from tests.support.editor import at
 
 MANIFEST = """\
@@ -139,3 +145,21 @@ def test_built_in_types_say_how_large_they_are(typing):
     items = typing("|")
     assert items["float64"].detail == "8 bytes"
     assert items["Wheel"].detail == "demo"
+
+
+@pytest.mark.parametrize(
+    "array", ["", "[]", "[3]", "[12]", "[<=3]", "[0]", "[99999999999999999999]"]
+)
+@pytest.mark.parametrize("base", [*PRIMITIVES, "string", "wstring", "string<=2", "demo/Drive"])
+def test_every_value_that_is_offered_is_one(base, array):
+    for value in suggestions.values(f"{base}{array}"):
+        report = Report()
+        source = Source("A.msg", f"{base}{array} a {value}\n")
+        lower(parse(source), TypeName("demo", "msg", "A"), report)
+        assert not report.had_errors, value
+
+
+def test_an_array_of_a_length_gets_a_value_of_that_length(typing):
+    assert "[0, 0, 0]" in typing("uint8[3] rgb |")
+    assert "[]" not in typing("uint8[3] rgb |")
+    assert typing("uint8[3] RGB=|") == {}

@@ -1,9 +1,14 @@
 """What an editor shows of a file: hover, definitions, references, symbols, layout."""
 
+import html
+import random
+import re
+
 import pytest
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
+from idlc.lsp.features.hover import prose
 from tests.support.editor import at, between
 
 CONTENT = lsp.WORKSPACE_TEXT_DOCUMENT_CONTENT
@@ -92,7 +97,63 @@ def test_text_of_a_comment_is_no_markup(opened):
     one, uri, _ = opened
     one.change(uri, "int8 x  # <b>*`_\n")
     text, _ = hover(opened, 0, 5)
-    assert r"\<b\>\*\`\_" in text
+    assert r"\<b>\*\`_" in text
+
+
+@pytest.mark.parametrize(
+    "text", ["one of STATUS_*", "a_b_c - [m/s]", "`speed` (1.5 m) & co", "x < y > z, 1 * 2"]
+)
+def test_what_markdown_shows_as_it_is_stays(text):
+    assert prose((text,)) == text
+
+
+PIECES = [
+    *"*_~`[]()<>&#+-=|.!:\\1a ",
+    *(
+        "word",
+        "STATUS_*",
+        "http://x.y",
+        "&amp;",
+        "<b>",
+        "1.",
+        "2)",
+        "---",
+        "===",
+        "](u)",
+        "[a]:",
+        "```",
+    ),
+]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_markdown_shows_any_comment_as_it_was_written(seed):
+    render = pytest.importorskip("markdown_it").MarkdownIt("commonmark")
+    render.enable(["table", "strikethrough"])
+    choose = random.Random(seed)
+    for _ in range(100):
+        lines = tuple(
+            "".join(choose.choices(PIECES, k=choose.randrange(1, 9))).strip() or "x"
+            for _ in range(choose.randrange(1, 4))
+        )
+        shown = render.render(prose(lines))
+        assert {*re.findall(r"<(\w+)", shown)} <= {"p", "br", "code"}, lines
+        text = html.unescape(re.sub(r"<[^>]*>", "", shown))
+        written = (re.sub(r"(?<!`)`([^`]+)`(?!`)", r"\1", line) for line in lines)
+        assert text.split() == " ".join(written).split(), lines
+
+
+def test_a_range_in_brackets_is_called_one(opened):
+    one, uri, _ = opened
+    for text in ("0..1", "-1.5 .. 1.5", "0-255", "0 to 100", ">= 0", "-pi..pi"):
+        one.change(uri, f"uint8 x  # [{text}] how much\n")
+        shown, _ = hover(opened, 0, 6)
+        assert f"range: `{text}`" in shown
+        assert "unit" not in shown
+        assert "range: `0` to" not in shown
+    for text in ("m/s", "1/s", "m-1", "kg m^2", "1e-3 m", "%"):
+        one.change(uri, f"uint8 x  # [{text}]\n")
+        assert f"unit: `{text}`" in hover(opened, 0, 6)[0]
 
 
 def test_a_definition_is_found_where_it_is(opened):

@@ -73,7 +73,7 @@ def test_hover_has_comment_unit_and_the_line(shown, word, expected):
     [
         ("speed", "demo/msg/_drive.py", "    speed: float"),
         ("radius", "demo/msg/_wheel.py", "    radius: float"),
-        ("Drive", "demo/msg/_drive.py", "class Drive(_idlc.Message):"),
+        ("Drive", "demo/msg/_drive.py", "class Drive(_idlc.Message):  # noqa"),
     ],
 )
 def test_a_definition_is_in_the_class(shown, word, path, text):

@@ -1,14 +1,17 @@
 """Whatever a client sends, the server lives on; it ends when the client does."""
 
 import json
+import os
 import random
 import signal
 import subprocess
 import sys
+from io import BytesIO
 
 import pytest
 
 from idlc.lsp.methods import METHODS
+from idlc.lsp.server import Server
 from tests.lsp.test_golden_replay import notification, request
 
 PATIENCE = 30
@@ -218,17 +221,19 @@ def test_a_cancelled_request_is_not_begun(workspace):
     assert "result" in answers[0]
 
 
-def start(*words):
+def start(*words, **variables):
     return subprocess.Popen(
         [sys.executable, *(words or ("-m", "idlc", "lsp"))],
+        env={**os.environ, **variables},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
 
 
-def test_it_ends_with_a_client_that_reads_no_more(workspace):
-    with start() as server:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_it_ends_with_a_client_that_reads_no_more(unbuffered, workspace):
+    with start(PYTHONUNBUFFERED=unbuffered) as server:
         server.stdin.write(frame(beginning(rootUri=workspace.as_uri())))
         server.stdin.flush()
         assert server.stdout.readline()
@@ -305,3 +310,35 @@ def test_words_of_clients_go_with_others():
     words = ["lsp", "--stdio", "--clientProcessId", "7", "--check"]
     done = subprocess.run([sys.executable, "-m", "idlc", *words], capture_output=True, check=True)
     assert json.loads(done.stdout)["serverInfo"]["name"] == "idlc"
+
+
+@pytest.mark.parametrize("half", ["\\ud800", "\\udfff"])
+def test_half_a_pair_is_no_text(workspace, half):
+    """In JSON it can be written, in UTF-8 it cannot: neither read as a path nor sent back."""
+    uri = f'"file:///a{half}.msg"'
+    position = '{"line": 0, "character": 0}'
+    params = f'{{"textDocument": {{"uri": {uri}}}, "position": {position}}}'
+    change = f'{{"textDocument": {{"uri": {uri}, "version": 2}}, "contentChanges": []}}'
+    messages = [
+        f'{{"jsonrpc": "2.0", "id": 1, "method": "textDocument/hover", "params": {params}}}',
+        f'{{"jsonrpc": "2.0", "id": 2, "method": "no{half}", "params": null}}',
+        f'{{"jsonrpc": "2.0", "id": "{half}", "method": "textDocument/hover"}}',
+        f'{{"jsonrpc": "2.0", "method": "textDocument/didChange", "params": {change}}}',
+    ]
+    parts = [frame(one.encode()) for one in messages]
+    found = run(
+        beginning(rootUri=workspace.as_uri()), notification("initialized", {}), *parts, *END
+    )
+    assert errors(found) == [-32602, -32602, -32600]
+    assert found[-1]["id"] == "last"
+
+
+def test_what_was_answered_or_cancelled_leaves_nothing():
+    cancels = [notification("$/cancelRequest", {"id": number}) for number in range(50)]
+    asked = [{**request("textDocument/hover", None), "id": number} for number in range(20, 30)]
+    parts = [beginning(), *cancels, *asked, *cancels, *END]
+    server = Server(BytesIO(b"".join(map(frame, parts))), BytesIO())
+    assert server.run() == 0
+    kept = {name: value for name, value in vars(server).items() if isinstance(value, (set, dict))}
+    assert kept
+    assert not any(kept.values())

@@ -11,6 +11,7 @@ from idlc.lsp.protocol.parts import DocumentId, OfDocument
 from idlc.lsp.protocol.token_kinds import TYPES
 from idlc.lsp.workbench import Workbench
 from tests.support.editor import at, between
+from tests.support.tools import tool
 
 STOP = """\
 # Stops the robot.
@@ -23,7 +24,6 @@ uint8 how
 uint8 OK=1
 bool ok
 """
-GIT = shutil.which("git")
 FILES = {"srv/Stop.srv": STOP, "msg/Wheel.msg": "uint8 side\nfloat64 radius\n"}
 
 
@@ -39,7 +39,7 @@ def server(editor, package):
 
 def git(folder, *words):
     who = ("-c", "user.name=test", "-c", "user.email=test@example.org")
-    subprocess.run([GIT, *who, *words], cwd=folder, check=True)
+    subprocess.run([tool("git"), *who, *words], cwd=folder, check=True)
 
 
 @pytest.fixture
@@ -232,6 +232,23 @@ def test_what_pyproject_compares_with_is_followed(editor, package, worktree):
     )
     assert lenses(one, uri)[2] == "breaks nothing against git:HEAD"
     assert lsp.WORKSPACE_CODE_LENS_REFRESH in [method for method, _ in asked]
+
+
+def test_what_cannot_be_compared_is_said(editor, package):
+    """One broken file of the old version says nothing of the others."""
+    files = {"pyproject.toml": TABLE, "msg/Old.msg": "int9 x\n", "msg/New.msg": "int8 x\n"}
+    folder = package(files)
+    shutil.rmtree(folder / ".git")
+    git(folder, "init", "-q")
+    git(folder, "add", ".")
+    git(folder, "commit", "-qm", "first")
+    one = editor(folder)
+    uri, old = (one.open(folder / f"msg/{name}.msg", "int16 x\n") for name in ("New", "Old"))
+    assert lenses(one, old)[2] == "not compared: there are errors in git:HEAD"
+    assert lenses(one, uri)[2] == "breaks: wire, hash, source for 0 users against git:HEAD"
+    shutil.rmtree(folder / ".git/objects")
+    (folder / ".git/refs/heads").rename(folder / ".git/refs/gone")
+    assert lenses(one, uri)[2].startswith("not compared: cannot read `git:HEAD`: ")
 
 
 def watchers(asked):

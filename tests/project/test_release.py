@@ -16,9 +16,15 @@ from release.project import FailedError, Project
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import clean_environment, ended, run
+from tests.support.tools import tool
 
 REPOSITORY = "https://github.com/someone/idlc"
 HERE = Project(ROOT)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _git():
+    tool("git")
 
 
 def git(*words, cwd):
@@ -111,6 +117,30 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     manifest = json.loads(project.text("editors/vscode/package.json"))
     assert manifest["version"] == "0.10.1"
     assert manifest["repository"]["url"] == f"{REPOSITORY}.git"
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "version", "day", "says"),
+    [
+        ("CHANGELOG.md", None, "0.10.1", "2031-01-02", "add `## 0.10.1 (not released yet)`"),
+        ("CITATION.cff", "version: ", HERE.version, "2031-01-02", "CITATION.cff names no version"),
+        ("idlc/__init__.py", "__version__", HERE.version, "2031-01-02", "names no version"),
+        ("CHANGELOG.md", None, "1.0", "2031-01-02", "not like 1.2.3"),
+        ("CHANGELOG.md", None, HERE.version, "tomorrow", "not like 2026-12-31"),
+    ],
+)
+def test_a_version_is_given_to_all_files_or_to_none(
+    published, tmp_path, path, change, version, day, says
+):
+    project = Project(tmp_path / "idlc")
+    shutil.copytree(published.root, project.root)
+    if change:
+        write(project.root / path, project.text(path).replace(change, "x"))
+    files = [project.root / one for one in project.files()]
+    before = [one.read_bytes() for one in files]
+    with pytest.raises(FailedError, match=re.escape(says)):
+        prepare.version_is(project, version, day)
+    assert [one.read_bytes() for one in files] == before
 
 
 def test_no_address_is_invented():

@@ -4,8 +4,10 @@ import shutil
 import sqlite3
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+import yaml
 
 from idlc.recordings.container import RecordingError, open_recording
 from tests.support import recordings as made
@@ -162,3 +164,105 @@ def test_what_is_in_a_file_is_read_with_the_standard_library(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def bag_of(folder, names):
+    """Write one message to each of some files of a folder."""
+    folder.mkdir()
+    for number, name in enumerate(names):
+        made.by_mcap(folder / name, MESSAGES[number : number + 1])
+
+
+NAMES = [f"a_long_name_of_a_file_of_this_day_{number}.mcap" for number in range(4)]
+ODD = [
+    "a b, c.mcap",
+    "x#y.mcap",
+    "\u00fcn\u00ef.mcap",
+    "tab\tq.mcap",
+    "co: lon.mcap",
+    "'q\".mcap",
+    "~.mcap",
+]
+
+
+def information(names, **more):
+    return {"rosbag2_bagfile_information": {"relative_file_paths": names, **more}}
+
+
+@pytest.mark.parametrize("names", [NAMES, ODD], ids=["long", "odd"])
+@pytest.mark.parametrize("version", range(1, 10))
+@pytest.mark.parametrize(
+    "style",
+    [
+        {},
+        {"default_flow_style": None},
+        {"default_flow_style": True, "width": 20},
+        {"default_style": '"', "width": 10},
+        {"default_style": "'", "indent": 8},
+        {"explicit_start": True, "explicit_end": True, "line_break": "\r\n"},
+    ],
+    ids=str,
+)
+def test_metadata_in_every_style_of_yaml(names, version, style, tmp_path):
+    bag_of(tmp_path / "bag", [*names, "other.mcap"])
+    there = [f"bag/{name}" for name in names] if version < 4 else names
+    meta = information(there, version=version, files=[{"path": one} for one in there])
+    path = tmp_path / "bag" / "metadata.yaml"
+    path.write_bytes(yaml.dump(meta, **style).encode("utf-16" if version == 9 else "utf-8"))
+    with open_recording(path.parent) as container:
+        assert [Path(one.name).name for one in container.files] == names
+        assert container.notes == ("`other.mcap` is not named in metadata.yaml and left out",)
+
+
+@pytest.mark.parametrize(
+    ("text", "note"),
+    [
+        (yaml.dump({"shared": NAMES[:3], **information(NAMES[:3])}), "not named"),
+        ("{[\nrosbag2", "` is not YAML: all files of the folder are read"),
+        ("a: &a [" + "[" * 5000, "nests more than 100 levels"),
+        ("a: \udcff", "is not YAML"),
+        ("%YAML 9.9\n---\n", ""),
+        ("a: !!python/object/apply:os.system [exit]", ""),
+        ("#" * (9 << 20), "larger than 8 MiB"),
+        ("", ""),
+        ("rosbag2_bagfile_information:\n  relative_file_paths:\n  - a.mcap\n" * 2, "`a.mcap`"),
+        ("rosbag2_bagfile_information: {relative_file_paths: [{}, [], ~, 5]}", "`5`"),
+        ("rosbag2_bagfile_information: {relative_file_paths: [../o.mcap, /etc/o.mcap]}", "`o.mc"),
+        ("- rosbag2_bagfile_information\n", ""),
+        ("&a [*a]", ""),
+    ],
+    ids=range(13),
+)
+def test_metadata_that_is_odd(text, note, tmp_path):
+    bag_of(tmp_path / "bag", NAMES)
+    made.by_mcap(tmp_path / "o.mcap", MESSAGES)
+    path = tmp_path / "bag" / "metadata.yaml"
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with open_recording(path.parent) as container:
+        names = [Path(one.name).name for one in container.files]
+        assert names == NAMES[: 3 if "shared" in text else 4]
+        assert note in " ".join(container.notes)
+
+
+def test_metadata_of_aliases_of_aliases_costs_nothing(tmp_path):
+    """Neither by lists of lists nor by merged mappings."""
+    bag_of(tmp_path / "bag", NAMES)
+    levels = range(60)
+    lists = "".join(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9 * (n > 0))}]\n" for n in levels)
+    merges = "".join(
+        f"m{n}: &m{n} {{<<: [{', '.join([f'*m{n - 1}'] * 9 * (n > 0))}]}}\n" for n in levels
+    )
+    path = tmp_path / "bag" / "metadata.yaml"
+    path.write_text(lists + merges + yaml.dump(information(NAMES[:2])), encoding="utf-8")
+    with open_recording(path.parent) as container:
+        assert len(container.files) == 2
+
+
+def test_a_name_that_is_there_twice_loses_no_file(tmp_path):
+    bag_of(tmp_path / "bag", NAMES)
+    text = "rosbag2_bagfile_information:\n" + "".join(
+        f"  relative_file_paths: [{one}]\n" for one in NAMES[:3]
+    )
+    (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="utf-8")
+    with open_recording(tmp_path / "bag") as container:
+        assert len(container.files) == 3

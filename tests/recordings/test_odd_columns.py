@@ -167,7 +167,7 @@ def test_times_in_lists_keep_their_nanoseconds(recording, tmp_path):
 
 def test_what_a_recording_does_not_define_is_looked_for_and_that_is_said(tmp_path, capfd):
     """As with recordings of Humble, in which there are no definitions and no hashes."""
-    path = recorded_text.write(tmp_path / "a.mcap", "@ /x own_msgs/msg/Pair\n", {"/x": 2})
+    path = recorded_text.write(tmp_path / "a.mcap", "@ /x own_msgs/msg/Pair unknown\n", {"/x": 2})
     assert main(["columns", str(path), "-o", str(tmp_path / "a.csv")]) == 1
     assert "there is no definition of `own_msgs/msg/Pair`" in capfd.readouterr().err
     (tmp_path / "own_msgs" / "msg").mkdir(parents=True)

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -120,8 +121,8 @@ def test_colcon_builds_it_with_links_and_without_in_any_order(scaffolded, ask, t
         expected = change(package, number)
     status, said = checked(tmp_path / "install")
     assert (status, "is out of date: `demo/msg/Drive` changed" in said) == (1, True)
-    new = {path for path in package.rglob("*") if "demo/demo/" not in path.as_posix()} - before
-    assert not [path for path in new if path.suffix not in ("", ".json")], "not part of the source"
+    after = {path for path in package.rglob("*") if "demo/demo/" not in path.as_posix()}
+    assert after == before, "what is built is not part of the source"
 
 
 @pytest.fixture(scope="module")
@@ -142,9 +143,9 @@ def environment(tmp_path_factory):
 def pip(environment, tmp_path):
     """Return a function that runs pip; idlc is importable for builds unless told otherwise."""
 
-    def pip(*words, borrowed=IDLC, path=""):
+    def pip(*words, borrowed=IDLC, path="", **others):
         python = environment / "bin" / "python"
-        found = {"BORROWED": borrowed, "PYTHONPATH": path}
+        found = {"BORROWED": borrowed, "PYTHONPATH": path, **others}
         return run(python, "-m", "pip", *words, cwd=tmp_path, **found)
 
     yield pip
@@ -172,9 +173,13 @@ def test_pip_installs_libraries_and_commands(options, scaffolded, environment, p
 
 def test_a_wheel_is_for_the_machine_whose_library_it_holds(scaffolded, pip, tmp_path):
     package = shutil.copytree(scaffolded, tmp_path / "demo")
-    pip("wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, package)
+    words = ("wheel", "--no-deps", "--no-build-isolation", "-w", tmp_path, package)
+    pip(*words, ROS_DISTRO="jazzy")
     (wheel,) = tmp_path.glob("*.whl")
-    assert wheel.name == f"demo-0.1.0-py3-none-linux_{platform.machine()}.whl"
+    tag = rf"(manylinux_2_17|musllinux_1_1)_{platform.machine()}"
+    assert re.fullmatch(rf"demo-0\.1\.0-py3-none-{tag}\.whl", wheel.name)
+    pip(*words, ROS_DISTRO="humble")
+    assert len({*tmp_path.glob("*.whl")}) == 2, "libraries that differ are in wheels that do"
 
 
 def test_a_package_of_nodes_alone_is_for_every_machine(environment, pip, tmp_path):
@@ -196,16 +201,134 @@ def test_without_a_library_the_package_is_not_in_the_index(scaffolded, environme
     elsewhere.mkdir()
     text = "import platform\nplatform.machine = lambda: 'riscv64'\n"
     (elsewhere / "sitecustomize.py").write_text(text)
-    for borrowed, reason in ((IDLC, "Linux on x86_64 and aarch64"), ("", "")):
+    for borrowed, reason in ((IDLC, "Linux on x86_64 and aarch64"), ("", "idlc is missing")):
         where = {"borrowed": borrowed, "path": str(elsewhere)}
         said = pip(*INSTALL, "--force-reinstall", package, **where)
         assert reason in said
         assert not (environment / INDEX).exists()
+        assert not (environment / INDEX.parents[1] / "rosidl_interfaces" / "demo").exists()
         assert not (environment / LIBRARY).exists()
         assert (environment / "share" / "demo" / "msg" / "Drive.msg").is_file()
         code = "from demo.msg import Drive; print(Drive(1.5))"
         said = run(environment / "bin" / "python", "-c", code, cwd=tmp_path, PYTHONPATH=SITE)
         assert "1.5" in said
+
+
+def built_by_colcon(*options, merged=False):
+    def build(package, folder, pip, environment):
+        colcon = [Path(sys.executable).parent / "colcon", "--log-base", folder / "log", "build"]
+        places = ["--build-base", folder / "build", "--install-base", folder / "install"]
+        run(*colcon, *places, *options, "--paths", package, cwd=folder, PYTHONPATH=str(ROOT))
+        return folder / "install" / ("" if merged else "demo")
+
+    return build
+
+
+def installed_by_pip(*options):
+    def build(package, folder, pip, environment):
+        pip(*INSTALL, *options, package)
+        return environment
+
+    return build
+
+
+def installed_from_an_sdist(package, folder, pip, environment):
+    code = "import setuptools.build_meta as b, sys; b.build_sdist(sys.argv[1])"
+    python = environment / "bin" / "python"
+    run(python, "-c", code, folder, cwd=package, BORROWED=IDLC, PYTHONPATH="")
+    (sdist,) = folder.glob("*.tar.gz")
+    pip(*INSTALL, sdist)
+    return environment
+
+
+def installed_by_the_backend(package, folder, pip, environment):
+    lines = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
+    (package / "pyproject.toml").write_text(lines)
+    (package / "demo" / "hello.py").unlink()
+    programs.run("git", "commit", "-qam", "backend", cwd=package)
+    pip(*INSTALL, package)
+    return environment
+
+
+def generated(package, folder, pip, environment):
+    idlc("gen", package, "--ament", folder / "prefix", cwd=folder)
+    return folder / "prefix"
+
+
+WAYS = {
+    "colcon": built_by_colcon(),
+    "colcon, links": built_by_colcon("--symlink-install"),
+    "colcon, merged": built_by_colcon("--merge-install", merged=True),
+    "pip": installed_by_pip(),
+    "pip, editable": installed_by_pip("-e"),
+    "sdist": installed_from_an_sdist,
+    "backend": installed_by_the_backend,
+    "gen --ament": generated,
+}
+
+
+def seen_by_ros(prefix):
+    """Return the files of a prefix by which ROS 2's tools know the package, and what they hold."""
+    return {
+        path.relative_to(prefix).as_posix(): path.read_bytes()
+        for pattern in (
+            "lib/libdemo_*",
+            "share/demo/package.xml",
+            "share/demo/msg/*",
+            "share/demo/srv/*",
+            "share/demo/action/*",
+            "share/ament_index/resource_index/rosidl_interfaces/*",
+            "share/ament_index/resource_index/packages/*",
+        )
+        for path in prefix.glob(pattern)
+    }
+
+
+@pytest.fixture(scope="module")
+def committed(scaffolded, tmp_path_factory):
+    """Return the package with its classes, a wide string, and all of it in git."""
+    package = shutil.copytree(scaffolded, tmp_path_factory.mktemp("committed") / "demo")
+    (package / "msg" / "Drive.msg").write_text("wstring note\n")
+    setup = package / "setup.py"  # a file that ROS 2 does not know is installed as it is listed
+    old = "data_files=[\n"
+    assert old in setup.read_text()
+    new = f"{old}        ('share/demo/msg/', ['README.md', 'msg/Drive.msg']),\n"
+    setup.write_text(setup.read_text().replace(old, new))
+    idlc("gen", cwd=package)
+    programs.run("git", "init", "-q", cwd=package)
+    for words in (["user.name", "A"], ["user.email", "a@example.com"]):
+        programs.run("git", "config", *words, cwd=package)
+    programs.run("git", "add", ".", cwd=package)
+    programs.run("git", "commit", "-qm", "all", cwd=package)
+    return package
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_each_way_installs_the_same_and_leaves_git_clean(
+    way, committed, environment, pip, tmp_path
+):
+    package = shutil.copytree(committed, tmp_path / "demo")
+    prefix = WAYS[way](package, tmp_path, pip, environment)
+    found = seen_by_ros(prefix)
+    expected = {
+        path.relative_to(package).as_posix()
+        for kind in ("msg", "srv", "action")
+        for path in (package / kind).iterdir()
+    }
+    listed = found["share/ament_index/resource_index/rosidl_interfaces/demo"].decode().split()
+    assert {path for path in listed if not path.endswith(".idl")} == expected
+    assert {f"share/demo/{path}" for path in listed} <= found.keys()
+    if not way.startswith(("backend", "gen")):
+        assert found.pop("share/demo/msg/README.md") == (package / "README.md").read_bytes()
+    reference = tmp_path / "reference"
+    reference.mkdir()
+    expected = seen_by_ros(generated(package, reference, pip, environment))
+    for path in [path for path in expected if path.startswith("lib/")]:
+        # has the texts of the interfaces that others have here
+        assert found.pop(path)[:4] == expected.pop(path)[:4]
+    assert found == expected
+    assert checked(prefix)[0] == 0
+    assert programs.run("git", "status", "--short", cwd=package) == ""
 
 
 @pytest.mark.parametrize("shell", [None, "sh", "bash", "zsh"])

@@ -168,3 +168,18 @@ def test_pip_installs_it(workspace, tmp_path, ros_environment, options):
     path = run_with(folder / "bin/python", "-c", code, cwd=tmp_path, **environment).split()[-1]
     environment["PYTHONPATH"] = os.pathsep.join([str(Path(path).parent), ros])
     works(program, tmp_path, environment)
+
+
+@pytest.mark.parametrize("linter", ["ament_flake8", "ament_pep257"])
+def test_generated_modules_pass_the_tests_of_a_new_package(linter, workspace, tmp_path):
+    """`ros2 pkg create` writes tests that run these on all that is in the package."""
+    for path, text in (
+        ("msg/Odd.msg", '# asks: a "thing", and so on\n#\n# more\nint32 a  # no period\n'),
+        ("srv/Ask.srv", f"# {'long words ' * 12}\nstring a\n---\n"),
+        ("action/Go.action", "---\nint32 a\n---\n"),
+    ):
+        (tmp_path / "odd" / path).parent.mkdir(parents=True)
+        (tmp_path / "odd" / path).write_text(text)
+    assert main(["gen", str(tmp_path / "odd"), "-o", str(tmp_path / "odd_msgs")]) == 0
+    program = Path(sys.executable).parent / linter
+    run_with(program, tmp_path / "odd_msgs", workspace / "src/py_pubsub/py_pubsub", cwd=tmp_path)

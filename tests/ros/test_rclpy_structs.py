@@ -7,7 +7,6 @@ and frees it.
 """
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 from tests.ros.test_rclpy_abi import VERSIONS
 from tests.support.installed import SHARE, generate, interfaces, interfaces_in, names_in
 from tests.support.paths import EVERY_KIND, EXAMPLE, PROGRAMS
+from tests.support.tools import tool
 
 PACKAGES = ("diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "std_srvs")
 OURS = (EVERY_KIND, EXAMPLE)
@@ -25,7 +25,7 @@ OURS = (EVERY_KIND, EXAMPLE)
 def compiled(library: Path, source: str, *words: str) -> Path:
     """Return a library, made of C with the headers of the installed ROS 2."""
     prefix = Path(sys.prefix)
-    command = [os.environ.get("CC", "cc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC", *words]
+    command = [tool("gcc"), "-O1", "-Wall", "-Werror", "-shared", "-fPIC", *words]
     command += ["-o", library, PROGRAMS / source, f"-L{prefix / 'lib'}", "-lrosidl_runtime_c"]
     for package in ("rcutils", "rosidl_runtime_c", "rosidl_typesupport_interface"):
         command += [f"-I{prefix / 'include' / package}"]

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -98,6 +99,27 @@ def test_a_node_that_shuts_rclpy_down_itself_ends(package, tmp_path, ros_environ
         once = start("demo.once_ends", "--server-timeout", "1000")
         assert once.ends() == 1
         assert "Traceback" not in once.output
+
+
+@pytest.mark.parametrize("name", ["stays", "once"])
+def test_signals_while_it_ends_change_nothing(name, package, tmp_path, ros_environment):
+    """A launch file that is ended by a script gets two: one for its group, one of its own."""
+    words = ["--server-timeout", "1000"] if name == "once" else []
+    line = "await self.pause(0.05)" if name == "once" else "self.get_logger().info('tick')"
+    text = (package / "demo" / f"{name}.py").read_text()
+    assert line in text
+    text = text.replace(line, f"print('it runs', flush=True); {line}")
+    (package / "demo" / f"{name}_says.py").write_text(text)
+    with nodes(package, tmp_path, ros_environment) as start:
+        statuses = []
+        for pause in (0.05, 0.1, 0.15, 0.2, 0.3):
+            node = start(f"demo.{name}_says", *words)
+            node.says("it runs")
+            while node.process.poll() is None:
+                node.process.send_signal(signal.SIGINT)
+                time.sleep(pause)
+            statuses.append((node.process.returncode, "Traceback" in node.output))
+        assert set(statuses) == {(0 if name == "stays" else 130, False)}
 
 
 def test_a_second_signal_changes_nothing(package, tmp_path, ros_environment):

@@ -11,6 +11,7 @@ import pytest
 
 from tests.support import programs
 from tests.support.paths import DOCS, ROOT
+from tests.support.tools import tool
 
 pytestmark = pytest.mark.long
 
@@ -36,9 +37,7 @@ def idlc(tmp_path_factory) -> Path:
     for path, text in files.items():
         assert not (folder / path).exists()
         (folder / path).write_text(text, encoding="utf-8")
-    git = shutil.which("git")
-    assert git
-    subprocess.run([git, "apply", "-"], input=diff, text=True, check=True, cwd=folder)
+    subprocess.run([tool("git"), "apply", "-"], input=diff, text=True, check=True, cwd=folder)
     return folder
 
 

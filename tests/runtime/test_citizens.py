@@ -25,6 +25,7 @@ import pytest
 import rich.console
 import rich.pretty
 
+from idlc.cli import pytest_plugin
 from idlc.emit import pynames
 from tests.support import generated
 
@@ -531,6 +532,73 @@ def test_pydantic_says_which_array_is_wrong():
     for name, value in (("two", [1]), ("data", [300]), ("values", "text"), ("names", [1])):
         with pytest.raises(pydantic.ValidationError):
             arrays.validate_python({name: value})
+
+
+def test_pydantic_reports_every_error_of_a_message_where_it_is():
+    pydantic = pytest.importorskip("pydantic")
+    nested = {"small": 300, "x": "much", "text": 3}
+    adapter = pydantic.TypeAdapter(list[get("msg/Plain")])
+    again = pydantic.create_model(
+        "Model", first=(get("msg/Plain"), ...), more=(list[get("msg/Plain")], ...)
+    )
+    arrays = pydantic.TypeAdapter(get("msg/Arrays"))
+
+    def places(check, value):
+        with pytest.raises(pydantic.ValidationError) as raised:
+            check(value)
+        return [error["loc"] for error in raised.value.errors()]
+
+    each = [("small",), ("x",), ("text",)]
+    assert places(adapter.validate_python, [nested, {}, nested]) == [
+        (index, *place) for index in (0, 2) for place in each
+    ]
+    assert places(again.model_validate, {"first": nested, "more": [nested]}) == [
+        *(("first", *place) for place in each),
+        *(("more", 0, *place) for place in each),
+    ]
+    wrong = {"data": [1, 300, -1], "two": [1], "names": ["a", 1], "values": [1e300]}
+    assert set(places(arrays.validate_python, wrong)) == {
+        ("data", 1),
+        ("data", 2),
+        ("two",),
+        ("names", 1),
+        ("values", 0),
+    }
+    # what is a message already is checked as well, wherever it is used again
+    mistaken = get("msg/Plain")()
+    mistaken.small = 300
+    assert places(again.model_validate, {"first": mistaken, "more": [mistaken]}) == [
+        ("first",),
+        ("more", 0),
+    ]
+
+
+def test_pytest_says_which_fields_differ(kind):
+    explain = pytest_plugin.pytest_assertrepr_compare
+    assert explain("==", kind(), long(kind))[:3] == [
+        f"{kind.__name__}(...) == {kind.__name__}(...)",
+        "",
+        "Differing fields:",
+    ]
+    plain, arrays = get("msg/Plain"), get("msg/Arrays")
+    assert explain("==", plain(1, text="a"), plain(2, text="a" * 99))[3:] == [
+        "  small: 1 != 2",
+        f"  text: 'a' != '{'a' * 76}...",
+    ]
+    assert explain("==", arrays(values=[1, 2]), arrays(values=[1, 3, 4]))[3:] == [
+        "  values: 2 elements != 3 elements",
+        "  values[1]: 2.0 != 3.0",
+    ]
+    mistaken = plain()
+    mistaken.text = object()
+    for op, left, right in (
+        ("!=", plain(), plain(2)),
+        ("==", plain(), arrays()),
+        ("==", plain(), None),
+        ("==", 3, 4),
+    ):
+        assert explain(op, left, right) is None
+    explain("==", mistaken, plain())
 
 
 def test_importing_messages_imports_none_of_this(folder):

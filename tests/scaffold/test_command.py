@@ -5,6 +5,7 @@ golden/scaffold that match, and fails, so that the changes are looked at.
 """
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -17,6 +18,7 @@ from catkin_pkg.package import parse_package
 from idlc.cli.main import main
 from tests.support import refresh
 from tests.support.paths import GOLDEN
+from tests.support.tools import tool
 
 FOLDER = GOLDEN / "scaffold"
 CASES = sorted(path.parent for path in FOLDER.glob("*/commands"))
@@ -117,9 +119,7 @@ def test_a_dry_run_shows_what_patch_would_need(package, capsys):
     assert main([*NODE, "--dry-run"]) == 0
     diff = capsys.readouterr().out
     assert tree(package) == before
-    git = shutil.which("git")
-    assert git
-    subprocess.run([git, "apply", "-"], input=diff, text=True, check=True, cwd=package)
+    subprocess.run([tool("git"), "apply", "-"], input=diff, text=True, check=True, cwd=package)
     patched = tree(package)
     assert patched != before
     assert main(NODE) == 0
@@ -231,6 +231,7 @@ def test_the_wizard_asks_for_the_same(package, monkeypatch):
 
 
 def test_the_maintainer_is_whom_git_knows(tmp_path, monkeypatch):
+    tool("git")
     config = tmp_path / "config"
     config.write_text("[user]\n\tname = \"Ada <L> & 'co'\"\n\temail = ada@example.com\n")
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(config))
@@ -321,3 +322,78 @@ def test_the_next_command_is_one_that_works(package, capsys, monkeypatch, tmp_pa
     (tools / "idlc").unlink()
     assert main(["scaffold", "interface", "msg", "Third", "float32 speed"]) == 0
     assert "-m idlc gen . -o demo\n" in capsys.readouterr().out
+
+
+CHOICES = {
+    "--maintainer": ("Lena & K", "maintainer="),
+    "--email": ("lena@example.com", "maintainer_email="),
+    "--description": ("Sorts 'parcels' & <letters>", "description="),
+    "--license": ("MIT", "license="),
+}
+
+
+@pytest.mark.parametrize("option", CHOICES)
+def test_what_an_existing_package_says_otherwise_is_reported(option, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "demo"]
+    assert main(words) == 0
+    before = tree(tmp_path)
+    capsys.readouterr()
+    value, argument = CHOICES[option]
+    assert main([*words, option, value]) == 1
+    assert tree(tmp_path) == before
+    said = capsys.readouterr().err
+    assert "nothing was written" in said
+    # what the hints say is all there is to do
+    for file, start in (("package.xml", "<"), ("setup.py", argument)):
+        (line,) = re.findall(rf"demo/{file}:(\d+):", said)
+        (new,) = re.findall(rf"write `({start}.*)`$", said, re.MULTILINE)
+        lines = before[f"demo/{file}"].splitlines()
+        lines[int(line) - 1] = f"  {new}" + "," * (file == "setup.py")
+        (tmp_path / "demo" / file).write_text("\n".join(lines) + "\n")
+    if option == "--license":
+        (tmp_path / "demo/LICENSE").unlink()
+    assert main([*words, option, value]) == 0
+    parse_package(tmp_path / "demo").validate()
+
+
+def test_choices_that_setup_py_computes_are_left_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "demo"]
+    assert main([*words, "--maintainer", "Bo"]) == 0
+    setup = tmp_path / "demo/setup.py"
+    setup.write_text(setup.read_text().replace("maintainer='Bo'", "maintainer=name()"))
+    assert main([*words, "--maintainer", "Bo"]) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
+def test_a_package_of_another_kind_is_left_alone(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["scaffold", "package", "demo"]) == 0
+    before = tree(tmp_path)
+    assert main(["scaffold", "package", "demo", "--interfaces"]) == 1
+    assert "the build type is `ament_python` here" in capsys.readouterr().err
+    assert tree(tmp_path) == before
+
+
+def test_interfaces_for_a_package_that_has_others_are_reported(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["scaffold", "package", "--interfaces", "demo_msgs", "Drive"]
+    assert main(words) == 0
+    assert main(words) == 0
+    assert main([*words, "srv/Ask"]) == 1
+    said = capsys.readouterr().err
+    commands = re.search("run `cd (.*)`, then `idlc (.*)`", said)
+    monkeypatch.chdir(commands[1])
+    assert main(shlex.split(commands[2])) == 0
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "srv/Ask"]) == 0
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_what_comes_next_installs_pytest_if_need_be(is_there, package, capsys, monkeypatch):
+    name = "idlc.cli.commands.scaffold_node.find_spec"
+    monkeypatch.setattr(name, lambda name: object() if is_there or name != "pytest" else None)
+    assert main(NODE) == 0
+    hints = re.findall("next: .* -m (.*)", capsys.readouterr().out)
+    assert hints == [*(() if is_there else ["pip install pytest"]), "pytest test/test_talker.py"]

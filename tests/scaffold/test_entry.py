@@ -62,6 +62,10 @@ def test_a_new_launch_file_is_installed_and_lists_the_node():
     assert "'heart = demo.heart:main'" in setup.text
     assert "('share/demo/launch', ['launch/demo_launch.py'])" in setup.text
     assert "LifecycleNode(" in entry.added["launch/demo_launch.py"]
+    manifest = entry.edits["package.xml"]
+    assert isinstance(manifest, Edited)
+    assert "<exec_depend>launch</exec_depend>" in manifest.text
+    assert "<exec_depend>launch_ros</exec_depend>" in manifest.text
 
 
 def test_what_cannot_be_edited_is_refused_but_for_the_launch_file():

@@ -268,15 +268,3 @@ def test_a_node_is_added_where_nodes_are_added_one_by_one():
     assert '        name="keeper",\n' in after
     assert compile(after, "x", "exec")
     assert launch_py.add_node(after, managed) == Edited(after)
-
-
-def test_packages_that_are_listed_get_those_of_the_classes():
-    names = ["demo", "demo._idlc", "demo.msg"]
-    listed = SETUP.replace("setup(", "setup(packages=[name], ").replace(
-        "\nsetup", "\nname = 'demo'\nsetup"
-    )
-    outcome = data_files.add_packages(listed, names)
-    assert "packages=[name, 'demo._idlc', 'demo.msg'], " in text_of(outcome)
-    assert data_files.add_packages(text_of(outcome), names) == outcome
-    for text in (SETUP, SETUP.replace("setup(", "setup(packages=find_packages(), "), "def f(:"):
-        assert data_files.add_packages(text, names) == Edited(text)

@@ -5,11 +5,13 @@ import importlib
 import json
 import sys
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.emit.render import render_package
 from idlc.model import catalog, derive, ir
+from idlc.model.distro import DEFAULT, Distro
 from idlc.model.link import link
 from idlc.model.lowering.file import lower
 from idlc.syntax.parse import parse
@@ -18,7 +20,25 @@ from tests.support.paths import GOLDEN
 RECORDED = GOLDEN / "rosidl" / "interfaces"
 
 
-def model_of(package, files):
+class BuiltIn(NamedTuple):
+    """The catalogue of a distribution as the library of a model."""
+
+    distro: Distro
+
+    def source(self, name):
+        return catalog.source(name, self.distro)
+
+    def names(self, package):
+        return catalog.names(package, self.distro)
+
+    def packages(self):
+        return catalog.packages(self.distro)
+
+    def nearby(self, _package):
+        return None
+
+
+def model_of(package, files, distro=DEFAULT):
     """Return the model of a package from texts by path, such as `msg/Pose.msg`."""
     report = Report()
     own = []
@@ -26,7 +46,7 @@ def model_of(package, files):
         kind, file = path.split("/")
         name = ir.TypeName(package, kind, file.partition(".")[0])
         own.append(lower(parse(Source(path, text)), name, report))
-    model = link(package, own, catalog, report)
+    model = link(package, own, BuiltIn(distro), report)
     assert not report.had_errors, [(d.code, d.message, d.where) for d in report]
     return model
 
@@ -58,8 +78,13 @@ def structures(name):
 
 def write_package(folder, package, files):
     """Generate a package into `folder`/`package`."""
-    for file in render_package(model_of(package, files)):
-        target = folder / package / file.path
+    write_model(folder, model_of(package, files))
+
+
+def write_model(folder, model):
+    """Generate a model's package into `folder`."""
+    for file in render_package(model):
+        target = folder / model.package / file.path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(file.text, encoding="utf-8")
 

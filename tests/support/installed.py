@@ -5,10 +5,18 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from idlc.disk.machine.distribution import distribution
+from idlc.native.layouts import LAYOUTS, Layout
+
 SHARE = Path(sys.prefix) / "share"
 
 #: The (kind, name) of each interface, by package.
 Interfaces = dict[str, list[tuple[str, str]]]
+
+
+def installed_layout() -> Layout:
+    """Return how the installed distribution lays structures out."""
+    return LAYOUTS.get(distribution().name, LAYOUTS["jazzy"])
 
 
 def interfaces_in(folders: Iterable[Path]) -> Interfaces:

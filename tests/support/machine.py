@@ -4,10 +4,15 @@ import contextlib
 import json
 import os
 import shutil
+import stat
 import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+import pytest
+
+import idlc
 
 HERE = Path(__file__).parent
 GEN = ["gen", "pkg", "-o", "out/demo"]
@@ -16,13 +21,14 @@ GEN = ["gen", "pkg", "-o", "out/demo"]
 class Machine:
     """A folder with a package in it, and a process that runs idlc there and commits faults."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, code):
         self.folder = folder
+        path = os.pathsep.join(filter(None, (code, os.environ.get("PYTHONPATH"))))
         self.process = subprocess.Popen(
             [sys.executable, str(HERE / "faults.py"), str(folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**os.environ, "PYTHONUTF8": "1", "AMENT_PREFIX_PATH": ""},
+            env={**os.environ, "PYTHONUTF8": "1", "PYTHONPATH": path, "AMENT_PREFIX_PATH": ""},
             text=True,
         )
 
@@ -52,14 +58,33 @@ class Machine:
 @contextlib.contextmanager
 def running():
     """Start a machine in a folder of its own, and end it."""
-    with TemporaryDirectory() as name:  # pytest's own folders are closed to other users
+    # pytest's own folders are closed to other users, and that of idlc may be
+    with TemporaryDirectory() as name, TemporaryDirectory() as code:
         folder = Path(name).resolve()
         (folder / ".git").mkdir()
+        source = Path(idlc.__file__).parent
+        for part in (source, source.with_name("templates")):
+            if part.is_dir():  # an installed idlc has its templates inside
+                shutil.copytree(part, Path(code, part.name))
         folder.chmod(0o755)
-        found = Machine(folder)
+        Path(code).chmod(0o755)
+        found = Machine(folder, code)
         yield found
         found.process.stdin.close()
         found.process.wait()
+
+
+def another_user(folder):
+    """Return the fault of being another user, where only root may do all; else none.
+
+    Leave the test out where the user may not enter a folder.
+    """
+    if os.getuid() != 0:
+        return {}
+    for parent in folder.parents:
+        if not parent.stat().st_mode & stat.S_IXOTH:
+            pytest.skip(f"no other user may enter {parent}: set TMPDIR to a folder for all")
+    return {"user": 65534}
 
 
 def tree(out):

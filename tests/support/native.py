@@ -8,8 +8,8 @@ from idlc.disk.find import look
 from idlc.disk.packages.inputs import packages
 from idlc.disk.scope import Scope
 from idlc.driver.stages import models_of
-from idlc.native.layouts import LAYOUTS
 from idlc.native.library import MACHINES, libraries
+from tests.support.installed import installed_layout
 from tests.support.paths import PROGRAMS
 from tests.support.tools import run, tool
 
@@ -37,13 +37,13 @@ def model_of(folder):
     return model
 
 
-def install(model, prefix, machine="x86_64", layout=LAYOUTS["jazzy"]):
-    """Write a package's libraries into a prefix; return them."""
+def install(model, prefix, machine="x86_64", layout=None):
+    """Write a package's libraries into a prefix, for what is installed by default; return them."""
     (prefix / INDEX).mkdir(parents=True, exist_ok=True)
     (prefix / INDEX / model.package).write_text("")
     (prefix / "lib").mkdir(exist_ok=True)
     paths = []
-    for name, content in libraries(model, MACHINES[machine], layout).items():
+    for name, content in libraries(model, MACHINES[machine], layout or installed_layout()).items():
         paths.append(Path(prefix, "lib", name))
         paths[-1].write_bytes(content)
     return paths

@@ -7,16 +7,17 @@ import subprocess
 
 import pytest
 
-#: The Debian packages that have them.
+#: The Debian packages that have them; for another machine, those of compilers end in its name.
 PACKAGES = {
-    "as": "binutils-{0}-linux-gnu",
+    "as": "binutils",
     "eu-elflint": "elfutils",
-    "g++": "g++-{0}-linux-gnu",
-    "gcc": "gcc-{0}-linux-gnu",
-    "ld": "binutils-{0}-linux-gnu",
-    "nm": "binutils-{0}-linux-gnu",
-    "objcopy": "binutils-{0}-linux-gnu",
-    "strip": "binutils-{0}-linux-gnu",
+    "g++": "g++",
+    "gcc": "gcc",
+    "git": "git",
+    "ld": "binutils",
+    "nm": "binutils",
+    "objcopy": "binutils",
+    "strip": "binutils",
     "patchelf": "patchelf",
     "qemu-aarch64": "qemu-user",
     "readelf": "binutils",
@@ -30,17 +31,22 @@ def is_foreign(machine):
 
 
 def tool(name, machine=None):
-    """Return the full name of a program that works for a machine.
-
-    Without it the test is left out, unless TOOLS=yes says that nothing is, as in CI.
-    """
+    """Return the full name of a program that works for a machine; leave the test out without it."""
     foreign = machine is not None and is_foreign(machine)
     full = f"{machine}-linux-gnu-{name}" if foreign else name
     if not shutil.which(full):
-        package = PACKAGES[name].format((machine or "").replace("_", "-"))
-        complain = pytest.fail if os.environ.get("TOOLS") == "yes" else pytest.skip
-        complain(f"no {full}: install {package}")
+        suffix = f"-{machine.replace('_', '-')}-linux-gnu" if foreign else ""
+        lacks(full, PACKAGES[name] + suffix)
     return full
+
+
+def lacks(what, package):
+    """Leave a test out that needs what a Debian package has.
+
+    It fails if TOOLS=yes says that nothing is left out, as in CI.
+    """
+    complain = pytest.fail if os.environ.get("TOOLS") == "yes" else pytest.skip
+    complain(f"no {what}: install {package}")
 
 
 def emulator(machine, *options):

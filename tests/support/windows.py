@@ -9,6 +9,7 @@ NOT_THERE = {
     "test_links_to_folders_are_followed_and_circles_end": "links need a right of their own",
     "test_links_below_the_package_are_not_followed": "links need a right of their own",
     "test_a_package_folder_that_is_a_link_is_fine": "links need a right of their own",
+    "test_a_tracked_folder_is_no_repository": "what git stores cannot be removed",
     "test_a_very_deep_folder_is_no_problem": "paths are short",
     "test_golden_case[IDL223_same_python_module]": "files cannot differ in capitals only",
     "test_golden_case[IDL601_unreadable]": "names and messages of the system differ",

@@ -9,6 +9,7 @@ const DOCUMENTS = [
   { language: "rosmsg" },
   { scheme: "file", pattern: "**/package.xml" },
   { scheme: "file", pattern: "**/pyproject.toml" },
+  { scheme: "file", pattern: "**/CMakeLists.txt" },
 ];
 
 export class Server {

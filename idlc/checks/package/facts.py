@@ -34,6 +34,7 @@ class Facts(msgspec.Struct, frozen=True):
     files are all that it has. `generates` is whether its CMakeLists.txt
     generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
     whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    `folders` are those with files by dotted name, and whether they are Python packages.
     """
 
     name: str
@@ -43,12 +44,14 @@ class Facts(msgspec.Struct, frozen=True):
     modules: Mapping[str, Source]
     setup_py: Source | None = None
     setup_cfg: Source | None = None
+    cmake: Source | None = None
     generates: bool = False
     native: bool = False
     marker: bool = False
     whole: bool = False
     outputs: tuple[Output, ...] = ()
     known: frozenset[str] = frozenset()
+    folders: Mapping[str, bool] = {}
 
     def declared(self, *tags: str) -> dict[str, Statement]:
         """Return the statements with one of these tags by their text, the first of each."""

@@ -6,15 +6,19 @@ A package that is entered in ROS 2's index without a library for its types stops
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
+from textwrap import indent
 from typing import TypeGuard
 
 import msgspec
 
-from idlc.checks.package.python_files import is_setup, parsed, read_setup, start_of
+from idlc.checks.package.python_files import range_of, span_of, start_of
+from idlc.checks.package.setup_edits import argument, indent_of, insertion
+from idlc.checks.package.setup_py import Setup, name_of_call
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
-from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.source import Span
 
 COMPILE = "compile_interfaces"
 RESULT = "compiled"
@@ -29,15 +33,15 @@ else:
 """
 
 
-def unusable_entry(setup: Source, package: str) -> Iterator[Diagnostic]:
+def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
     """Yield the problem with a setup.py that enters a package without installing libraries."""
-    index = [text for text in read_setup(setup).data_files or () if "/packages" in text.value]
+    index = [one for one in setup.data_files or () if "/packages" in (one.folder or "")]
     if not index or installs(setup):
         return
     edits = edits_for(setup)
     by_hand = "; --fix does" if edits else f", as in `setup(**{RESULT}, ...)`"
     problem = codes.NO_LIBRARY_INSTALLED.at(
-        index[0].span,
+        span_of(setup.source, index[0].node),
         f"`{package}` is entered in ROS 2's index without libraries for its types, and stops "
         "`ros2 bag record`",
         hint=f"give setup() what `idlc.build.{COMPILE}` returns{by_hand}",
@@ -45,71 +49,52 @@ def unusable_entry(setup: Source, package: str) -> Iterator[Diagnostic]:
     yield msgspec.structs.replace(problem, edits=edits)
 
 
-def installs(setup: Source) -> bool:
+def installs(setup: Setup) -> bool:
     """Return whether a setup.py uses what compiling the interfaces returns."""
-    tree = parsed(setup.text)
-    if tree is None:
-        return True
-    dropped = {id(one.value) for one in ast.walk(tree) if _is_plain(one)}
-    return any(_is_compile(one) and id(one) not in dropped for one in ast.walk(tree))
+    dropped = {id(one.value) for one in setup.nodes if _is_plain(one)}
+    return any(_is_compile(one) and id(one) not in dropped for one in setup.nodes)
 
 
-def edits_for(setup: Source) -> tuple[Edit, ...]:
+def edits_for(setup: Setup) -> tuple[Edit, ...]:
     """Return the edits after which a setup.py installs libraries; none if it is too unusual."""
-    tree = parsed(setup.text)
-    calls = [one for one in ast.walk(tree) if is_setup(one)] if tree else []
-    names = {one.id for one in ast.walk(tree) if isinstance(one, ast.Name)} if tree else set()
-    if tree is None or len(calls) != 1 or RESULT in names or installs(setup):
+    names = {one.id for one in setup.nodes if isinstance(one, ast.Name)}
+    if setup.call is None or RESULT in names or installs(setup):
         return ()
-    call = calls[0]
-    taken = {one.arg for one in call.keywords} & {"distclass", None}
-    if call.args or not call.keywords or taken:
-        return ()
-    compiling = _compiling(setup, tree, call)
-    return (*compiling, _argument(setup, call)) if compiling else ()
+    taken = {one.arg for one in setup.call.keywords} & {"distclass", None}
+    given = () if taken else argument(setup, f"**{RESULT}")
+    compiling = _compiling(setup) if given else ()
+    return (*compiling, *given) if compiling else ()
 
 
-def _compiling(setup: Source, tree: ast.Module, call: ast.Call) -> tuple[Edit, ...]:
+def _compiling(setup: Setup) -> tuple[Edit, ...]:
     """Return the edits that keep what compiling returns, or that compile in the first place."""
-    plain = [one for one in ast.walk(tree) if _is_plain(one)]
+    source = setup.source
+    plain = [one for one in setup.nodes if _is_plain(one)]
     if not plain:
-        first = next((one for one in tree.body if call in ast.walk(one)), None)
-        name = next((one.value for one in call.keywords if one.arg == "name"), None)
-        if not isinstance(first, ast.Expr) or not isinstance(name, (ast.Name, ast.Constant)):
+        name = setup.arguments.get("name")
+        first = setup.first_use("packages", "data_files")
+        if first is None or not isinstance(name, (ast.Name, ast.Constant)):
             return ()
-        gap = "\n" if any(setup.lines[first.lineno - 2 : first.lineno - 1]) else ""
-        return (_insert(setup, first, gap + _BLOCK.format(name=ast.unparse(name))),)
-    found = [one for one in tree.body if isinstance(one, ast.Try) and plain[0] in one.orelse]
+        at = start_of(source, first)
+        margin = indent_of(source, at)
+        if first.col_offset != len(margin):
+            return ()  # behind a semicolon
+        at -= len(margin)
+        blank = not at or re.search(r"(\r\n?|\n)[ \t]*(\r\n?|\n)\Z", source.text[:at])
+        block = _BLOCK.format(name=ast.unparse(name))
+        return (insertion(source, at, ("" if blank else "\n") + indent(block, margin)),)
+    found = [one for one in setup.nodes if isinstance(one, ast.Try) and plain[0] in one.orelse]
     if len(plain) != 1 or len(found) != 1 or len(found[0].handlers) != 1:
         return ()
     (otherwise,) = found[0].handlers
     if len(otherwise.body) != 1 or not isinstance(otherwise.body[0], ast.Pass):
         return ()
-    start = start_of(setup, otherwise.body[0])
-    nothing = Edit(Span(setup, start, start + len("pass")), f"{RESULT} = {{}}")
-    return nothing, _insert(setup, plain[0], f"{RESULT} = ")
-
-
-def _argument(setup: Source, call: ast.Call) -> Edit:
-    """Return the edit that gives setup() one argument more, laid out like its first one."""
-    first = call.keywords[0]
-    spread = first.lineno > call.lineno
-    between = "\n" + " " * first.col_offset if spread else " "
-    return _insert(setup, first, f"**{RESULT},{between}")
-
-
-def _insert(setup: Source, node: ast.AST, text: str) -> Edit:
-    start = start_of(setup, node)
-    return Edit(Span(setup, start, start), text)
+    nothing = Edit(Span(source, *range_of(source, otherwise.body[0])), f"{RESULT} = {{}}")
+    return nothing, insertion(source, start_of(source, plain[0]), f"{RESULT} = ")
 
 
 def _is_compile(node: ast.AST) -> bool:
-    if not isinstance(node, ast.Call):
-        return False
-    function = node.func
-    return (
-        function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
-    ) == COMPILE
+    return name_of_call(node) == COMPILE
 
 
 def _is_plain(node: ast.AST) -> TypeGuard[ast.Expr]:

@@ -8,18 +8,18 @@ from collections.abc import Sequence
 import msgspec
 
 from idlc.checks.package.facts import Facts
+from idlc.checks.package.package_xml import DEPENDENCIES, RANK
 from idlc.checks.sections import sections
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Edit, Report
+from idlc.diagnostics.report import Diagnostic, Edit, Label, Report
 from idlc.diagnostics.source import Span
+from idlc.diagnostics.suggest import closest_package
 from idlc.model import catalog, ir
 from idlc.model.link import Model
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
 #: What rosidl adds by itself.
 _IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
-#: What a package.xml begins with; dependencies come after it.
-_HEAD = frozenset(("name", "version", "description", "maintainer", "license", "url", "author"))
 _GROUP = "rosidl_interface_packages"
 #: The packages that generate interfaces, and those that generated code needs, usual first.
 _GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
@@ -29,17 +29,42 @@ _RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
 def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     """Packages whose messages are used are declared."""
     seen = _may_use(facts)
+    for package, span in used_packages(model).items():
+        if package not in seen:
+            found = codes.MISSING_DEPENDENCY.at(
+                span,
+                f"`{facts.manifest.path}` does not declare `{package}`",
+                hint=f"add `<depend>{package}</depend>`",
+            )
+            report.add(_or_meant(found, facts, model, package))
+
+
+def used_packages(model: Model) -> dict[str, Span]:
+    """Return the known packages whose messages are used, and where each is used first."""
+    known = _known(model)
+    found: dict[str, Span] = {}
     for message in sections(model):
         for field, target in message.holders:
-            package = target.package
-            if field.type_span is not None and package not in seen:
-                seen.add(package)
-                found = codes.MISSING_DEPENDENCY.at(
-                    field.type_span,
-                    f"`{facts.manifest.path}` does not declare `{package}`",
-                    hint=f"add `<depend>{package}</depend>`",
-                )
-                report.add(_with_lines(found, facts, [f"<depend>{package}</depend>"]))
+            if field.type_span is not None and target.package in known:
+                found.setdefault(target.package, field.type_span)
+    return found
+
+
+def _known(model: Model) -> set[str]:
+    """Return the packages of which interfaces are known."""
+    return {name.package for name in model.interfaces} | {*catalog.packages(model.distro)}
+
+
+def _or_meant(found: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
+    """Return a problem with the edit that declares a package, or with the misspelt declaration."""
+    known = _known(model) | facts.known
+    for name, statement in facts.declared(*_NEEDED).items():
+        if name not in known and closest_package(name, [package]):
+            line = f"<{statement.tag}>{package}</{statement.tag}>"
+            hint = f"write `{line}` in place of `{name}`, which is not known here"
+            label = Label(statement.span, "misspelt?")
+            return msgspec.structs.replace(found, hint=hint, labels=(label,))
+    return _with_lines(found, facts, [f"<depend>{package}</depend>"])
 
 
 def _may_use(facts: Facts) -> set[str]:
@@ -124,23 +149,27 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
         report.add(_with_lines(found, facts, [line for _, line in missing]))
 
 
-def declared_imports(facts: Facts, _: Model, report: Report) -> None:
+def declared_imports(facts: Facts, model: Model, report: Report) -> None:
     """ROS packages that the nodes import are declared."""
     if not facts.modules:
         return
-    from idlc.checks.package.python_files import imported_packages
+    from idlc.checks.package.python_files import imported_modules, span_of
 
     declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
+    used = used_packages(model)
     for source in facts.modules.values():
-        for package, span in imported_packages(source):
+        for module, node in imported_modules(source):
+            package = module.partition(".")[0]
             if package in facts.known and package not in declared:
                 declared.add(package)
+                tag = "depend" if package in used else "exec_depend"
+                line = f"<{tag}>{package}</{tag}>"
                 found = codes.UNDECLARED_IMPORT.at(
-                    span,
+                    span_of(source, node),
                     f"`{facts.manifest.path}` does not declare `{package}`",
-                    hint=f"add `<exec_depend>{package}</exec_depend>`",
+                    hint=f"add `{line}`",
                 )
-                report.add(_with_lines(found, facts, [f"<exec_depend>{package}</exec_depend>"]))
+                report.add(_with_lines(found, facts, [line]))
 
 
 def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
@@ -150,17 +179,24 @@ def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagno
 
 
 def _addition(facts: Facts, line: str) -> Edit | None:
+    """Return the edit that adds a line, where the schema's order has it."""
     text = facts.manifest.text
-    tag = line[1 : line.index(">")]
-    same = [one for one in facts.statements if one.tag == tag]
-    like = same or [one for one in facts.statements if "depend" in one.tag]
-    like = like or [one for one in facts.statements if one.tag in _HEAD]
-    if not like:
+    rank = RANK[line[1 : line.index(">")]]
+    ranked = [one for one in facts.statements if one.tag in RANK]
+    before = [one for one in ranked if RANK[one.tag] <= rank]
+    same = [one for one in before if RANK[one.tag] == rank]
+    after = next((one for one in ranked if RANK[one.tag] > rank), None)
+    first = not same and after and not any(one.tag in DEPENDENCIES for one in before)
+    place = after if first or not before else (same or before)[-1]
+    if place is None:
         return None
-    last = like[-1]
-    start = last.span.start
-    end = re.compile(rf"</{last.tag}\s*>").search(text, start)
+    start = place.span.start
     indent = text[text.rfind("\n", 0, start) + 1 : start]
-    if end is None or indent.strip():
+    pattern = rf"</{place.tag}\s*>([ \t]*<!--[^\n]*-->(?=[ \t]*\r?\n))?"
+    end = re.compile(pattern).search(text, start)
+    if indent.strip() or end is None:
         return None
-    return Edit(Span(facts.manifest, end.end(), end.end()), f"\n{indent}{line}")
+    line_end = "\r\n" if "\r\n" in text else "\n"
+    if place is after:
+        return Edit(Span(facts.manifest, start, start), f"{line}{line_end}{indent}")
+    return Edit(Span(facts.manifest, end.end(), end.end()), f"{line_end}{indent}{line}")

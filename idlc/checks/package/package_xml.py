@@ -17,6 +17,16 @@ _PARENTS = (("package",), ("package", "export"))
 _DEPTHS = tuple(len(parents) + 1 for parents in _PARENTS)
 
 
+#: The elements of a package.xml in the order of the schema: dependencies come after the head.
+HEAD = ("name", "version", "description", "maintainer", "license", "url", "author")
+DEPENDENCIES = (
+    *("build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
+    *("exec_depend", "run_depend", "depend", "doc_depend", "test_depend"),
+    *("conflict", "replace", "group_depend", "member_of_group"),
+)
+RANK = {tag: at for at, tag in enumerate((*HEAD, *DEPENDENCIES))}
+
+
 class NotXmlError(ValueError):
     """The text is not XML; `line`, from 1, and `column`, from 0, are known unless `line` is 0."""
 

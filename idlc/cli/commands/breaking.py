@@ -69,8 +69,9 @@ def command(
 ) -> int:
     """Report what a new version of interfaces breaks, and for whom.
 
-    wire: bytes recorded before are read wrongly or not at all. hash: endpoints of both versions
-    do not talk. source: code fails. behaviour: the same code does something else.
+    wire: bytes recorded before are read wrongly or not at all. hash: the middleware may not
+    deliver messages between both versions. source: code fails. behaviour: the same code does
+    something else.
 
     With distro:NAME, the standard interfaces that PATH uses are compared with that
     distribution's, or all of them if there is no PATH.

@@ -30,8 +30,8 @@ def command(paths: tuple[str, ...], check: bool, diff: bool, exclude: tuple[str,
     sides or on none. There are at most two blank lines in a row. A file that is changed also loses
     the blanks at the ends of its lines; these alone, or a missing line end, change no file.
 
-    Nothing else changes, so the meaning stays. Files with errors are left alone. PATH is as for
-    `idlc check`.
+    Nothing else changes, so the meaning stays. Files with syntax errors are left alone. PATH is as
+    for `idlc check`.
     """
     from idlc.cli.fmt_run import run
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -64,13 +65,14 @@ def command(style: str, watch: bool, **given: Any) -> int:
     REC is a recording, an .mcap or .db3 file or the folder of a bag: all that its topics need.
 
     OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
-    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`.
+    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`. In a
+    package with a setup.py, PATH and OUT default to the package and the folder of its name.
     """
     from idlc.cli import gen_run, output
     from idlc.diagnostics.report import Report
     from idlc.disk.scope import scope
     from idlc.disk.settings import pyproject
-    from idlc.driver.generate.gen import GenOptions, with_settings
+    from idlc.driver.generate.gen import GenOptions, in_package, with_settings
 
     report = Report()
     settings = pyproject.load(report)
@@ -79,7 +81,9 @@ def command(style: str, watch: bool, **given: Any) -> int:
         return output.status(report)
     package = given["package"]
     words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
-    wanted = with_settings(GenOptions(**given, scope=scope(settings, *words)), settings)
+    again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
+    asked = GenOptions(**given, scope=scope(settings, *words), again=again)
+    wanted = in_package(with_settings(asked, settings))
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -121,8 +122,10 @@ def command(name: str, **given: Any) -> int:
     report = Report()
     result = scaffold_node.node(wanted, settings, report)
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
-    test = f"{Path(sys.executable).name} -m pytest {folder}test/test_{name}.py"
-    return finish(result, report, (test,))
+    python = Path(sys.executable).name
+    install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
+    test = f"{python} -m pytest {folder}test/test_{name}.py"
+    return finish(result, report, (*install, test))
 
 
 def _wanted(name: str, given: dict[str, Any], presets: dict[tuple[str, int], str]) -> spec.Node:

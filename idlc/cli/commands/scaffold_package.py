@@ -25,7 +25,7 @@ LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
 @click.option("--description", default="", help="What the package is for, in a sentence.")
 @click.option("--maintainer", help="Who answers for it; git's user.name if not given.")
 @click.option("--email", help="The maintainer's address; git's user.email if not given.")
-@click.option("--license", "licence", type=click.Choice(LICENSES), default=LICENSES[0])
+@click.option("--license", "licence", type=click.Choice(LICENSES))
 @click.option(
     "--interfaces",
     "--interfaces-only",
@@ -81,10 +81,12 @@ def command(
         given["description"] or f"The package {name}.",
         given["maintainer"] or setting("user.name") or "Your Name",
         given["email"] or setting("user.email") or "you@example.com",
-        given["licence"],
+        given["licence"] or LICENSES[0],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
     shared = {key: given[key] for key in ("dry_run", "force", "include", "templates")}
-    result = package(wanted, folder, Settings(**shared), report, examples)
+    chosen = {"license" if key == "licence" else key for key, value in given.items() if value}
+    chosen |= {"starters"} if starters else set()
+    result = package(wanted, folder, Settings(**shared), report, examples, chosen)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
     return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

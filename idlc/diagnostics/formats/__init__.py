@@ -17,11 +17,15 @@ DOCUMENTS = ("github", "sarif", "junit", "gitlab")
 
 
 class Run(NamedTuple):
-    """What a document tells besides problems: the command, idlc's version and the files read."""
+    """What a document tells besides problems: the command, idlc's version and the files read.
+
+    `strict` is whether warnings fail as errors do.
+    """
 
     command: str
     version: str
     files: tuple[str, ...] = ()
+    strict: bool = False
 
 
 def document(style: str, diagnostics: Iterable[Diagnostic], run: Run) -> str:

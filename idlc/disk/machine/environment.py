@@ -50,7 +50,12 @@ def machine() -> str:
 
 
 def wheel_platform() -> str:
-    """Return how the tags of wheels call this machine, such as `linux_x86_64`."""
-    import sysconfig
+    """Return the platform tag of wheels with libraries for this machine.
 
-    return sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    The libraries need none of the system's, so they run wherever the generated code does: the tags
+    are those of the oldest systems that have a Python for it.
+    """
+    import platform
+
+    libc = "manylinux_2_17" if platform.libc_ver()[0] == "glibc" else "musllinux_1_1"
+    return f"{libc}_{machine()}"

@@ -110,39 +110,45 @@ class Target:
         self.lock = record
         return transaction.apply(changes, encode(record), self.name, self.report)
 
-    def drift(self, changes: Plan, record: Lock) -> None:
-        """Report IDL616 for each file that is not what a run would write."""
+    def drift(self, changes: Plan, record: Lock, again: str) -> None:
+        """Report IDL616 for each file that is not what the command `again` would write."""
+        hint = f"run `{again}`"
         if self.lock is None:
             if self.report.had_errors:
                 return
             message = f"there is no {self.home}{FILE} in `{self.name}`, so nothing can be compared"
-            self.report.add(codes.DRIFT.of(self.name, message, hint="run idlc gen once"))
+            self.report.add(codes.DRIFT.of(self.name, message, hint=hint))
             return
         why = _reasons(self.lock, record) or "idlc itself changed"
         for change in changes.changes:
-            self.report.add(self._drifted(change, self.lock, why))
+            self.report.add(self._drifted(change, self.lock, why, again))
         # a dependency found elsewhere that compiles to the same is no drift
         if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
             path = f"{self.name}/{self.home}{FILE}"
-            self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}"))
+            self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
 
-    def _drifted(self, change: Change, old: Lock, why: str) -> Diagnostic:
+    def _drifted(self, change: Change, old: Lock, why: str, again: str) -> Diagnostic:
         path = f"{self.name}/{change.path}"
         wrote = old.outputs.get(change.path)
-        hint = "run idlc gen without --check"
+        hint = f"run `{again}`"
         if change.new is None:
             message = f"`{path}` is no longer generated: {why}"
         elif change.old is None:
             message = f"`{path}` is missing" + ("" if wrote else f": {why}")
         elif wrote is not None and digest(change.old) != wrote:
             message = f"`{path}` was edited since idlc wrote it"
-            hint = "idlc gen --force replaces it"
+            hint = f"`{again} --force` replaces it, and keeps a copy"
         elif wrote is None:
             message = f"`{path}` was not written by idlc"
-            hint = "idlc gen --force replaces it"
+            hint = f"`{again} --force` replaces it, and keeps a copy"
         else:
-            message = f"`{path}` is out of date: {why}"
+            message = f"`{path}` is out of date: {self.cause(change) or why}"
         return codes.DRIFT.of(path, message, hint=hint)
+
+    def cause(self, change: Change) -> str:
+        """Say why a file is out of date; empty where only the locks can tell."""
+        del change
+        return ""
 
 
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
@@ -153,6 +159,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     found = []
     if old.idlc != new.idlc:
         found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.converts_values != new.converts_values:
+        found.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
         found.append(f"the package was called `{old.package}`")
     for before, after in pairs:

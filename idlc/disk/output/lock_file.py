@@ -38,12 +38,14 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     interfaces that were read, by full name, `outputs` the files written, by path below the
     lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
     other packages that the generated code needs, `vendored` the packages written beside it.
+    `converts_values` is there where the classes convert values as those of Lyrical do.
     """
 
     format: int = FORMAT
     idlc: str
     package: str
     vendor_deps: bool = False
+    converts_values: bool | msgspec.UnsetType = msgspec.UNSET
     vendored: tuple[str, ...] = ()
     imports: tuple[str, ...] = ()
     inputs: dict[str, str]

@@ -7,6 +7,7 @@ added is the user's. All changes are made in one go, or none.
 from __future__ import annotations
 
 import difflib
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -45,12 +46,12 @@ class Project:
         return (self.path / path).exists()
 
     def text(self, path: str) -> str | None:
-        """Return a file's text, `None` where there is none; reports what cannot be read."""
+        """Return a file's text, `None` without one; no byte order mark, which edits keep."""
         if not (self.path / path).is_file():
             return None
         data = read_bytes(self.path / path, self.shown(path), self._report)
         source = None if data is None else decode(data, self.shown(path), self._report)
-        return source.text if source else None
+        return source.text.removeprefix("\ufeff") if source else None
 
     def names(self, folder: str) -> list[str]:
         """Return the names of the files in one of its folders, sorted."""
@@ -74,6 +75,8 @@ class Project:
         tree = Tree(self.path)
         for path, text in sorted({**added, **edited}.items()):
             old, new = tree.read(path), text.encode("utf-8")
+            if path in edited and isinstance(old, bytes) and old.startswith(BOM_UTF8):
+                new = BOM_UTF8 + new
             if isinstance(old, Obstacle):
                 self._in_the_way(path, old)
                 refused = True

@@ -42,6 +42,7 @@ def unchanged(
     return (
         lock is not None
         and (lock.idlc, lock.package, lock.vendor_deps) == (__version__, package, vendor_deps)
+        and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
         and not _idlc_is_newer(out / FILE)

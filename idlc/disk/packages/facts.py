@@ -15,7 +15,7 @@ from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.output import lock_file
 from idlc.disk.packages.enclosing import manifest
 from idlc.disk.packages.inputs import Inputs
-from idlc.disk.read import NOTHING_OPEN, Unsaved, read_bytes, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, shown
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
@@ -48,6 +48,7 @@ def facts(
     files = list(_files(folder))
     locks = _locks(files)
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
+    cmake = _optional(folder / "CMakeLists.txt", unsaved)
     modules = dict(_modules(folder, files, generated, unsaved))
     return Facts(
         name=given.package,
@@ -57,13 +58,31 @@ def facts(
         modules=modules,
         setup_py=_optional(folder / "setup.py", unsaved),
         setup_cfg=_optional(folder / "setup.cfg", unsaved),
-        generates=_generates(folder / "CMakeLists.txt"),
+        cmake=cmake,
+        generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
         whole=_whole(given, files, exclude),
         marker=(folder / "resource" / given.package).is_file(),
         outputs=tuple(Output(shown(at), one.package, one.inputs) for at, one in locks.items()),
+        folders=_by_name(folder, files),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
     )
+
+
+def folders(folder: Path) -> dict[str, bool]:
+    """Return the folders with files, by dotted name, and whether each is a Python package."""
+    return _by_name(folder, _files(folder))
+
+
+def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
+    found: dict[str, bool] = {}
+    for file in files:
+        parts = file.relative_to(folder).parts[:-1]
+        for end in range(1, len(parts) + 1):
+            found.setdefault(".".join(parts[:end]), False)
+        if file.name == "__init__.py" and parts:
+            found[".".join(parts)] = True
+    return found
 
 
 def _locks(files: Iterable[Path]) -> dict[Path, lock_file.Lock]:
@@ -79,12 +98,11 @@ def _whole(given: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
     return bool(given.files) and there <= {one.file.path.resolve() for one in given.files}
 
 
-def _generates(cmake: Path) -> bool:
+def _generates(cmake: Source) -> bool:
     """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    data = read_bytes(cmake, "", Report()) if cmake.is_file() else None
-    code = re.sub(rb"#[^\n]*", b"", data or b"")
-    calls = re.findall(rb"rosidl_generate_interfaces\s*\(([^()]*)", code)
-    return any(b"SKIP_INSTALL" not in call.split() for call in calls)
+    code = re.sub(r"#[^\n]*", "", cmake.text)
+    calls = re.findall(r"rosidl_generate_interfaces\s*\(([^()]*)", code)
+    return any("SKIP_INSTALL" not in call.split() for call in calls)
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
@@ -10,7 +11,8 @@ import msgspec
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.disk.find import InterfaceFile, find
+from idlc.disk.exclude import Exclusions
+from idlc.disk.find import KINDS, InterfaceFile, find
 from idlc.disk.library import Library
 from idlc.disk.output.folder import Target
 from idlc.disk.output.lock_file import FILE
@@ -19,7 +21,7 @@ from idlc.disk.packages.enclosing import declared_name, manifest
 from idlc.disk.packages.names import accept_name, by_home, places, several
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
-from idlc.model import ir
+from idlc.model import catalog, ir
 
 
 def wanted(
@@ -61,8 +63,24 @@ def _from_files(
             name, origins = declared_name(declared, shown(declared), report), ["package.xml"]
         if name is None:
             name, origins = absolute(out).name, ["the folder given with -o"]
+            if catalog.is_standard(name) and min(homes).name != name:
+                report.add(
+                    codes.UNIMPORTABLE_PACKAGE.of(
+                        "",
+                        f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
+                        hint=f"choose another folder; add `--package {name}` if they are its files",
+                    )
+                )
             _tell(name, min(homes), out, report)
         found = (inputs.load(name, files, min(homes), report),)
+    if out and any(absolute(str(file.path.parent)) == absolute(out) for file in files):
+        report.add(
+            codes.FOREIGN_FILE.of(
+                out,
+                f"`{out}` holds interface files: generated code would lie among them",
+                hint="choose another folder with -o",
+            )
+        )
     for one, origin in zip(found, origins, strict=True):
         accept_name(one.package, origin, report)
     return found
@@ -119,6 +137,22 @@ def completed(
         files = sorted((*one.files, *more), key=lambda each: each.file.key)
         found.append(msgspec.structs.replace(one, files=tuple(files)))
     return [] if found == [*given] else found
+
+
+def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
+    """Return the .idl files of a package that no .msg, .srv or .action file is beside, sorted."""
+    found = []
+    for folder in folders:
+        for kind in KINDS:
+            inside = folder / kind[1:]
+            try:
+                names = {entry.name for entry in os.scandir(inside)}
+            except OSError:
+                continue
+            own = (name for name in names if name.endswith(".idl"))
+            alone = (name for name in own if f"{name.removesuffix('.idl')}{kind}" not in names)
+            found += [f"{kind[1:]}/{name}" for name in alone if not exclude.has(str(inside / name))]
+    return sorted(found)
 
 
 def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:

@@ -75,7 +75,10 @@ def selection(config: Config, report: Report) -> Selection:
 
 def against(config: Config, report: Report) -> str | None:
     """Return what `idlc breaking` compares with unless told otherwise."""
-    return _table(config, "breaking", BreakingSettings, report)[0].against or None
+    table, place = _table(config, "breaking", BreakingSettings, report)
+    if place is not None:
+        place.no_url("against", table.against, report)
+    return table.against or None
 
 
 def allowances(config: Config, report: Report) -> tuple[Allowance, ...]:

@@ -113,6 +113,8 @@ def _checked(table: object, source: Source, folder: Path, report: Report) -> Con
         return Config()
     found = read_table(table, Settings, place, report)
     assert found is not None
+    for path in found.paths:
+        place.no_url("paths", path, report)
     return Config(
         paths=tuple(_typed(folder, path) for path in found.paths),
         out=_typed(folder, found.out) if found.out else None,

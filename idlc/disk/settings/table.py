@@ -45,6 +45,12 @@ class Place(NamedTuple):
             else BAD_CONFIG.at(span, message, hint=hint)
         )
 
+    def no_url(self, key: str, value: str, report: Report) -> None:
+        """Report a URL: what a file of somebody else names is not fetched."""
+        if "://" in value:
+            message = f"`{key}` in {self.shown} is a URL"
+            self.wrong(key, message, report, "URLs are opened if they are typed")
+
     def _span(self, key: str) -> Span | None:
         """Return where a key of the table stands, else the table's header, else any such key."""
         text = self.source.text

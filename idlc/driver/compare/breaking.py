@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from typing import TYPE_CHECKING, NamedTuple
 
 import msgspec
 
@@ -20,17 +21,22 @@ from idlc.breaking.packages import (
 from idlc.breaking.version import part_to_raise, raised
 from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.disk.find import InterfaceFile, find, look, nothing_in
 from idlc.disk.output import lock_file
 from idlc.disk.packages import inputs
 from idlc.disk.packages.enclosing import manifest, statements
+from idlc.disk.packages.names import by_home
 from idlc.disk.read import absolute
 from idlc.disk.revision import Revision, checked_out, is_revision
 from idlc.disk.scope import Scope
 from idlc.driver.compare.distribution import compare_with_distro, is_distro
-from idlc.driver.stages import models_of, stage
+from idlc.driver.stages import models_of, stage, without_errors
+from idlc.model import ir
 from idlc.model.link import Model
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 GIT = "git:"
 
@@ -50,8 +56,9 @@ class BreakingOptions(NamedTuple):
 class Verdict(NamedTuple):
     """What came out: how many changes break each level, and the version part to raise.
 
-    `added` breaks nothing. There is no part to raise without a difference, and none for
-    a comparison with a distribution.
+    `added` breaks nothing, and `not_compared` is what nothing is known of. There is no part to
+    raise without a difference, where that is not known, and for a comparison with a distribution.
+    `hidden` is how many changes break other levels than those that were asked for.
     """
 
     levels: dict[str, int]
@@ -60,6 +67,8 @@ class Verdict(NamedTuple):
     version: str | None
     next_version: str | None
     added: tuple[str, ...] = ()
+    not_compared: tuple[str, ...] = ()
+    hidden: int = 0
 
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
@@ -67,17 +76,23 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     there = look(options.paths, report, options.scope.exclude)
     given = inputs.packages(there.files, options.scope, report)
     comparison = None if report.had_errors else _against(options, given, report)
-    if comparison is not None and not comparison.differs:
+    if comparison is None:
+        return None
+    if there.empty and not (comparison.differs or report.had_errors):
         # of what was removed, there is something to compare with
         report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
-    if comparison is None or report.had_errors:
         return None
-    changes = without_allowed(
-        comparison.changes, options.allowed, options.today, options.allowed_in, report
-    )
+    if comparison.left_out:  # for which allowances may be
+        changes = not_allowed(comparison.changes, options, report)
+    else:
+        changes = without_allowed(
+            comparison.changes, options.allowed, options.today, options.allowed_in, report
+        )
     wanted = [change for change in changes if change.levels & set(options.levels)]
     report.extend(change.diagnostic for change in wanted)
-    part = None if is_distro(options.against) else part_to_raise(comparison)
+    part = None
+    if not (comparison.left_out or is_distro(options.against)):
+        part = part_to_raise(comparison)
     version = _version(given, report)
     return Verdict(
         {level: sum(level in change.levels for change in wanted) for level in LEVELS},
@@ -86,6 +101,8 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         version,
         raised(version, part) if version and part else None,
         comparison.additions,
+        comparison.left_out,
+        len(changes) - len(wanted),
     )
 
 
@@ -123,14 +140,26 @@ def _against(
     return _compare(options, given, None, report)
 
 
+class Side(NamedTuple):
+    """One of two versions: the models of its packages, without what could not be compiled.
+
+    `broken` are the interfaces that have errors, and those that hold them; `error` is the first
+    one, in words.
+    """
+
+    models: Mapping[str, Model]
+    broken: frozenset[ir.TypeName]
+    error: str
+
+
 def earlier(
     options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
-) -> dict[str, Model]:
-    """Return the models of packages as they are in a folder or git revision; empty after errors."""
+) -> Side | None:
+    """Return the packages as they are in a folder or git revision; `None` after errors."""
     if not options.against.startswith(GIT):
         return _before(options, given, None, report)
     with checked_out(options.against.removeprefix(GIT), options.paths[0], report) as revision:
-        return _before(options, given, revision, report) if revision else {}
+        return _before(options, given, revision, report) if revision else None
 
 
 def _compare(
@@ -140,16 +169,60 @@ def _compare(
     report: Report,
 ) -> Comparison | None:
     before = _before(options, given, revision, report)
-    after = sound_ones(given, options.scope, report)
-    if report.had_errors:
+    found = Report()
+    after = _side(given, {}, options.scope, found)
+    report.extend(one for one in found if one.severity is codes.ERROR)
+    if before is None or any(one.code in codes.USAGE for one in report):
         return None
+    known = {one.name for model in before.models.values() for one in model.own} | before.broken
+    others = _of_others(given, known, revision) if revision else frozenset()
+    submodules = tuple(revision.unknown(options.paths)) if revision else ()
+    out = before.broken | after.broken | others
+    old, new = (_without(side.models, out) for side in (before, after))
     with stage("compare", options.against):
-        found = [
-            compare(model, after[package]) if package in after else removed_package(model)
-            for package, model in before.items()
+        changes = [
+            compare(model, new[package]) if package in new else removed_package(model)
+            for package, model in old.items()
         ]
-        new = (model for package, model in after.items() if package not in before)
-        return together([*found, *map(added_package, new)])
+        come = (model for package, model in new.items() if package not in old)
+        whole = together([*changes, *map(added_package, come)])
+    elsewhere = {*map(str, others), *submodules}
+    report.extend(
+        _not_compared(names, reason, options, hint)
+        for names, reason, hint in (
+            (before.broken, f"there are errors in {options.against}", before.error),
+            (elsewhere, "other git repositories hold their history", None),
+        )
+        if names
+    )
+    return whole._replace(left_out=tuple(sorted({*map(str, out), *elsewhere})))
+
+
+def _not_compared(
+    names: Iterable[object], reason: str, options: BreakingOptions, hint: str | None
+) -> Diagnostic:
+    listed = first_few(sorted(f"`{name}`" for name in names), 5)
+    return codes.NOT_COMPARED.of(options.paths[0], f"not compared: {listed}; {reason}", hint=hint)
+
+
+def _of_others(
+    given: Sequence[inputs.Inputs], known: AbstractSet[ir.TypeName], revision: Revision
+) -> frozenset[ir.TypeName]:
+    """Return the interfaces that a revision lacks because they are in other repositories."""
+    return frozenset(
+        name
+        for one in given
+        for file in (each.file for each in one.files)
+        if (name := ir.TypeName(one.package, file.kind, file.name)) not in known
+        and not revision.holds(file.path)
+    )
+
+
+def _without(models: Mapping[str, Model], names: AbstractSet[ir.TypeName]) -> dict[str, Model]:
+    return {
+        package: model.only({one.name for one in model.own} - names)
+        for package, model in models.items()
+    }
 
 
 def _before(
@@ -157,7 +230,7 @@ def _before(
     given: tuple[inputs.Inputs, ...],
     revision: Revision | None,
     report: Report,
-) -> dict[str, Model]:
+) -> Side | None:
     scope = options.scope
     if revision is None:
         files = find([options.against], report, scope.exclude)
@@ -167,8 +240,46 @@ def _before(
         scope = msgspec.structs.replace(
             scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
         )
-    old = _named_alike(inputs.packages(files, scope, report), given, files, scope, report)
-    return sound_ones(old, scope, report)
+    found = Report()
+    old = _named_alike(inputs.packages(files, scope, found), given, files, scope, found)
+    report.extend(one for one in found if one.code in codes.USAGE)
+    if any(one.code in codes.USAGE for one in report):
+        return None
+    homes = {one.home: files for one in old} if scope.package else by_home(files)
+    return _side(old, homes, scope, found)
+
+
+def _side(
+    given: Sequence[inputs.Inputs],
+    files: Mapping[Path, Sequence[InterfaceFile]],
+    scope: Scope,
+    report: Report,
+) -> Side:
+    """Compile one version; `files` are those by package that may not have been read."""
+    compiled = {
+        ir.TypeName(one.package, each.file.kind, each.file.name): each.file.shown
+        for one in given
+        for each in one.files
+    }
+    every = {
+        file.shown: ir.TypeName(one.package, file.kind, file.name)
+        for one in given
+        for file in files.get(one.home, ())
+    }
+    # of a type that is defined twice, nobody knows which definition was meant
+    also = {shown: compiled[name] for shown, name in every.items() if name in compiled}
+    pairs = list(models_of(given, scope, report))
+    extents: Extents = {}
+    for model in without_errors(pairs, report, also):
+        report.extend(oversized(model, extents))
+    models = list(without_errors(pairs, report, also))
+    names = {*compiled, *every.values()}
+    sound = {own.name for model in models for own in model.own}
+    error = ""
+    if first := next((one for one in report if one.severity is codes.ERROR), None):
+        line = first.span.source.position(first.span.start)[0] if first.span else 1
+        error = f"the first error is {first.code} at {first.where[0]}:{line}: {first.message}"
+    return Side({model.package: model for model in models}, frozenset(names - sound), error)
 
 
 def _named_alike(

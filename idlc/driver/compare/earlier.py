@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.breaking.change import Change
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, Severity
 from idlc.disk import revision
 from idlc.disk.packages.inputs import Inputs
 from idlc.disk.read import NOTHING_OPEN, absolute, is_folder
@@ -17,8 +17,7 @@ from idlc.disk.scope import Scope
 from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings.pyproject import Config
 from idlc.disk.working_folder import working_in
-from idlc.driver.compare.breaking import GIT, BreakingOptions, earlier, not_allowed
-from idlc.model.link import Model
+from idlc.driver.compare.breaking import GIT, BreakingOptions, Side, earlier, not_allowed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,18 +42,19 @@ class Earlier:
             allowed=command_settings.allowances(settings, ignored),
         )
         self._commit: str | None = None
-        self._models: Mapping[str, Model] | None = None
+        self._side: Side | None = None
 
-    def models(self, packages: Sequence[Inputs]) -> Mapping[str, Model]:
-        """Return the packages' models as they were then; empty if they cannot be compiled."""
-        if self.has_moved() or self._models is None:
+    def side(self, packages: Sequence[Inputs]) -> Side:
+        """Return the packages as they were then; of a version that cannot be read, why."""
+        if self.has_moved() or self._side is None:
             report = Report()
             paths = tuple(one.home.as_posix() for one in packages)
             options = self._options._replace(paths=paths)
             with working_in(self._folder):
-                found = earlier(options, tuple(packages), report) if paths and self.name else {}
-            self._models = {} if report.had_errors else found
-        return self._models
+                found = earlier(options, tuple(packages), report) if paths and self.name else None
+            why = next((one.message for one in report if one.severity is Severity.ERROR), "")
+            self._side = found or Side({}, frozenset(), why)
+        return self._side
 
     def has_moved(self) -> bool:
         """Return whether the name means another commit than when this was asked last."""
@@ -64,7 +64,7 @@ class Earlier:
         before, self._commit = self._commit, revision.commit(name, str(self._folder)) or ""
         if before == self._commit:
             return False
-        self._models = None
+        self._side = None
         return before is not None
 
     def repository(self) -> tuple[Path, ...]:

@@ -47,7 +47,7 @@ class GraphVerdict(NamedTuple):
     """What came out: how many findings break each level, and all that was looked at.
 
     `seen` is how many nodes, topics, services and actions that is; `silent` how many endpoints
-    tell no type hash.
+    tell no type hash; `hidden` how many findings break other levels than those asked for.
     """
 
     levels: dict[str, int]
@@ -55,6 +55,7 @@ class GraphVerdict(NamedTuple):
     seen: dict[str, int]
     silent: int
     endpoints: tuple[Endpoint, ...]
+    hidden: int
 
 
 def compare_with_graph(
@@ -88,6 +89,7 @@ def compare_with_graph(
         _counts(endpoints),
         sum(not one.hash for one in endpoints),
         endpoints,
+        len(left) - len(wanted),
     )
 
 

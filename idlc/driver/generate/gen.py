@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from idlc.diagnostics.report import Report
+from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
+from idlc.disk.output.lock_file import FILE
 from idlc.disk.packages import inputs
-from idlc.disk.packages.requested import borrowed, completed, targets, wanted
+from idlc.disk.packages.enclosing import declared_name, manifest
+from idlc.disk.packages.requested import borrowed, completed, targets, unread_idl, wanted
+from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
 from idlc.disk.settings.pyproject import Config
 from idlc.driver import named_types
@@ -26,7 +29,8 @@ from idlc.syntax.tree import OPTIONAL
 class GenOptions(NamedTuple):
     """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both.
 
-    `topics` are those of recordings whose types are wanted; none means all.
+    `topics` are those of recordings whose types are wanted; none means all. `again` is the command
+    that writes what `check` compares, for hints.
     """
 
     paths: tuple[str, ...]
@@ -37,6 +41,7 @@ class GenOptions(NamedTuple):
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
+    again: str = "idlc gen"
 
 
 def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
@@ -45,6 +50,27 @@ def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
         paths=wanted.paths or settings.paths,
         out=wanted.out or ("" if wanted.ament else settings.out or ""),
         vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+    )
+
+
+def in_package(wanted: GenOptions) -> GenOptions:
+    """Return options with what the package around implies where nothing was said.
+
+    A package that setup.py builds is compiled into the folder of its name.
+    """
+    if wanted.ament or (wanted.out and wanted.paths) or len(wanted.paths) > 1:
+        return wanted
+    given = absolute(next(iter(wanted.paths), "."))
+    path = manifest(given)
+    if path is None or (wanted.paths and path.parent != given):
+        return wanted
+    name = declared_name(path, shown(path), Report())
+    if not name or not is_file(path.parent / "setup.py"):
+        return wanted
+    homes = (path.parent / name, path.parent / "src" / name)
+    out = next((home for home in homes if is_file(home / FILE)), homes[0])
+    return wanted._replace(
+        paths=wanted.paths or (shown(path.parent),), out=wanted.out or shown(out)
     )
 
 
@@ -73,6 +99,8 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
+    whole = {one.package for one in given if one.is_whole or options.ament}.union(words)
+    _note_idl((one for one in given if one.package in whole), options.scope, report)
     found = _targets(given, options, report) if given else ()
     if not found:
         return ()
@@ -83,6 +111,16 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
             enter(found[0])
         return done
+
+
+def _note_idl(given: Iterable[inputs.Inputs], scope: Scope, report: Report) -> None:
+    for one in given:
+        if names := unread_idl(one.folders, scope.exclude):
+            files = first_few((f"`{name}`" for name in names), 3)
+            report.notes.append(
+                f"idlc does not compile .idl files, so `{one.package}` lacks what these define: "
+                f"{files}"
+            )
 
 
 def _targets(
@@ -98,7 +136,11 @@ def _targets(
         (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
         for one in given
     )
-    found = [Overlay(prefix, name, home, report, force=options.force) for name, home in homes]
+    distros = [one.name for one in options.scope.distros]
+    found = [
+        Overlay(prefix, name, home, report, force=options.force, distros=distros)
+        for name, home in homes
+    ]
     return tuple(found) if found[0].usable() else ()
 
 
@@ -142,7 +184,7 @@ def _made(
         ]
         if all(current):
             done = [one for each in current for one in each]
-            return with_needs(done, wanted, library.distro, report)
+            return with_needs(done, wanted, library.distro, report, options.again)
     compiler = Compiler(library)
     models = [model for _, model in compiler.all(wanted.values(), report)]
     needed = {name for model in models for name in model.interfaces}
@@ -155,11 +197,11 @@ def _made(
         )
     if options.check:
         for one in packages:
-            one.target.drift(one.plan, one.lock)
+            one.target.drift(one.plan, one.lock, options.again)
     elif not all(one.target.apply(one.plan, one.lock) for one in packages):
         return ()
     targets = wanted if packages else ()
-    return with_needs(map(generated, packages), targets, library.distro, report)
+    return with_needs(map(generated, packages), targets, library.distro, report, options.again)
 
 
 def _may_be_refused(given: Iterable[inputs.Inputs], distro: Distro) -> bool:

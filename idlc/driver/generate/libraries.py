@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from idlc.disk.machine import environment
-from idlc.disk.machine.distribution import Distribution, distribution
+from idlc.disk.machine.distribution import DEFAULT, Distribution, distribution
 from idlc.driver.stages import stage
 
 if TYPE_CHECKING:
@@ -19,11 +19,13 @@ class Libraries(NamedTuple):
     """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
 
     `missing` says why there are none although the package has interfaces. Such a package must not
-    be entered in the index of ROS 2: recorders stop at it.
+    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel of the
+    package has in its name, so that wheels for different distributions have different names.
     """
 
     files: Mapping[str, bytes]
     missing: str = ""
+    build_tag: str = ""
 
 
 def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
@@ -33,12 +35,21 @@ def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
     """
     from idlc.native.library import libraries
 
-    target = target_of(found or distribution())
+    found = found or distribution()
+    target = target_of(found)
     if not model.own or isinstance(target, str):
-        return Libraries({}, target if model.own and isinstance(target, str) else "")
+        missing = target if model.own and isinstance(target, str) else ""
+        return Libraries({}, missing, build_tag(model))
     with stage("libraries", model.package):
         files = libraries(model, *target)
-    return Libraries({f"lib/{name}": content for name, content in files.items()})
+    placed = {f"lib/{name}": content for name, content in files.items()}
+    return Libraries(placed, build_tag=build_tag(model, found.name))
+
+
+def build_tag(model: Model, *libraries: str) -> str:
+    """Return a wheel's build tag; `libraries` is the distribution that it has libraries for."""
+    names = dict.fromkeys((model.distro.name, *libraries))
+    return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
 
 
 def target_of(found: Distribution) -> tuple[Machine, Layout] | str:

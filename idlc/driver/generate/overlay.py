@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from idlc.disk.machine.distribution import distribution
 from idlc.disk.output.folder import Target
 from idlc.disk.output.overlay import Overlay
 from idlc.driver.generate.libraries import libraries_of
@@ -27,7 +26,7 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
     manifest = overlay.manifest or _rendered(
         "overlay/package.xml.jinja", name=model.package, depends=dependencies(model)
     )
-    libraries = libraries_of(model, distribution(overlay.prefixes))
+    libraries = libraries_of(model, overlay.distribution)
     placed = {f"{overlay.modules}{path}": modules[path] for path in modules}
     return {**placed, **shared(model, manifest, libraries, overlay.report)}
 

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from symtable import symtable
 from typing import TYPE_CHECKING, NamedTuple
 
+from msgspec import UNSET
+
 from idlc import __version__
 from idlc.disk.library import Library
 from idlc.disk.output import lock_file
@@ -77,6 +79,7 @@ def package_of(
             idlc=__version__,
             package=model.package,
             vendor_deps=vendored is not None,
+            converts_values=model.distro.converts_values or UNSET,
             vendored=tuple(vendored or ()),
             imports=_imports(model),
             inputs=digests,

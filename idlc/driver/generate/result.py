@@ -58,7 +58,7 @@ def up_to_date(
 
 
 def with_needs(
-    done: Iterable[Generated], targets: Iterable[Target], distro: Distro, report: Report
+    done: Iterable[Generated], targets: Iterable[Target], distro: Distro, report: Report, again: str
 ) -> tuple[Generated, ...]:
     """Report IDL617 for generated packages that need others that cannot be imported here.
 
@@ -77,8 +77,8 @@ def with_needs(
             codes.DEPENDENCY_NOT_IMPORTABLE.of(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
-                hint=f"{distro.installing(missing)}, or run idlc gen again "
-                "with --vendor-deps, which writes it next to this one",
+                hint=f"{distro.installing(missing)}, or run `{again} --vendor-deps`, "
+                "which writes it next to this one",
             )
         )
     return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)

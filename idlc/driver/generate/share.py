@@ -19,14 +19,18 @@ INTERFACES = f"{INDEX}/rosidl_interfaces"
 
 
 def shared(
-    model: Model, manifest: str | bytes, libraries: Libraries, report: Report
-) -> dict[str, str | bytes]:
+    model: Model, manifest: str | bytes | None, libraries: Libraries, report: Report
+) -> dict[str, bytes]:
     """Return libraries, package.xml, interfaces and entries in the index, in the order to write.
 
-    What leads to others comes after these.
+    What leads to others comes after these. Without libraries the package is registered neither as
+    a package nor as one with interfaces: recorders stop at the one, `ros2 interface list` at the
+    other alone.
     """
     name = model.package
-    found: dict[str, str | bytes] = {**libraries.files, f"share/{name}/package.xml": manifest}
+    found: dict[str, str | bytes] = {**libraries.files}
+    if manifest is not None:
+        found[f"share/{name}/package.xml"] = manifest
     interfaces = {}
     for own in model.own:
         key = f"{own.name.kind}/{own.name.name}"
@@ -36,15 +40,18 @@ def shared(
         found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
     found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
     found[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
-    found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
     if libraries.missing:
         report.notes.append(
-            f"`{name}` is not entered in the index of ROS 2, because recorders stop at packages "
+            f"`{name}` is not registered in the index of ROS 2, because recorders stop at packages "
             f"without a library: {libraries.missing}"
         )
     else:
+        found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
         found[f"{INDEX}/packages/{name}"] = ""
-    return found
+    return {
+        path: content.encode() if isinstance(content, str) else content
+        for path, content in found.items()
+    }
 
 
 def dependencies(model: Model) -> list[str]:

@@ -23,13 +23,15 @@ from idlc.model.link import Model
 class RecordedVerdict(NamedTuple):
     """What came out: how many changes break each level, and all that was looked at.
 
-    `others` is how many changes are none for readers, and were not asked for.
+    `others` is how many changes are none for readers, where no level was asked for; otherwise
+    `hidden` is how many break other levels.
     """
 
     levels: dict[str, int]
     allowed: int
     others: int
     seen: dict[str, int]
+    hidden: int
 
 
 def compare_with_recordings(
@@ -133,6 +135,7 @@ def _verdict(
         len(changes) - len(left),
         0 if asked else len(left) - len(wanted),
         seen,
+        len(left) - len(wanted) if asked else 0,
     )
 
 

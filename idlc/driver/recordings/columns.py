@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -173,7 +174,7 @@ def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | 
         known = ", ".join(export.STYLES)
         return f"`{options.out}` does not say which format is meant", f"--format, or one of {known}"
     paths = [job.path for job in jobs]
-    twice = next((path for path in paths if paths.count(path) > 1), None)
+    twice = next((path for path, count in Counter(paths).items() if count > 1), None)
     if twice is not None:
         what = "standard output" if twice == STDOUT else f"`{twice}`"
         several = [job.topic.topic.name for job in jobs if job.path == twice]

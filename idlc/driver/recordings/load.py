@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from idlc import __version__
 from idlc.diagnostics.report import Report
 from idlc.disk.cache import loaded as cache
+from idlc.disk.scope import Scope
 from idlc.emit.pynames import class_
 from idlc.model import ir
 from idlc.recordings.errors import RecordingError
@@ -101,8 +102,10 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
     Warns if something else had to be used, or if it is not what the topic's publisher said it is.
     """
     schema, key = topic.schema, ""
-    if schema:
-        key = _key([topic.type, schema.encoding, schema.text])
+    if schema and not schema.is_blank:
+        converts = Scope(include=include).distro.converts_values
+        texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
+        key = _key(texts, converts=converts)
     if not (key and cache.has(key)):
         from idlc.driver.recordings.loading import topic_models
 
@@ -184,7 +187,8 @@ def _kept(models: Mapping[str, Model], key: str = "") -> str:
             for own in model.own
             for text in (str(own.name), own.source.text if own.source else "")
         ]
-        key = _key(texts)
+        converts = any(model.distro.converts_values for model in models.values())
+        key = _key(texts, converts=converts)
     if not cache.has(key):
         cache.keep(key, _files(models, f"{LOADED}.{key}"))
         invalidate_caches()
@@ -203,11 +207,14 @@ def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
                 yield RenderedFile(f"{package}/{file.path}", file.text)
 
 
-def _key(texts: Iterable[str]) -> str:
-    """Return a name for packages that are compiled from these texts by this idlc."""
+def _key(texts: Iterable[str], *, converts: bool) -> str:
+    """Return a name for packages that are compiled from these texts by this idlc.
+
+    `converts` is whether their classes convert values as those of Lyrical do.
+    """
     from hashlib import sha256
 
-    digest = sha256(f"{__version__} {cache.newest()}".encode())
+    digest = sha256(f"{__version__} {cache.newest()} {converts}".encode())
     for text in texts:
         raw = text.encode("utf-8", "surrogatepass")
         digest.update(b"%d " % len(raw) + raw)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Label, Report
+from idlc.diagnostics.report import Diagnostic, Label, Report, Severity
 from idlc.diagnostics.source import Span
 from idlc.disk.scope import Scope
 from idlc.driver.recordings.types import Around, RecordedTypes, recorded_types
@@ -21,8 +23,11 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
     """Report what is wrong with what recordings say of their types."""
     around = Around(scope, report)
     for path in paths:
-        recording = read(path, report)
+        recording = read(path, report, look=True)
         found = versions(recording.topics) if recording else []
+        for message, hint in recording.unread if recording else ():
+            problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
+            report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
         check_versions(found, report)
         for version in found:
             types = recorded_types(version, around, scope, report)
@@ -51,7 +56,7 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
             yield codes.RECORDED_HASH_DIFFERS.of(
                 f"{one.recorded.recording}: topic {topic.name}",
                 f"the definition of `{one.name}` is not that of what was recorded",
-                hint="the recorder found another version of its files than the publisher used",
+                hint="point -I to the files that the publisher used",
                 place=one.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )

@@ -12,7 +12,7 @@ from typing import Any
 from idlc.driver.recordings.selection import Selection
 from idlc.recordings.container import Container, Db3File, McapFile, Topic, open_pieces
 from idlc.recordings.db3 import Rows
-from idlc.recordings.mcap_records import INDEX_OFFSET, Chunk
+from idlc.recordings.mcap_records import Chunk
 from idlc.recordings.messages import Messages, Window
 
 
@@ -53,7 +53,7 @@ def divided(
     container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
 ) -> Iterator[Part]:
     """Yield the parts of a topic, each of about `size` bytes of a file."""
-    for file, ids in container.ids_of(topic):
+    for file, ids, _ in container.ids_of(topic):
         if isinstance(file, McapFile):
             found: Iterator[tuple[Any, ...]] = _chunks(file, ids, window, size)
         else:
@@ -63,17 +63,15 @@ def divided(
 
 
 def _chunks(file: McapFile, ids: list[int], window: Window, size: int) -> Iterator[tuple[Any, ...]]:
-    """Yield neighbours of about `size` bytes, with no more of their indexes than is needed."""
+    """Yield neighbours of about `size` bytes."""
     pieces: list[Chunk] = []
+    total = 0
     for chunk in file.pieces(ids, window):
-        if chunk.indexes is not None:
-            mine = [(one, chunk.index_of(one)) for one in ids]
-            packed = b"".join(INDEX_OFFSET.pack(one, at) for one, at in mine if at is not None)
-            chunk = chunk._replace(indexes=packed)
-        if pieces and sum(one.size for one in pieces) + chunk.size > size:
+        if pieces and total + chunk.size > size:
             yield tuple(pieces)
-            pieces = []
+            pieces, total = [], 0
         pieces.append(chunk)
+        total += chunk.size
     if pieces:
         yield tuple(pieces)
 

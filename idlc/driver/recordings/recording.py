@@ -36,6 +36,9 @@ class Recording(Mapping[str, "RecordedTopic"]):
     ) -> None:
         self._include = tuple(map(str, include))
         self._container: Container = open_recording(path, index=index, check=check)
+        self._topics: dict[str, list[Topic]] = {}
+        for topic in self.topics:
+            self._topics.setdefault(topic.name, []).append(topic)
 
     @property
     def topics(self) -> tuple[Topic, ...]:
@@ -48,7 +51,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
         return self._container.notes
 
     def __getitem__(self, name: str) -> RecordedTopic:
-        found = [topic for topic in self.topics if topic.name == name]
+        found = self._topics.get(name)
         if not found:
             from idlc.diagnostics.suggest import did_you_mean
 
@@ -60,10 +63,10 @@ class Recording(Mapping[str, "RecordedTopic"]):
         return RecordedTopic(self._container, found[0], include=self._include)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys(topic.name for topic in self.topics))
+        return iter(self._topics)
 
     def __len__(self) -> int:
-        return len({topic.name for topic in self.topics})
+        return len(self._topics)
 
     def __repr__(self) -> str:
         rows = [(one.name, one.type, f"{one.count:,}") for one in self.topics]
@@ -110,7 +113,7 @@ class RecordedTopic(Selection):
 
         A time is an int in nanoseconds, a datetime, or a text: `10` and `1m30s` count from the
         start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
-        in UTC.
+        in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
         """
         first, last = (
             None if one is None else moment(one, self._container.start) for one in (start, end)

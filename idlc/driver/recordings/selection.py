@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
 from idlc.recordings.compression import missing
 from idlc.recordings.container import Topic
+from idlc.recordings.encapsulation import CDR, START, unread
 from idlc.recordings.errors import RecordingError
-from idlc.recordings.messages import Messages, joined
+from idlc.recordings.messages import Messages, Raw, joined
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 Kind = TypeVar("Kind")
-#: How ROS 2 writes messages.
-CDR = "cdr"
 #: How errors name a message of many, and what is in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
 #: What is known of a message besides its fields.
@@ -92,7 +91,7 @@ class Selection:
         kind, done = self._kind(kind), 0
         for batch in self.batches():
             for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
-                with _at(self.topic, done):
+                with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
                     message = kind.deserialize(view)
                 yield Stamped(time, message)
                 done += 1
@@ -107,7 +106,7 @@ class Selection:
         """
         kind = self._kind(kind)
         batch = joined(list(self.batches()))
-        with _at(self.topic):
+        with _at(self.topic, batch.views):
             made = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
         times = zip(_names(made.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {
@@ -137,7 +136,7 @@ class Selection:
     def _tables(self, kind: Any, options: Any) -> Iterator[pa.Table]:
         done = 0
         for batch in self.batches():
-            with _at(self.topic, done):
+            with _at(self.topic, batch.views, done):
                 made = kind.to_arrow(batch, **options)
             yield _with_times(made, batch)
             done += len(batch)
@@ -178,7 +177,7 @@ def arrow() -> Any:
 
 
 @contextmanager
-def _at(topic: Topic, done: int = 0) -> Iterator[None]:
+def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
     """Have errors in messages say which message of the recording it is."""
     try:
         yield
@@ -188,6 +187,9 @@ def _at(topic: Topic, done: int = 0) -> Iterator[None]:
             raise
         found = _INDEXED.match(error.path)
         number, path = (int(found[1]), found[2]) if found else (0, error.path)
+        why = unread(topic.name, bytes(views()[number][:START]))
+        if why:
+            raise RecordingError(*why) from error
         where = f"{path}: " if path else ""
         raise RecordingError(
             f"message {done + number} of `{topic.name}` is broken: "

@@ -32,7 +32,8 @@ class TopicFacts(NamedTuple):
 
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
-    recording = read(path, report)
+    recording = read(path, report, look=True)
+    report.notes += [one.message for one in recording.unread] if recording else []
     around = Around(scope, report)
     found = []
     for version in versions(recording.topics) if recording else ():
@@ -51,7 +52,8 @@ def _facts(one: Recorded, compiled: str | None, around: Around) -> TopicFacts:
     here = "unknown"
     if known and hash_:
         here = "same" if known == hash_ else "differs"
-    definition = topic.schema.encoding or "unknown" if topic.schema else None
+    schema = None if topic.schema and topic.schema.is_blank and not compiled else topic.schema
+    definition = schema.encoding or "unknown" if schema else None
     return TopicFacts(topic.name, topic.type, topic.count, hash_, here, definition)
 
 

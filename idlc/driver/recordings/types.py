@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from functools import cached_property
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from idlc.diagnostics.source import Source
 from idlc.disk.library import Library
 from idlc.disk.packages import nearby
 from idlc.disk.scope import Scope
-from idlc.driver.recordings.versions import Version
+from idlc.driver.recordings.versions import Contents, Version
 from idlc.driver.stages import Compiler
 from idlc.model import derive, ir
 from idlc.model.describe import Describer
@@ -27,6 +27,7 @@ NAMED = 5
 BORROWED = "see to it that it is what was recorded, or point -I to it"
 #: Why a definition is not the recording's.
 ABSENT, UNREADABLE = "there is no definition of", "there are errors in the definition of"
+WRONG = "the recorded hash is not that of the definition of"
 
 
 class Typed(NamedTuple):
@@ -41,7 +42,8 @@ class Around:
     """The types that are known here without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
-        self.library = Library(scope.include, report, own=nearby.near(), distro=scope.distro)
+        self.near = nearby.near()
+        self.library = Library(scope.include, report, own=self.near, distro=scope.distro)
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
 
@@ -69,15 +71,16 @@ def has(model: Model, name: ir.TypeName) -> bool:
 def recorded_types(version: Version, around: Around, scope: Scope, report: Report) -> RecordedTypes:
     """Return what the topics of a version mean; reports IDL652 for what it does not define.
 
-    What is known here stands in for definitions that have errors, unless a recorded hash says that
-    something else was recorded. Then these are in `errors`.
+    What is known here stands in for definitions that have errors or another hash than the recorded
+    one, unless a recorded hash says that something else was recorded. Then these are in `errors`.
     """
     told, others = Report(), Report()
     types = RecordedTypes(version, around, scope, told)
-    broken = {name for name in types.broken if around.library.source(name) is not None}
+    broken = {**dict.fromkeys(types.wrong, WRONG), **dict.fromkeys(types.broken, UNREADABLE)}
+    broken = {name: why for name, why in broken.items() if around.library.source(name) is not None}
     if broken:
         trial = RecordedTypes(version, around, scope, others, broken)
-        if trial.may_stand_in(version.topics, broken):
+        if trial.may_stand_in(version.topics, broken.keys()):
             types, told = trial, others
     report.extend(told)
     return types
@@ -92,17 +95,19 @@ class RecordedTypes:
         around: Around,
         scope: Scope,
         report: Report,
-        broken: Container[ir.TypeName] = (),
+        broken: Mapping[ir.TypeName, str] | None = None,
     ) -> None:
         """Look the types up; reports IDL652 for what the recording does not define.
 
-        Definitions that are `broken` are none.
+        Definitions that are `broken` are none; it says why.
         """
-        self._broken = broken
+        self._broken = broken = broken or {}
+        self._around = around
+        self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
         texts = {name: one for name, one in version.texts.items() if name not in broken}
         texts |= _empty_ones(version.topics, texts, around)
         self.library = Library(
-            scope.include, Report(), own=nearby.near(), distro=scope.distro, texts=texts
+            scope.include, Report(), own=around.near, distro=scope.distro, texts=texts
         )
         self.topics = tuple(_typed(version.topics, texts, around, report))
         self._compiler = Compiler(self.library)
@@ -123,22 +128,23 @@ class RecordedTypes:
         return found
 
     def _doubts(self) -> Iterator[Diagnostic]:
-        """Yield IDL652 for definitions that are not the recording's.
+        """Yield IDL652 or IDL654 for definitions that are not the recording's.
 
         If none is there, and the recorded hash confirms the other, nothing is to be said.
         """
         doubtful: dict[tuple[str, str, bool], set[ir.TypeName]] = {}
         for one in self.topics:
-            missing = self.names_of(one) - self.texts.keys()
+            missing = {name for name in self.names_of(one) if name not in self.texts}
             sure = bool(missing) and one.recorded.topic.hash == self.hash(one)
             for name in missing:
-                why = UNREADABLE if name in self._broken else ABSENT
-                if why == UNREADABLE or not sure:
+                why = self._broken.get(name, ABSENT)
+                if why != ABSENT or not sure:
                     doubtful.setdefault((one.recorded.recording, why, sure), set()).add(name)
         for (recording, why, sure), found in doubtful.items():
             names = first_few((f"`{name}`" for name in sorted(found)), NAMED)
             which = "has the recorded hash and" if sure else "by that name"
-            yield codes.MISSING_DEFINITION.of(
+            code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
+            yield code.of(
                 recording,
                 f"{why} {names}; what is known here {which} is used",
                 hint=None if sure else BORROWED,
@@ -146,7 +152,10 @@ class RecordedTypes:
 
     def names_of(self, topic: Typed) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of."""
-        return _explicit([topic.interface], self.interfaces)
+        name = topic.interface
+        if name not in self._names:
+            self._names[name] = _explicit([name], self.interfaces)
+        return self._names[name]
 
     @property
     def models(self) -> dict[str, Model]:
@@ -184,6 +193,24 @@ class RecordedTypes:
         wrong = {one.where[0] for one in self.errors}
         return {name for name, one in self.texts.items() if one.path in wrong}
 
+    @property
+    def wrong(self) -> set[ir.TypeName]:
+        """The definitions of the recording that are others here, where the recorded hash is."""
+        contents = Contents()
+        found: set[ir.TypeName] = set()
+        seen: set[tuple[ir.TypeName, str | None]] = set()
+        for one in self.topics:
+            digest = one.recorded.topic.hash
+            if (one.name, digest) in seen or digest in (None, self.hash(one)):
+                continue
+            seen.add((one.name, digest))
+            if digest == self._around.hash(one.name, one.interface):
+                for name in self.names_of(one) & self.texts.keys():
+                    here = self._around.library.source(name)
+                    if here is None or not contents.same(name, self.texts[name], here):
+                        found.add(name)
+        return found
+
     def may_stand_in(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
         """Return whether no recorded hash says that broken definitions were others than here."""
         typed = {id(one.recorded): one for one in self.topics}
@@ -208,14 +235,15 @@ def _empty_ones(
 ) -> Iterator[tuple[ir.TypeName, Source]]:
     """Yield the messages whose definitions are empty because they are.
 
-    Their hashes say so, or where none was recorded, what is known here.
+    Their hashes say so, or where none was recorded, what is known here or their encoding.
     """
     for topic in topics:
         name, recorded = topic.interface, topic.topic.hash
         if name is None or name.kind != "msg" or name in texts:
             continue
         empty = Describer({name: ir.Message(name=name)}).hash(str(name))
-        if (recorded or around.hash(name, name)) == empty:
+        said = empty if topic.topic.schema and topic.topic.schema.is_blank else None
+        if (recorded or around.hash(name, name) or said) == empty:
             path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
             yield name, Source(path, "", topic.recording)
 

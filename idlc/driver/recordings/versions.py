@@ -15,10 +15,14 @@ from idlc.model import ir
 from idlc.model.lowering.file import lower
 from idlc.model.meaning import content
 from idlc.recordings.container import open_recording
-from idlc.recordings.definitions import Recorded, recorded
+from idlc.recordings.definitions import Known, Recorded, recorded
+from idlc.recordings.encapsulation import Unread
 from idlc.recordings.errors import RecordingError
 from idlc.recordings.find import is_there
 from idlc.syntax.parse import parse_any
+
+#: With so many versions a topic is compared.
+TRIED = 16
 
 
 class Recording(NamedTuple):
@@ -26,6 +30,7 @@ class Recording(NamedTuple):
 
     path: str
     topics: tuple[Recorded, ...]
+    unread: tuple[Unread, ...] = ()
 
 
 class Version(msgspec.Struct):
@@ -35,15 +40,20 @@ class Version(msgspec.Struct):
     texts: dict[ir.TypeName, Source]
 
 
-def read(path: str, report: Report) -> Recording | None:
-    """Return what is in a recording; report IDL651 and return `None` for one that is none."""
+def read(path: str, report: Report, *, look: bool = False) -> Recording | None:
+    """Return what is in a recording; report IDL651 and return `None` for one that is none.
+
+    With `look`, it says which topics cannot be read.
+    """
     if not is_there(path):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
         return None
     try:
         with open_recording(path) as container:
             report.notes += container.notes
-            return Recording(path, tuple(recorded(one, path) for one in container.topics))
+            known: Known = {}
+            topics = tuple(recorded(one, path, known) for one in container.topics)
+            return Recording(path, topics, tuple(container.unread()) if look else ())
     except RecordingError as error:
         report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
         return None
@@ -76,27 +86,30 @@ def versions(topics: Iterable[Recorded]) -> list[Version]:
     What differs in comments only is no other definition.
     """
     found: list[Version] = []
-    contents = _Contents()
+    contents = Contents()
+    placed: dict[int, Version] = {}  # topics of one definition share their texts
     for one in topics:
-        for version in found:
-            if contents.agree(one.texts, version.texts):
-                break
-        else:
-            version = Version([], {})
-            found.append(version)
-        version.topics.append(one)
-        if not one.texts.keys() <= version.texts.keys():
-            version.texts = {**one.texts, **version.texts}
+        if id(one.texts) not in placed:
+            # real recordings have few versions; of many, not all are tried
+            some = (each for each in found[-TRIED:] if contents.agree(one.texts, each.texts))
+            version = next(some, None) or Version([], {})
+            if not version.topics:
+                found.append(version)
+            for name, source in one.texts.items():
+                version.texts.setdefault(name, source)
+            placed[id(one.texts)] = version
+        placed[id(one.texts)].topics.append(one)
     return found
 
 
 def contradictions(found: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Source, Source]]:
     """Yield each name that has several definitions, with the first two of them."""
-    contents = _Contents()
+    contents = Contents()
     seen: dict[ir.TypeName, Source] = {}
     told: set[ir.TypeName] = set()
     for version in found:
-        repeated = (pair for topic in version.topics for pair in topic.repeated)
+        every = {id(topic.repeated): topic.repeated for topic in version.topics}
+        repeated = (pair for pairs in every.values() for pair in pairs)
         for name, source in (*version.texts.items(), *repeated):
             first = seen.setdefault(name, source)
             if name not in told and not contents.same(name, first, source):
@@ -104,7 +117,7 @@ def contradictions(found: Sequence[Version]) -> Iterator[tuple[ir.TypeName, Sour
                 yield name, first, source
 
 
-class _Contents:
+class Contents:
     """Compares definitions by what they mean without comments; each is read once."""
 
     def __init__(self) -> None:
@@ -114,7 +127,9 @@ class _Contents:
         self, some: Mapping[ir.TypeName, Source], others: Mapping[ir.TypeName, Source]
     ) -> bool:
         """Return whether no name has different definitions in both."""
-        return all(self.same(name, some[name], others[name]) for name in some.keys() & others)
+        return all(
+            self.same(name, one, others[name]) for name, one in some.items() if name in others
+        )
 
     def same(self, name: ir.TypeName, one: Source, other: Source) -> bool:
         """Return whether two definitions mean the same."""

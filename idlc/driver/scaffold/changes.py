@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from idlc.checks.package.long_lines import wrapped
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.disk.cache import templates as template_cache
@@ -16,6 +17,7 @@ from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
 from idlc.disk.settings import pyproject, user_templates
 from idlc.driver.stages import stage
+from idlc.model import ir
 from idlc.scaffold.edits.outcome import Edited, Outcome
 from idlc.scaffold.template_problems import BrokenTemplateError
 from idlc.scaffold.templates import ENDING, Templates, folders
@@ -86,11 +88,17 @@ def library_around(package: str, project: Project, settings: Settings, report: R
     return Library(settings.include, report, own=own, distro=distro)
 
 
-def generation(project: Project, own: str) -> tuple[str, ...]:
+def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...]:
     """Return the words of the command that compiles the package's interfaces."""
+    included = (word for folder in settings.include for word in ("-I", folder))
     if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
-        return ("gen",)
-    return ("gen", project.name, "-o", project.shown(own))
+        return ("gen", *included)
+    return ("gen", project.name, "-o", project.shown(own), *included)
+
+
+def keys_of(project: Project) -> set[str]:
+    """Return the interfaces of a package as `kind/Name.kind`."""
+    return {f"{k}/{name}" for k in ir.KINDS for name in project.names(k) if name.endswith(f".{k}")}
 
 
 def accepted(
@@ -101,6 +109,8 @@ def accepted(
     for path, outcome in edits.items():
         if isinstance(outcome, Edited):
             edited[path] = outcome.text
+            if path == "setup.py":
+                edited[path] = wrapped(project.text(path) or "", outcome.text)
             continue
         shown_path = project.shown(path)
         report.add(

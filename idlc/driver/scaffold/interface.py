@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.disk.output.project import Project
+from idlc.disk.packages.facts import folders
 from idlc.driver.scaffold.changes import (
     Result,
     Settings,
     accepted,
     find_package,
     generation,
+    keys_of,
     library_around,
     rendering,
     templates,
@@ -51,14 +53,14 @@ def interface(
         added |= _test_of_interfaces(project, own, used)
     read = {one: project.text(one) for one in (CMAKE, MANIFEST, SETUP)}
     texts = {one: text for one, text in read.items() if text is not None}
-    keys = {f"{one}/{f}" for one in ir.KINDS for f in project.names(one) if f.endswith(one)}
-    edits = enter_interface.enter(model, texts, {*keys, path}, tested=len(added) > 1)
+    keys, there = {*keys_of(project), path}, folders(project.path)
+    edits = enter_interface.enter(model, texts, keys, there, tested=len(added) > 1)
     edited = accepted(project, edits, report)
     if edited is None:
         return None
-    edited |= enter_interface.index(model, texts, {*keys, path})
+    edited |= enter_interface.index(model, texts, keys)
     result = write(project, added, edited, settings, report)
-    after = () if CMAKE in texts else generation(project, own)
+    after = () if CMAKE in texts else generation(project, own, settings)
     return result and result._replace(following=after)
 
 

@@ -6,12 +6,14 @@ from idlc.diagnostics.report import Report
 from idlc.disk.machine.distribution import distribution
 from idlc.disk.machine.environment import python_folders
 from idlc.disk.output.project import Project
+from idlc.disk.packages.facts import folders
 from idlc.driver.scaffold.changes import (
     Result,
     Settings,
     accepted,
     find_package,
     generation,
+    keys_of,
     library_around,
     rendering,
     templates,
@@ -48,7 +50,7 @@ def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None
         return None
     missing = not project.has(f"{own}/_idlc")
     compiled = any(one.interface and one.interface.name.package == own for one in planned.endpoints)
-    after = generation(project, own) if missing and compiled else ()
+    after = generation(project, own, settings) if missing and compiled else ()
     notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
     return result._replace(notes=(*notes, *_absent(planned)), following=after)
 
@@ -87,8 +89,8 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
         compile(text, path, "exec", dont_inherit=True)
     read = {path: project.text(path) for path in enter_node.paths(own, project.names("launch"))}
     texts = {path: text for path, text in read.items() if text is not None}
-    has_interfaces = any(map(project.names, ir.KINDS))
-    entry = enter_node.enter(planned, texts, files, used, has_interfaces=has_interfaces)
+    keys, there = keys_of(project), folders(project.path)
+    entry = enter_node.enter(planned, texts, files, used, keys=keys, folders=there)
     if launch:
         entry = enter_node.launch(planned, texts, entry, used)
     return entry._replace(added={**files, **entry.added})

@@ -130,9 +130,9 @@ class Tables:
         expression = f'_idlc.sequence_copier(order, "{step.code}")'
         return self.define(f"bytes_of_{step.numpy}", expression, expression)
 
-    def sequence_reader(self, step: wire_plan.Numbers) -> str:
+    def sequence_reader(self, step: wire_plan.Numbers, reading: str) -> str:
         """Return the function that turns a buffer into a sequence of numbers."""
-        expression = f'_idlc.sequence_reader(order, "{step.code}", reading)'
+        expression = f'_idlc.sequence_reader(order, "{step.code}", {reading})'
         return self.define(f"read_{step.numpy}", expression, expression)
 
     def texts_writer(self, step: wire_plan.Texts) -> str:

@@ -9,7 +9,7 @@ afterwards, by the runtime.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from idlc.emit.codec import wire_plan
 from idlc.emit.codec.alignment import multiple_of
@@ -38,14 +38,16 @@ def decode(
     tables: Tables,
     own: str,
     makers: dict[ir.TypeName, str],
+    foreign: Mapping[ir.TypeName, str],
     *,
     bulk: bool,
 ) -> tuple[Statement, ...]:
     """Return the statements that read a message; what they use is defined in `tables`.
 
-    `own` and `makers` name the functions that make empty objects; `bulk` is what `is_bulk` says.
+    `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
+    packages; `bulk` is what `is_bulk` says.
     """
-    decoder = _Decoder(tables, makers, "view" if bulk else "data")
+    decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
     for step in steps:
         decoder.step(step)
@@ -62,9 +64,16 @@ def decode(
 class _Decoder(Running):
     """Emits a message's steps; `makers` name the functions that make empty objects."""
 
-    def __init__(self, tables: Tables, makers: dict[ir.TypeName, str], source: str) -> None:
+    def __init__(
+        self,
+        tables: Tables,
+        makers: dict[ir.TypeName, str],
+        foreign: Mapping[ir.TypeName, str],
+        source: str,
+    ) -> None:
         super().__init__(tables, source)
         self.makers = makers
+        self.foreign = foreign
         self.looping = False
 
     def step(self, step: wire_plan.Step) -> None:
@@ -139,7 +148,9 @@ class _Decoder(Running):
     def numbers(self, step: wire_plan.Numbers) -> None:
         """Read a numeric sequence as one buffer."""
         raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
-        self.line(call(self.tables.sequence_reader(step), raw), step.place.text)
+        kind = self.foreign.get(step.place.type)
+        reading = f"reading.of({kind})" if kind else "reading"
+        self.line(call(self.tables.sequence_reader(step, reading), raw), step.place.text)
 
     def block(self, step: wire_plan.Block) -> None:
         """Read a large array of fixed size as one buffer."""

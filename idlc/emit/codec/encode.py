@@ -9,6 +9,8 @@ remainder in `low`) only where somebody reads it.
 
 from __future__ import annotations
 
+import msgspec
+
 from idlc.emit.codec import statements, wire_plan
 from idlc.emit.codec.alignment import Alignment, multiple_of
 from idlc.emit.codec.constants import Tables
@@ -270,10 +272,10 @@ def inlined(step: wire_plan.Items) -> list[wire_plan.Step]:
             case wire_plan.Enter(place):
                 paths[place.local] = f"{paths[place.owner]}.{place.slot}"
             case wire_plan.Number(place, letter, size):
-                moved = wire_plan.Place(paths[place.owner], place.slot, place.local)
+                moved = msgspec.structs.replace(place, owner=paths[place.owner])
                 found.append(wire_plan.Number(moved, letter, size))
             case wire_plan.Block(place, primitive, count):
-                moved = wire_plan.Place(paths[place.owner], place.slot, place.local)
+                moved = msgspec.structs.replace(place, owner=paths[place.owner])
                 found.append(wire_plan.Block(moved, primitive, count))
             case _:
                 found.append(part)

@@ -18,11 +18,12 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a value lives: a slot of the object in a local variable."""
+    """Where a value lives: a slot of the object in a local variable, of the structure `type`."""
 
     owner: str
     slot: str
     local: str
+    type: ir.TypeName
 
     @property
     def text(self) -> str:
@@ -168,7 +169,7 @@ def _steps(
     found: list[Step] = []
     for field in message.fields:
         inner = (*path, field.name)
-        place = Place(owner, pynames.slot(field.name), names.shortest(inner))
+        place = Place(owner, pynames.slot(field.name), names.shortest(inner), message.name)
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
             found.append(Enter(place, field.type.target, not nested.fields))

@@ -123,7 +123,7 @@ def _items(typed: Typed, world: World) -> Iterator[Item]:
         yield from _types(typed, words[0] if words else "", world)
     elif "=" in code and re.fullmatch(r"\S+\s+[A-Z]\w*\s*=.*", code.lstrip()):
         word = code.partition("=")[2].lstrip()
-        if "<=" not in words[0] or "=" in words[-1]:
+        if "[" not in words[0] and ("<=" not in words[0] or "=" in words[-1]):
             yield from _values(typed, words[0], word, "")
     elif len(words) == 1 or (len(words) == 2 and not code.endswith((" ", "\t"))):
         yield from _names(typed, words[0], words[1] if len(words) == 2 else "")

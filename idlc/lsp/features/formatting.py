@@ -10,7 +10,7 @@ from idlc.lsp.world import World
 
 
 def document(world: World, asked: OfDocument) -> list[TextEdit]:
-    """Return the edits that lay a document out; none where it has errors."""
+    """Return the edits that lay a document out; none where it has syntax errors."""
     known = world.known(asked.text_document.uri)
     if known is None:
         return []

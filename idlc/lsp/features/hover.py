@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from idlc.driver.workspace import State
@@ -12,7 +13,7 @@ from idlc.lsp.protocol.parts import AtPosition, Markup, Part, Range
 from idlc.lsp.world import World, is_built_in
 from idlc.model import derive, ir
 from idlc.model.link import Model
-from idlc.model.spelling import spell, spell_value
+from idlc.model.spelling import is_range, spell, spell_value
 
 #: Lines of a message that are shown.
 MOST_LINES = 40
@@ -62,8 +63,9 @@ def _definition(element: Element, interface: ir.Interface, state: State) -> Iter
         default = f" {spell_value(one.default.value)}" if one.default else ""
         yield code([f"{spell(one.type)} {one.name}{default}"])
     yield prose(one.comment)
-    facts = [f"unit: `{one.unit}`"] if one.unit else []
-    facts += _range(one.type)
+    says_range = one.unit is not None and is_range(one.unit)
+    facts = [f"{'range' if says_range else 'unit'}: `{one.unit}`"] if one.unit else []
+    facts += _limits(one.type, has_range=says_range)
     if isinstance(one, ir.Field):
         facts += [f"default: `{spell_value(one.default.value)}`"] if one.default else []
         placed = placed_fields(element.message, interface, state)
@@ -71,11 +73,11 @@ def _definition(element: Element, interface: ir.Interface, state: State) -> Iter
     yield "  \n".join(facts)
 
 
-def _range(type_: ir.FieldType) -> list[str]:
+def _limits(type_: ir.FieldType, *, has_range: bool) -> list[str]:
     """Return which values a type has, where that is not all of a float or text."""
     facts = []
     element = ir.element_of(type_)
-    if isinstance(element, ir.Primitive) and element.info.low is not None:
+    if isinstance(element, ir.Primitive) and element.info.low is not None and not has_range:
         facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
     if isinstance(element, ir.String) and element.bound is not None:
         facts.append(f"length: at most {element.bound} characters")
@@ -136,14 +138,33 @@ def code(lines: list[str]) -> str:
 
 def _runs(text: str) -> Iterator[str]:
     """Yield each run of backticks."""
-    import re
-
     return iter(re.findall("`+", text))
 
 
-def prose(lines: tuple[str, ...]) -> str:
-    """Return a comment as it was written, as text that is no Markdown."""
-    import re
+#: What begins a heading, list, quotation, table, rule, or fenced code at the start of a line.
+_BLOCK = r"^\s*(?:[#>+=~|:*_-]|\d+(?=[.)]))"
+#: Text in backticks, which is code in Markdown as in comments.
+_CODE = r"(?<!`)`[^`]+`(?!`)"
+#: What Markdown may take for something else than text: the beginning of a span suffices.
+_MARKS = (
+    r"\\(?=[!-/:-@\[-`{-~])|\\$|`|<(?=[\w/!?])|&(?=[\w#])|\](?=[(\[:])"
+    r"|(?<![^\W_])_+(?=\S)|[*~]+(?=\S)"
+)
 
-    escaped = (re.sub(r"([\\`*_{}\[\]<>()#+\-.!|~])", r"\\\1", line) for line in lines)
-    return "  \n".join(escaped)
+
+def prose(lines: tuple[str, ...]) -> str:
+    """Return a comment as it was written, as Markdown that shows it so.
+
+    Only what Markdown would take for something else is escaped, as some editors show each escape.
+    """
+    escape = re.compile(rf"{_CODE}|{_BLOCK}|{_MARKS}")
+    return "  \n".join(escape.sub(_escaped, line) for line in lines)
+
+
+def _escaped(match: re.Match[str]) -> str:
+    text = match[0]
+    if text.startswith("`") and len(text) > 1:
+        return text
+    blanks = text[: len(text) - len(text.lstrip())]
+    mark = text.lstrip()
+    return blanks + (f"{mark}\\" if mark.isdigit() else "".join(f"\\{one}" for one in mark))

@@ -96,10 +96,17 @@ def _what_breaks(known: Known, world: World) -> str:
     if earlier is None or project is None:
         return ""
     world.follow_git(project.folder, earlier.repository)
-    before = project.workspace.before(world.settings.against).get(interface.name.package)
+    side = project.workspace.before(world.settings.against)
+    before = side.models.get(interface.name.package)
     after = known.state.model_of(interface)
-    if before is None or after is None or interface.name not in before.interfaces:
-        return f"nothing to compare with in {earlier.name}" if after else ""
+    if after is None:
+        return ""
+    if interface.name in side.broken:
+        return f"not compared: there are errors in {earlier.name}"
+    if side.error and not side.models:
+        return f"not compared: {side.error}"
+    if before is None or interface.name not in {one.name for one in before.own}:
+        return f"nothing to compare with in {earlier.name}"
     name = {interface.name}
     changes = compare(before.only(name), after.only(name)).changes
     broken = {level for change in earlier.not_allowed(changes) for level in change.levels}

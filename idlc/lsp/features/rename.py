@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import msgspec
@@ -11,22 +11,31 @@ import msgspec
 from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.packages import called, compare
 from idlc.diagnostics.edits import apply
+from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Edit, Report, first_few
 from idlc.diagnostics.source import Span
 from idlc.disk.read import is_file
-from idlc.driver.workspace import State
+from idlc.lsp.edits import document_edit, of_documents
 from idlc.lsp.elements import Element, spot
 from idlc.lsp.features.navigation import mentions
 from idlc.lsp.protocol import uris
 from idlc.lsp.protocol.errors import REQUEST_FAILED, RequestError
 from idlc.lsp.protocol.parts import AskedFileRenames, AskedRename, AtPosition, Part, Range, TextEdit
-from idlc.lsp.users import users
-from idlc.lsp.world import Known, World
+from idlc.lsp.users import users, uses
+from idlc.lsp.world import Known, Renaming, World
 from idlc.model import ir, names
 
+#: The file that lists the interface files of a package.
+BUILD = "CMakeLists.txt"
+#: Letters of the longest name that a file can have on usual disks.
+LONGEST_NAME = 255
 #: Users that a warning names.
 NAMED = 5
 _ANNOTATION = "idlc.rename"
+_CANNOT_MOVE = (
+    "a message is renamed with its file, and this editor does not rename files for a server; "
+    "Emacs does with idlc.el, as docs/editors.md says"
+)
 
 
 class Renamed(Part, frozen=True):
@@ -36,15 +45,23 @@ class Renamed(Part, frozen=True):
     placeholder: str
 
 
-class FileEdits(msgspec.Struct):
-    """Edits by URI, and what is renamed after them."""
+class Annotated(TextEdit, frozen=True):
+    """An edit that the user is asked about."""
 
-    edits: dict[str, list[TextEdit]]
-    moves: list[tuple[str, str]] = []
+    annotation_id: str
+
+
+class Move(Part, frozen=True, tag="rename", tag_field="kind"):
+    """A file that gets another name, as an operation of a workspace edit."""
+
+    old_uri: str
+    new_uri: str
+    annotation_id: str | None = None
 
 
 def prepare(world: World, asked: AtPosition) -> Renamed | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
+    world.notice_rename()
     known = world.known(asked.text_document.uri)
     found = spot(world, known, asked.position) if known else None
     if known is None or found is None:
@@ -74,8 +91,9 @@ def _home(name: ir.TypeName, world: World) -> Known | None:
     return None
 
 
-def rename(world: World, asked: AskedRename) -> dict[str, object]:
+def rename(world: World, asked: AskedRename) -> dict[str, object] | None:
     """Return the edits that rename what stands at a position, and say what they break."""
+    world.projects.forget()
     known = world.known(asked.text_document.uri)
     found = spot(world, known, asked.position) if known else None
     if known is None or found is None or prepare(world, asked) is None:
@@ -84,7 +102,7 @@ def rename(world: World, asked: AskedRename) -> dict[str, object]:
         target = found.element.target
         home = _home(target, world) if target else None
         assert home is not None
-        return _rename_interface(home, asked.new_name, world)
+        return _rename_interface(home, asked, known, world)
     return _rename_definition(found.element, known, asked.new_name, world)
 
 
@@ -99,76 +117,121 @@ def _rename_definition(element: Element, known: Known, new: str, world: World) -
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, known)]
     uri = world.uri(known.state.path_of(known.source))
-    found = FileEdits({uri: [TextEdit(world.range(one.span), one.text) for one in edits]})
+    changed = {uri: [TextEdit(world.range(one.span), one.text) for one in edits]}
     changes = _changes(known, apply(known.source.text, edits)[0], world)
-    old = element.body.name.text
-    return _answer(found, f"Rename {old} to {new}", changes, known.interface.name, world)
+    title = f"Rename {element.body.name.text} to {new}"
+    return _answer(changed, None, title, changes, known, world)
 
 
-def _changes(known: Known, text: str, world: World) -> Iterable[Change]:
-    """Return what another text for a file breaks, where both versions are sound."""
+def _changes(known: Known, text: str, world: World) -> Iterable[Change] | None:
+    """Return what another text for a file breaks, `None` if one of the versions has errors."""
     path = known.state.path_of(known.source)
     project = world.projects.of(path)
     after = project.workspace.state_with(path, text) if project else None
     interface = after.interfaces[path][0] if after and path in after.interfaces else None
     if after is None or interface is None:
-        return ()
+        return None
     old, new = known.state.model_of(known.interface), after.model_of(interface)
     name = {interface.name}
-    return compare(old.only(name), new.only(name)).changes if old and new else ()
+    return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
-def _rename_interface(home: Known, new: str, world: World) -> dict[str, object]:
+def _rename_interface(
+    home: Known, asked: AskedRename, asking: Known, world: World
+) -> dict[str, object] | None:
     """Return the edits for another name of a message, with the renaming of its file."""
-    old = home.interface.name
+    old, new = home.interface.name, asked.new_name
     path = home.state.path_of(home.source)
-    target = path.with_name(f"{new}.{old.kind}")
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
-    if new != old.name and (is_file(target) or world.documents.at(target)):
+    target = path.with_name(f"{new}.{old.kind}")
+    if len(target.name) > LONGEST_NAME:
+        raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
+    if new == old.name:
+        return None
+    if is_file(target) or world.documents.at(target):
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
-    if not world.supports("workspace", "workspaceEdit", "documentChanges"):
-        raise RequestError(REQUEST_FAILED, "this editor cannot rename files")
-    found = FileEdits(_edits_of_users(old, new, path, world))
-    found.moves.append((world.uri(path), uris.from_path(target)))
+    if not is_file(path):
+        raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
+    if not world.supports("workspace", "workspaceEdit", "resourceOperations", "rename"):
+        raise RequestError(REQUEST_FAILED, _CANNOT_MOVE)
+    report = Report()
+    edits = _edits_of_users(old, new, path, report, world)
+    if problem := next(iter(report), None):
+        raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
+    uri = asked.text_document.uri
+    here = world.path(uri)
+    spans = (_last(one) for state, one in users(old, world) if state.path_of(one.source) == here)
+    own = dict.fromkeys(Edit(Span(asking.source, one.start, one.end), new) for one in spans)
+    world.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
+    move = Move(world.uri(path), uris.from_path(target))
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
-    title = f"Rename {old.name} to {new}"
-    return _answer(found, title, [called(home.interface, renamed)], old, world)
+    changes = [called(home.interface, renamed)]
+    return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, world)
 
 
 def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
-    """Return the edits that follow from interface files getting other names."""
+    """Return the edits that follow from interface files getting other names.
+
+    Some clients also ask this about a file that an answer of `rename` has them move. Documents
+    that are open have the edits of that answer by then. What else it edits may be in buffers that
+    the client does not tell of, so it is not edited again.
+    """
+    world.projects.forget()
     edits: dict[str, list[TextEdit]] = {}
+    report = Report()
     for one in asked.files:
         old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
         known = world.known(one.old_uri)
-        if old and new and known and old.parent == new.parent and old.suffix == new.suffix:
-            name = known.interface.name
-            for uri, some in _edits_of_users(name, new.stem, old, world).items():
+        if not (old and new and known and _is_other_name(old, new)):
+            continue
+        is_own = world.renaming is not None and _is_under_way(world.renaming, old, new, world)
+        found = _edits_of_users(known.interface.name, new.stem, old, report, world)
+        for uri, some in found.items():
+            if not is_own or world.documents.get(uri):
                 edits.setdefault(uri, []).extend(some)
-    return _document_changes(FileEdits(edits), None, world) if edits else None
+    for problem in report:
+        world.tell(
+            "window/showMessage", {"type": 2, "message": f"{BUILD} is left: {problem.message}"}
+        )
+    return of_documents(edits, world) if edits else None
+
+
+def _is_other_name(old: Path, new: Path) -> bool:
+    """Return whether a file gets another name by which an interface can be called."""
+    is_valid = names.is_message_name(new.stem)
+    return is_valid and old.parent == new.parent and old.suffix == new.suffix
+
+
+def _is_under_way(renaming: Renaming, old: Path, new: Path, world: World) -> bool:
+    """Return whether the client makes the edits of an answer, and now moves this file for it."""
+    if (renaming.old, renaming.new) != (old, new):
+        return False
+    known = world.known(renaming.uri)
+    return known is not None and known.source.text == renaming.text
 
 
 def _edits_of_users(
-    old: ir.TypeName, new: str, path: Path, world: World
+    old: ir.TypeName, new: str, path: Path, report: Report, world: World
 ) -> dict[str, list[TextEdit]]:
     """Return the edits of all files that name an interface: its users, and CMakeLists.txt."""
-    edits: dict[str, list[TextEdit]] = {}
+    edits: dict[str, dict[TextEdit, None]] = {}  # two folders may hold the same file
     for state, span in users(old, world):
         uri = world.uri(state.path_of(span.source))
-        edits.setdefault(uri, []).append(TextEdit(world.range(_last(span)), new))
-    for span in _in_cmake(old, path, world):
+        edits.setdefault(uri, {})[TextEdit(world.range(_last(span)), new)] = None
+    for span in _in_cmake(old, path, report, world):
         uri = world.uri(Path(span.source.path))
-        edits.setdefault(uri, []).append(TextEdit(world.range(span), new))
-    return edits
+        edits.setdefault(uri, {})[TextEdit(world.range(span), new)] = None
+    return {uri: list(some) for uri, some in edits.items()}
 
 
-def _in_cmake(name: ir.TypeName, path: Path, world: World) -> Iterator[Span]:
+def _in_cmake(name: ir.TypeName, path: Path, report: Report, world: World) -> Iterator[Span]:
     """Yield where CMakeLists.txt of a package names an interface file."""
-    cmake = path.parent.parent / "CMakeLists.txt"
-    if not is_file(cmake):
+    cmake = path.parent.parent / BUILD
+    unsaved = world.documents.unsaved()
+    if not unsaved.is_file(cmake):
         return
-    source = world.documents.unsaved().read_source(cmake, str(cmake), Report())
+    source = unsaved.read_source(cmake, str(cmake), report)
     pattern = rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?!\w)"
     for match in re.finditer(pattern, source.text) if source else ():
         assert source is not None
@@ -176,41 +239,55 @@ def _in_cmake(name: ir.TypeName, path: Path, world: World) -> Iterator[Span]:
 
 
 def _answer(
-    found: FileEdits, title: str, changes: Iterable[Change], name: ir.TypeName, world: World
+    edits: Mapping[str, list[TextEdit]],
+    move: Move | None,
+    title: str,
+    changes: Iterable[Change] | None,
+    known: Known,
+    world: World,
 ) -> dict[str, object]:
     """Return the edits, which say what they break before anybody makes them."""
+    what, is_broken = _what_breaks(changes, known, world)
+    support = ("workspace", "workspaceEdit")
+    if not (
+        world.supports(*support, "changeAnnotationSupport")
+        and world.supports(*support, "documentChanges")
+    ):
+        world.tell("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
+        if move is None:
+            return of_documents(edits, world)
+        return {"documentChanges": [*(document_edit(*one, world) for one in edits.items()), move]}
+    marked = (
+        document_edit(uri, (Annotated(e.range, e.new_text, _ANNOTATION) for e in some), world)
+        for uri, some in edits.items()
+    )
+    moves = [msgspec.structs.replace(move, annotation_id=_ANNOTATION)] if move else []
+    note = {"label": title, "description": what, "needsConfirmation": is_broken}
+    return {"documentChanges": [*marked, *moves], "changeAnnotations": {_ANNOTATION: note}}
+
+
+def _what_breaks(changes: Iterable[Change] | None, known: Known, world: World) -> tuple[str, bool]:
+    """Return what a rename breaks, in words, and whether it breaks something."""
+    if changes is None:
+        return "there are errors, so idlc cannot say what this breaks", True
     broken = {level for one in changes for level in one.levels}
     levels = ", ".join(level for level in LEVELS if level in broken)
-    used = sorted({_holder(state, span) for state, span in users(name, world)})
-    what = f"breaks {levels} for whoever uses `{name}`" if levels else "breaks nothing that is sent"
-    what += f": {first_few(used, NAMED)}" if used and levels else ""
-    support = ("workspace", "workspaceEdit", "changeAnnotationSupport")
-    if not (world.supports(*support) and world.supports(*support[:2], "documentChanges")):
-        world.tell("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
-        return _document_changes(found, None, world)
-    note = {"label": title, "description": what, "needsConfirmation": bool(levels)}
-    return _document_changes(found, note, world)
-
-
-def _holder(state: State, span: Span) -> str:
-    """Return the name of the interface in whose file a span is."""
-    return str(state.interfaces[state.path_of(span.source)][0].name)
-
-
-def _document_changes(
-    found: FileEdits, note: dict[str, object] | None, world: World
-) -> dict[str, object]:
-    from idlc.lsp.edits import document_edit, of_documents
-
-    if note is None and not found.moves:
-        return of_documents(found.edits, world)
-    mark = {"annotationId": _ANNOTATION} if note else {}
-    changes = [
-        document_edit(uri, ({"range": e.range, "newText": e.new_text, **mark} for e in some), world)
-        for uri, some in found.edits.items()
-    ]
-    changes += [
-        {"kind": "rename", "oldUri": old, "newUri": new, **mark} for old, new in found.moves
-    ]
-    annotations = {"changeAnnotations": {_ANNOTATION: note}} if note else {}
-    return {"documentChanges": changes, **annotations}
+    if not levels:
+        return "breaks nothing that is sent", False
+    name = known.interface.name
+    holders: dict[ir.TypeName, set[ir.TypeName]] = {}
+    for state, span, target in uses(world):
+        holder = state.interfaces[state.path_of(span.source)][0].name
+        holders.setdefault(target, set()).add(holder)
+    direct = sorted(map(str, holders.get(name, ())))
+    what = f"breaks {levels} for whoever uses `{name}`"
+    what += f": {first_few(direct, NAMED)}" if direct else ""
+    if "hash" in broken and known.state.library.distro.has_hashes:
+        reached = {name}
+        waiting = [name]
+        while waiting:
+            new = holders.get(waiting.pop(), set()) - reached
+            reached |= new
+            waiting += new
+        what += f"; changes the type hash of {counted(len(reached), 'interface')}"
+    return what, True

@@ -13,6 +13,9 @@ from idlc.syntax.parse import parse_definition
 #: Numbers that people take for bounds.
 BOUNDS = ("1", "3", "6", "9", "16", "32", "36", "64", "128", "256", "1024")
 
+#: Elements of the longest array of which a value is offered.
+MOST_ELEMENTS = 36
+
 
 def field_name(type_: str) -> str:
     """Return what a field that holds a message is called first."""
@@ -21,10 +24,16 @@ def field_name(type_: str) -> str:
 
 def values(type_: str) -> Iterator[str]:
     """Yield values for a type as it is written; none for a message."""
-    base, bracket, _ = type_.partition("[")
+    base, bracket, length = type_.partition("[")
     base = base.partition("<=")[0]
     if bracket:
-        yield "[]"
+        size = length.removesuffix("]")
+        if base not in ir.PRIMITIVES and base not in STRINGS:
+            return
+        if not size.isdecimal():
+            yield "[]"
+        elif len(size) <= len(str(MOST_ELEMENTS)) and 0 < int(size) <= MOST_ELEMENTS:
+            yield f"[{', '.join([next(values(base))] * int(size))}]"
     elif base == "bool":
         yield from ("true", "false")
     elif base in STRINGS:

@@ -33,6 +33,7 @@ def answer(client: dict[str, Any]) -> dict[str, object]:
     }
 
 
+_INTERFACE_FILES = {"filters": [{"pattern": {"glob": "**/*.{msg,srv,action}"}}]}
 CAPABILITIES: dict[str, object] = {
     "textDocumentSync": {"openClose": True, "change": 2, "save": {"includeText": False}},
     "diagnosticProvider": {
@@ -69,9 +70,7 @@ CAPABILITIES: dict[str, object] = {
     "documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n"},
     "workspace": {
         "textDocumentContent": {"schemes": ["idlc"]},
-        "fileOperations": {
-            "willRename": {"filters": [{"pattern": {"glob": "**/*.{msg,srv,action}"}}]}
-        },
+        "fileOperations": {"willRename": _INTERFACE_FILES, "didRename": _INTERFACE_FILES},
         "workspaceFolders": {"supported": True, "changeNotifications": True},
     },
 }

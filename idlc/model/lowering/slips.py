@@ -11,6 +11,7 @@ from itertools import takewhile
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic
 from idlc.diagnostics.source import Span
+from idlc.diagnostics.suggest import closest
 from idlc.model import ir, names
 from idlc.model.lowering.fault import Fault
 from idlc.syntax import tree
@@ -56,6 +57,9 @@ _C_TYPES = {
     "unsigned short": "uint16",
 }
 _C_WORDS = ("char", "double", "int", "long", "short", "signed", "unsigned")
+#: The words of them that people misspell.
+_NUMBERS = ("boolean", "double", "float", "int", "integer", "uint")
+_ANY = ("any", "auto", "var", "variant")
 _LISTS = ("array", "deque", "list", "sequence", "set", "tuple", "vector")
 _MAPS = ("dict", "dictionary", "hashmap", "map", "object", "struct", "union", "unordered_map")
 #: What other languages put before a type.
@@ -73,18 +77,25 @@ def type_hint(name: str) -> str | None:
         return f"did you mean `{word}`?" if word != name else None
     if word in _TYPES:
         return f"did you mean `{_TYPES[word]}`?"
+    if word in _ANY:
+        return "a field has one type, which a message names: there is none for all values"
     if word in _LISTS:
         return _LIST_HINT
     if word in _MAPS:
         return "ROS 2 has no maps and no structures within messages; make a message for its fields"
     if word == "enum":
         return "ROS 2 has no enums; make a uint8 field, and a constant for each of its values"
-    return None
+    near = closest(name, (*ir.PRIMITIVES, "string", "wstring")) or closest(name, _NUMBERS)
+    return f"did you mean `{_TYPES.get(near, near)}`?" if near else None
 
 
 def dotted(name: str) -> str | None:
     """Return `package/Name` for a message's name as Python or C++ write it."""
     parts = re.split(r"::|\.", name)
+    if len(parts) > 1 and parts[-1] == "msg" and names.is_message_name(parts[-2]):
+        return "/".join((*parts[:-2][:1], parts[-2]))  # as a file is called
+    if parts[0] == "std":
+        return None
     fits = names.is_package_name(parts[0]) and names.is_message_name(parts[-1])
     return f"{parts[0]}/{parts[-1]}" if fits and parts[1:-1] in ([], ["msg"]) else None
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.suggest import did_you_mean
 from idlc.model import ir, names
 from idlc.model.lowering import slips
 from idlc.model.lowering.fault import Fault
@@ -55,7 +54,11 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
 def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
     parts = piece.text.split("/")
     if len(parts) > 2:
-        hint = f"write `{parts[0]}/{parts[-1]}`" if len(parts) == 3 else "write `package/Name`"
+        hint = (
+            f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
+            if len(parts) == 3
+            else "write `package/Name`"
+        )
         if len(parts) == 3 and parts[1] in _NO_FIELDS:
             hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
         return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
@@ -72,13 +75,12 @@ def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
 def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
     name = piece.text
     if not qualified:
-        meant = slips.type_hint(name) or did_you_mean(name, (*ir.PRIMITIVES, *STRINGS))
-        if meant:
-            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
         if dotted := slips.dotted(name):
             message = f"`{name}` cannot be a type name"
             return _fault(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
-    like = names.message_name_like(name)
+        if meant := slips.type_hint(name):
+            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
+    like = names.message_name_like(name.removesuffix(".msg"))
     hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
     return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 

@@ -24,6 +24,16 @@ def validate_field(value: Any, field: FieldInfo) -> None:
     check(value, field, field.public, wire_only=True)
 
 
+def validate_element(value: Any, field: FieldInfo) -> None:
+    """Raise ValidationError if a field, or a list in it, cannot hold a value."""
+    _element(value, field, field.public, wire_only=False)
+
+
+def validate_count(values: Any, field: FieldInfo) -> None:
+    """Raise ValidationError if a field cannot hold so many values."""
+    _count(values, field, field.public)
+
+
 def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
     for field in fields_of(name):
         place = f"{path}.{field.public}" if path else field.public
@@ -39,15 +49,19 @@ def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
 def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
     if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
         raise ValidationError(path, "a sequence", values)
+    _count(values, field, path)
+    if field.primitive is not None and _holds(values, field.primitive):
+        return
+    for index, value in enumerate(values):
+        _element(value, field, f"{path}[{index}]", wire_only)
+
+
+def _count(values: Any, field: FieldInfo, path: str) -> None:
     if field.size is not None and len(values) != field.size:
         problem = f"has {counted(len(values), 'element')}, needs {field.size}"
         raise ValidationError(path, f"{field.size} elements", values, problem)
     if field.bound is not None and len(values) > field.bound:
         _too_many(path, "element", len(values), field.bound, values)
-    if field.primitive is not None and _holds(values, field.primitive):
-        return
-    for index, value in enumerate(values):
-        _element(value, field, f"{path}[{index}]", wire_only)
 
 
 def _holds(values: Any, primitive: Primitive) -> bool:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import libcst as cst
 
-from idlc.checks.package.libraries import edits_for
+from idlc.checks.package.installation import wiring
 from idlc.diagnostics.edits import apply
 from idlc.diagnostics.source import Source
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
-from idlc.scaffold.edits.python_text import appended, constants, parsed, quoted, string
+from idlc.scaffold.edits.python_text import appended, constants, parsed, quoted
 from idlc.scaffold.edits.setup_py import setup_calls, strings
 
 WHERE = "to `data_files` in the call of setup()"
@@ -42,28 +42,15 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     return Edited(changed.code)
 
 
-def add_libraries(text: str) -> str:
-    """Return a setup.py that makes and installs libraries for C++ tools, if it can be told to."""
-    return apply(text, edits_for(Source("setup.py", text)))[0]
+def add_interfaces(
+    text: str, package: str, keys: Iterable[str], folders: Mapping[str, bool]
+) -> str:
+    """Return a setup.py that installs interfaces, their classes and libraries for C++ tools.
 
-
-def add_packages(text: str, names: Iterable[str]) -> Outcome:
-    """Return a setup.py that installs packages, where it lists those that it installs."""
-    module = parsed(text)
-    given = _given(setup_calls(module), "packages") if module else []
-    if module is None or len(given) != 1 or not isinstance(given[0], cst.List):
-        return Edited(text)
-    known = constants(module)
-    listed: cst.BaseExpression = given[0]
-    present = [string(element.value, known) for element in given[0].elements]
-    for name in names:
-        if name not in present and None not in present:
-            assert isinstance(listed, cst.List)
-            literal = quoted(name, [element.value for element in listed.elements])
-            listed = appended(listed, cst.Element(literal))
-    changed = module.deep_replace(given[0], listed)
-    assert isinstance(changed, cst.Module)
-    return Edited(changed.code)
+    What is computed in it stays; `idlc check` and the build report what is missing then.
+    """
+    problems = wiring(Source("setup.py", text), package, sorted(keys), folders)
+    return apply(text, (edit for problem in problems for edit in problem.edits))[0]
 
 
 def _given(calls: Iterable[cst.Call], keyword: str) -> list[cst.BaseExpression]:

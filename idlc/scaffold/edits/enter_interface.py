@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from idlc.emit.render import support_packages
 from idlc.model import catalog, derive
 from idlc.model.link import Model
 from idlc.scaffold import new_interface
 from idlc.scaffold.edits import cmake, data_files, package_xml
-from idlc.scaffold.edits.outcome import Outcome
+from idlc.scaffold.edits.outcome import Edited, Outcome
 
 CMAKE = "CMakeLists.txt"
 MANIFEST = "package.xml"
@@ -17,12 +16,18 @@ SETUP = "setup.py"
 
 
 def enter(
-    model: Model, texts: Mapping[str, str], keys: Iterable[str], *, tested: bool
+    model: Model,
+    texts: Mapping[str, str],
+    keys: Iterable[str],
+    folders: Mapping[str, bool],
+    *,
+    tested: bool,
 ) -> dict[str, Outcome]:
     """Return the edits of a package that has got the interfaces of a model.
 
     `texts` are those of the package's files that exist, `keys` all its interfaces as
-    `kind/Name.kind`. The package needs pytest if it is `tested`.
+    `kind/Name.kind`, `folders` those that there are by dotted name, and whether each is a Python
+    package. The package needs pytest if it is `tested`.
     """
     needed = depends(model)
     tests = ["python3-pytest"] if tested else []
@@ -33,10 +38,8 @@ def enter(
         edits[CMAKE] = cmake.add_dependencies(texts[CMAKE], needed)
         return edits
     if SETUP in texts:
-        parts = [*support_packages(), *sorted({key.partition("/")[0] for key in keys})]
-        packages = [model.package, *(f"{model.package}.{part}" for part in parts)]
-        wired = data_files.add_libraries(texts[SETUP])
-        edits[SETUP] = data_files.add_packages(wired, packages)
+        wired = data_files.add_interfaces(texts[SETUP], model.package, keys, folders)
+        edits[SETUP] = Edited(wired)
     return edits
 
 

@@ -6,6 +6,7 @@ Everything is a function of the texts of the package's files.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.scaffold import new_package, node_tests
@@ -46,18 +47,20 @@ def enter(
     files: Mapping[str, str],
     templates: Templates,
     *,
-    has_interfaces: bool = False,
+    keys: Iterable[str] = (),
+    folders: Mapping[str, bool] = MappingProxyType({}),
 ) -> Entry:
     """Return how a node, whose own files are `files`, is entered, but for the launch file.
 
-    `texts` are those of the package's files that exist. A package that `has_interfaces` installs
-    libraries for C++ tools.
+    `texts` are those of the package's files that exist. A package with interfaces,
+    whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
     described = {one: texts[one] for one in ("pyproject.toml", "setup.cfg", SETUP) if one in texts}
-    if has_interfaces and SETUP in described:
-        described[SETUP] = data_files.add_libraries(described[SETUP])
+    if (own := tuple(keys)) and SETUP in described:
+        text = described[SETUP]
+        described[SETUP] = data_files.add_interfaces(text, node.package, own, folders)
     path, outcome = console_script.add_script(described, script)
     tests = node_tests.packages(planned)
     manifest = package_xml.add(texts.get(MANIFEST, ""), depends=planned.packages, tests=tests)
@@ -73,6 +76,10 @@ def launch(planned: Plan, texts: Mapping[str, str], entry: Entry, templates: Tem
     if planned.once:
         return entry
     node = planned.node
+    manifest = entry.edits.get(MANIFEST)
+    if isinstance(manifest, Edited):  # what launch files import
+        needed = package_xml.add(manifest.text, executes=("launch", "launch_ros"))
+        entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
     started = launch_py.Started(node.package, node.name, node.lifecycle)
     path = next((one for one in texts if one.startswith("launch/")), "")
     if path:

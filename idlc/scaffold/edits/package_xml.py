@@ -5,29 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
-from idlc.checks.package.package_xml import Manifest, NotXmlError, read
+from idlc.checks.package.package_xml import DEPENDENCIES, RANK, Manifest, NotXmlError, read
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
 
 #: Tags by which a package is there when a node runs.
 AT_RUN_TIME = frozenset({"depend", "exec_depend", "run_depend"})
 AT_TEST_TIME = AT_RUN_TIME | {"test_depend"}
 GROUP = "rosidl_interface_packages"
-#: What may stand before dependencies, in the order of the schema.
-_HEAD = ("name", "version", "description", "maintainer", "license", "url", "author")
-_DEPENDENCIES = (
-    *("build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
-    *("exec_depend", "run_depend", "depend", "doc_depend", "test_depend"),
-    *("conflict", "replace", "group_depend", "member_of_group"),
-)
 
 
 def add(
-    text: str, *, depends: Sequence[str] = (), tests: Sequence[str] = (), group: bool = False
+    text: str,
+    *,
+    depends: Sequence[str] = (),
+    executes: Sequence[str] = (),
+    tests: Sequence[str] = (),
+    group: bool = False,
 ) -> Outcome:
     """Return the file with the dependencies that it lacks.
 
-    `depends` are needed to run, `tests` for testing; with `group` the package says that it has
-    interfaces.
+    `depends` are needed to build and run, `executes` to run, `tests` for testing; with `group` the
+    package says that it has interfaces.
     """
     data = text.encode("utf-8")
     manifest = _manifest(data)
@@ -40,6 +38,8 @@ def add(
     testing = own.union(manifest.texts(*AT_TEST_TIME))
     tag = "run_depend" if manifest.format == "1" else "depend"
     new = [(tag, name) for name in depends if name not in running]
+    execute = "run_depend" if manifest.format == "1" else "exec_depend"
+    new += [(execute, name) for name in executes if name not in {*running, *depends}]
     testing.update(name for _, name in new)
     new += [("test_depend", name) for name in tests if name not in testing]
     if group and manifest.format not in ("1", "2"):
@@ -66,16 +66,15 @@ def _depend(name: str, tag: str) -> str:
 def _with(data: bytes, tag: str, name: str) -> bytes:
     """Return the file with an element, on a line of its own after its like."""
     elements = read(data, "utf-8").children
-    rank = {one: at for at, one in enumerate((*_HEAD, *_DEPENDENCIES))}
     same = [element for element in elements if element.tag == tag]
-    before = same or [e for e in elements if rank.get(e.tag, 99) < rank[tag]]
+    before = same or [e for e in elements if RANK.get(e.tag, 99) < RANK[tag]]
     after = max(before, key=lambda element: element.end)
     line_start = data.rfind(b"\n", 0, after.start) + 1
     margin = data[line_start : after.start]
     if margin.strip():
         margin = b"  "
     ending = b"\r\n" if b"\r\n" in data else b"\n"
-    gap = b"" if same or after.tag in _DEPENDENCIES else ending
+    gap = b"" if same or after.tag in DEPENDENCIES else ending
     at = _line_end(data, after.end)
     return data[:at] + ending + gap + margin + _depend(name, tag).encode() + data[at:]
 

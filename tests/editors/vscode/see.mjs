@@ -4,16 +4,19 @@
  * VS Code runs as code-server, and a browser without a window shows it. All is done as people do
  * it, with keys; what was edited is saved, and read from disk.
  *
- *     node see.mjs FOLDER EXTENSION.vsix CHROMIUM
+ *     node see.mjs FOLDER EXTENSION.vsix CHROMIUM RENAMING
+ *
+ * In the workspace RENAMING, a message is renamed.
  */
 
 import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync, readdirSync, rmSync, statSync } from "node:fs";
+import { writeFileSync } from "node:fs";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { chromium } from "playwright-core";
 
-const [folder, vsix, browserPath] = process.argv.slice(2);
+const [folder, vsix, browserPath, renaming] = process.argv.slice(2);
 const out = dirname(process.env.SEEN);
 const entry = fileURLToPath(new URL("node_modules/code-server/out/node/entry.js", import.meta.url));
 const data = join(out, "data");
@@ -173,6 +176,91 @@ function marked() {
       })
       .map((word) => word.textContent)[0];
   });
+}
+
+/** Show a workspace, with one of its files open. */
+async function goTo(workspace, path) {
+  const file = encodeURIComponent(
+    JSON.stringify([["openFile", `vscode-remote://127.0.0.1:${port}${workspace}/${path}`]]),
+  );
+  await page.goto(`http://127.0.0.1:${port}/?folder=${workspace}&payload=${file}`);
+  await page.locator(".view-line").first().waitFor();
+}
+
+/** The files of the packages in which a message is renamed, as they are on disk. */
+function renamingOnDisk() {
+  const list = (name) => readdirSync(join(renaming, name), { recursive: true }).map((one) => join(name, one));
+  const isFile = (path) => statSync(join(renaming, path), { throwIfNoEntry: false })?.isFile();
+  const paths = ["base", "fleet"].flatMap(list).filter(isFile); // some are renamed meanwhile
+  return Object.fromEntries(paths.map((path) => [path, readFileSync(join(renaming, path), "utf8")]));
+}
+
+/** Save everything, and return what is on disk after some time in which nothing changes there. */
+async function settled() {
+  await keyboard.press("Control+k");
+  await keyboard.press("s");
+  let last = "";
+  let times = 0;
+  await until("rest", async () => {
+    const now = JSON.stringify(renamingOnDisk());
+    times = now === last ? times + 1 : 0;
+    last = now;
+    return times > 20;
+  });
+  return renamingOnDisk();
+}
+
+/** Ask for another name of the message in the first line; return the dialog that VS Code shows. */
+async function askForRename(newName) {
+  const box = page.locator(".rename-box input");
+  await until("box for a name", async () => {
+    await page.locator(".tab.active .monaco-icon-label").first().click();
+    await keyboard.press("Control+Home");
+    for (let column = 0; column < 6; column++) {
+      await keyboard.press("ArrowRight");
+    }
+    await keyboard.press("F2");
+    return box.waitFor({ timeout: 3000 }).then(() => true, () => false);
+  });
+  await box.fill(newName);
+  await keyboard.press("Enter");
+  const dialog = page.locator(".monaco-dialog-box", { hasText: "changes the type hash of" });
+  await dialog.waitFor();
+  return dialog;
+}
+
+/** Rename, undo and redo; return the files after each. */
+async function renameUndoRedo(newName) {
+  const dialog = await askForRename(newName);
+  await dialog.getByText("Rename", { exact: true }).click();
+  await dialog.waitFor({ state: "detached" });
+  const seenFiles = { renamed: await settled() };
+  await picture("rename-message");
+  await keyboard.press("Control+z");
+  const all = page.locator(".monaco-dialog-box").getByText(/^Undo in \d+ Files$/);
+  await all.click({ timeout: 5000 }).catch(() => undefined); // it does not always ask
+  seenFiles.undone = await settled();
+  await keyboard.press("Control+y");
+  seenFiles.redone = await settled();
+  seenFiles.dialogs = await page.locator(".monaco-dialog-box").count();
+  return seenFiles;
+}
+
+/** Rename a file in the explorer, and let the server edit what names it. */
+async function renameFile(oldName, newName) {
+  const row = page.locator(`.explorer-folders-view .monaco-list-row[aria-label^="${oldName}"]`);
+  if (!(await row.count())) {
+    for (const name of ["base", "msg"]) {
+      await page.locator(`.explorer-folders-view .monaco-list-row[aria-label^="${name}"]`).first().click();
+    }
+  }
+  await row.click();
+  await keyboard.press("F2");
+  const input = page.locator(".explorer-folders-view input");
+  await input.fill(newName);
+  await keyboard.press("Enter");
+  await page.locator(".monaco-dialog-box").getByText("OK", { exact: true }).click();
+  return settled();
 }
 
 const LOOKS = {
@@ -367,7 +455,23 @@ const LOOKS = {
     await reply("Scan");
     return until("result", () => existsSync(join(folder, "msg/Scan.msg")));
   },
+  async rename_message() {
+    await goTo(renaming, "fleet/msg/Robot.msg");
+    const closed = await renameUndoRedo("Waypoint");
+    await goTo(renaming, "base/CMakeLists.txt");
+    await goTo(renaming, "fleet/msg/Robot.msg");
+    const open = await renameUndoRedo("Pose");
+    return { closed, open };
+  },
+  async rename_file() {
+    await goTo(renaming, "fleet/msg/Robot.msg");
+    const dialog = await askForRename("Waypoint");
+    await dialog.getByText("Cancel", { exact: true }).click();
+    const renamed = await renameFile("Pose.msg", "Waypoint.msg");
+    return { renamed, back: await renameFile("Waypoint.msg", "Pose.msg") };
+  },
   async missing() {
+    await goTo(folder, "msg/Drive.msg");
     settle("Machine", { "idlc.path": "/there/is/no/idlc" });
     const told = page.locator(".notification-list-item", { hasText: "does not serve editors" });
     await told.first().waitFor();
@@ -379,11 +483,7 @@ const LOOKS = {
 
 const seen = {};
 try {
-  const file = encodeURIComponent(
-    JSON.stringify([["openFile", `vscode-remote://127.0.0.1:${port}${folder}/msg/Drive.msg`]]),
-  );
-  await page.goto(`http://127.0.0.1:${port}/?folder=${folder}&payload=${file}`);
-  await page.locator(".view-line").first().waitFor();
+  await goTo(folder, "msg/Drive.msg");
   await page.locator('.explorer-folders-view .monaco-list-row[aria-label^="msg"]').click();
   for (const [name, look] of Object.entries(LOOKS)) {
     if (process.env.LOOK && !process.env.LOOK.split(",").includes(name)) {

@@ -11,6 +11,11 @@ from ctypes import CFUNCTYPE, POINTER, c_bool, c_char, c_char_p, c_size_t, c_uin
 
 from trees import class_of
 
+from idlc.disk.machine.distribution import distribution
+from idlc.native.layouts import LAYOUTS
+
+LAYOUT = LAYOUTS.get(distribution().name, LAYOUTS["jazzy"])
+
 
 class Member(ctypes.Structure):
     _fields_ = (
@@ -25,6 +30,7 @@ class Member(ctypes.Structure):
         ("offset", c_uint32),
         ("default_value", c_void_p),
         *((name, c_void_p) for name in ("size", "get_const", "get", "fetch", "assign", "resize")),
+        *([("is_rosidl_buffer", c_bool)] if LAYOUT.member > LAYOUTS["jazzy"].member else []),
     )
 
 

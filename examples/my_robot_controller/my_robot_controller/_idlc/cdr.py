@@ -114,7 +114,7 @@ _truth = TRUTHS.__getitem__
 
 def flags(values: Any) -> bytes:
     """Return one byte per bool; of a buffer of bytes, whether each is not zero."""
-    raw = None if type(values) is list else _single_bytes(values)
+    raw = None if type(values) is list else single_bytes(values)
     if raw is None:
         return bytes(map(_truth, values) if len(values) else b"")
     return bytes(map(bool, raw))
@@ -123,7 +123,7 @@ def flags(values: Any) -> bytes:
 def octets(values: Any) -> bytes:
     """Return one byte per `bytes` of length 1, or the bytes of a buffer."""
     if type(values) is not list:
-        raw = _single_bytes(values)
+        raw = single_bytes(values)
         if raw is not None:
             return raw
     values = listed(values)
@@ -133,7 +133,7 @@ def octets(values: Any) -> bytes:
     return raw
 
 
-def _single_bytes(values: Any) -> bytes | None:
+def single_bytes(values: Any) -> bytes | None:
     """Return the content of a buffer whose elements are bytes."""
     try:
         view = memoryview(values)

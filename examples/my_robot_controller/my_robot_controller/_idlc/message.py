@@ -280,7 +280,7 @@ class Message(metaclass=MessageMeta):
         """Return how pydantic checks and writes a message."""
         from .on_demand.pydantic_schema import message_schema
 
-        return message_schema(handler(source))
+        return message_schema(cls, handler(source), handler)
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         # the two oldest protocols of pickle do not know slots; theirs can say what later ones do

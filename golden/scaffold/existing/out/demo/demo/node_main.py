@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
@@ -19,6 +20,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import get_default_context, try_shutdown
 
 Main = Callable[..., None]
+
+
+@atexit.register
+def ignore_signals() -> None:
+    """Ignore signals while Python ends: a second Ctrl-C would kill the process there."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 class WakingExecutor(SingleThreadedExecutor):

@@ -1,0 +1,109 @@
+"""What setup(**compile_interfaces(...)) installs and distributes, whatever `data_files` lists."""
+
+import sys
+import tarfile
+
+import pytest
+
+from tests.support import programs
+from tests.support.paths import ROOT
+
+pytestmark = pytest.mark.long
+
+SETUP = """\
+import os, platform, sys
+from glob import glob
+from setuptools import setup
+from idlc.build import compile_interfaces
+package_name = 'demo'
+platform.machine = lambda: {machine!r}
+compiled = compile_interfaces(package_name)
+setup(
+    **compiled,
+    name=package_name,
+    version='1.0',
+    packages=['demo'],
+    data_files={data_files},
+)
+"""
+INDEX = "share/ament_index/resource_index"
+MARKER = f"('{INDEX}/packages', ['resource/' + package_name])"
+#: How people write it.
+SHAPES = {
+    "nothing": "None",
+    "the marker alone": f"[{MARKER}]",
+    "a tuple of lists": f"([*{MARKER}], ['share/demo/msg', ('msg/Drive.msg',)])",
+    "all of it, and files of idlc 0.1": f"""[
+        {MARKER},
+        ('{INDEX}/rosidl_interfaces/', glob('resource/rosidl_interfaces/*')),
+        (os.path.join('share', package_name), ['package.xml', 'README.md']),
+        ('share//demo/./msg/', glob('msg/*.msg') + glob('resource/msg/*')),
+    ]""",
+    "a file for the prefix itself": f"[{MARKER}, 'README.md']",
+}
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Return a package that was built by another idlc before an interface was added."""
+    for path, text in {
+        "package.xml": "<package format='3'><name>demo</name><version>1.0.0</version></package>\n",
+        "README.md": "A demo.\n",
+        "resource/demo": "",
+        "resource/rosidl_interfaces/demo": "msg/Old.msg\n",
+        "resource/msg/Drive.json": "{}\n",
+        "demo/__init__.py": "",
+        "msg/Drive.msg": "wstring note\n",
+    }.items():
+        (tmp_path / "demo" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "demo" / path).write_text(text)
+    return tmp_path / "demo"
+
+
+def set_up(package, shape, machine, *words):
+    (package / "setup.py").write_text(SETUP.format(data_files=SHAPES[shape], machine=machine))
+    command = [sys.executable, "setup.py", "-q", *words]
+    return programs.run_with(*command, cwd=package, PYTHONPATH=str(ROOT), ROS_DISTRO="jazzy")
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "riscv64"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_index_says_what_is_installed(shape, machine, package, tmp_path):
+    before = {path for path in package.rglob("*") if path.is_file()}
+    prefix = tmp_path / "prefix"
+    said = set_up(package, shape, machine, "install_data", "--install-dir", str(prefix))
+    found = {
+        path.relative_to(prefix).as_posix(): path.read_text(errors="replace")
+        for path in prefix.rglob("*")
+        if path.is_file()
+    }
+    own = {path for path in found if "demo" in path} - {"share/demo/README.md"}
+    expected = {f"share/demo/msg/Drive.{ending}" for ending in ("msg", "idl", "json")}
+    expected |= {f"{INDEX}/package_run_dependencies/demo", "share/demo/package.xml"}
+    if machine == "x86_64":
+        expected |= {f"{INDEX}/{kind}/demo" for kind in ("packages", "rosidl_interfaces")}
+        expected |= {
+            f"lib/libdemo__rosidl_typesupport_{kind}cpp.so" for kind in ("", "introspection_")
+        }
+        listed = found[f"{INDEX}/rosidl_interfaces/demo"].split()
+        assert listed == ["msg/Drive.idl", "msg/Drive.msg"]
+    else:
+        assert "`demo` is not registered in the index of ROS 2" in said
+    assert own == expected
+    assert found["share/demo/msg/Drive.json"] != "{}\n"
+    assert ("README.md" in found) == (shape == "a file for the prefix itself")
+    after = {path for path in package.rglob("*") if path.is_file()}
+    new = {path.relative_to(package).as_posix() for path in after - before}
+    assert {path.partition("/")[0] for path in new} == {"build", "demo", "setup.py"}
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "riscv64"])
+def test_a_source_distribution_holds_what_data_files_lists(machine, package, tmp_path):
+    shape = "all of it, and files of idlc 0.1"
+    set_up(package, shape, machine, "install_data", "--install-dir", str(tmp_path / "prefix"),
+           "sdist", "--dist-dir", str(tmp_path / "dist"))  # fmt: skip
+    (archive,) = (tmp_path / "dist").glob("*.tar.gz")
+    with tarfile.open(archive) as sdist:
+        names = {name.partition("/")[2] for name in sdist.getnames()}
+    assert {"msg/Drive.msg", "resource/demo", "package.xml", "setup.py"} <= names
+    assert not [name for name in names if name.startswith("build")]
