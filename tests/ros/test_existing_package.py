@@ -170,6 +170,7 @@ def test_pip_installs_it(workspace, tmp_path, ros_environment, options):
     works(program, tmp_path, environment)
 
 
+@pytest.mark.jazzy  # the linters are in its environment alone
 @pytest.mark.parametrize("linter", ["ament_flake8", "ament_pep257"])
 def test_generated_modules_pass_the_tests_of_a_new_package(linter, workspace, tmp_path):
     """`ros2 pkg create` writes tests that run these on all that is in the package."""
