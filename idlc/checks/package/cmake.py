@@ -44,7 +44,7 @@ def calls(source: Source) -> Iterator[Call]:
 
 
 def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
-    """CMake is told of each package whose messages the interfaces use; rosidl stops otherwise."""
+    """CMakeLists.txt names each package whose messages are used; without it, rosidl stops."""
     if facts.cmake is None or not (facts.generates and model.own):
         return
     commands = list(calls(facts.cmake))
