@@ -45,6 +45,7 @@ _ENVIRONMENT = {
     "GIT_NO_LAZY_FETCH": "1",
     "GIT_TERMINAL_PROMPT": "0",
     "GIT_OPTIONAL_LOCKS": "0",
+    "LC_ALL": "C",
 }
 #: Variables that name a repository, as hooks of git have them: here, a path does.
 _ELSEWHERE = frozenset(
@@ -54,14 +55,20 @@ _ELSEWHERE = frozenset(
         "NAMESPACE PREFIX"
     ).split()
 )
-_HINT = (
-    "fetch it first, idlc does not: `git fetch --unshallow` completes a shallow clone, "
-    "`git fetch --refetch --no-filter` a partial one"
-)
+_SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
+_PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
+_NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
+_DAMAGED = "`git fsck` lists what is missing or damaged"
+#: How git begins the sentences that say what is wrong.
+_BAD = ("fatal: ", "error: ")
 
 
 class GitError(Exception):
-    """Git could not answer; the text says why, and `hint` is what git says to do."""
+    """Git could not answer; the text says why, and `hint` what to do.
+
+    Without one, something is missing or damaged in the repository; an empty one is for what cannot
+    be repaired there.
+    """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)
@@ -71,13 +78,15 @@ class GitError(Exception):
 class Revision(NamedTuple):
     """A revision's interface files below `root`, laid out as in the repository at `top`.
 
-    `submodules` are the paths of those that it has, of which nothing is below `root`.
+    `submodules` are the paths of those that it has, of which nothing is below `root`. `skipped` are
+    the paths that git does not check out, as in a sparse checkout.
     """
 
     name: str
     top: Path
     root: Path
     submodules: tuple[str, ...] = ()
+    skipped: frozenset[str] = frozenset()
 
     def counterpart(self, path: str) -> str | None:
         """Return where a path of the working tree is in the revision; `None` outside of it."""
@@ -109,6 +118,12 @@ class Revision(NamedTuple):
             if is_meant and not os.path.lexists(now / ".git") and not _is_empty(now):
                 yield name
 
+    def is_skipped(self, shown: str) -> bool:
+        """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
+        path = PurePath(shown.removeprefix(self._shown(self.root)[:-1]))
+        names = (one.as_posix() for one in (path, *path.parents))
+        return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
+
     def _shown(self, path: Path) -> str:
         """Return how a file of the revision is called in messages."""
         return f"git:{self.name}:{path.relative_to(self.root).as_posix()}"
@@ -123,18 +138,35 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
     with TemporaryDirectory(prefix="idlc-") as place:
         root = Path(place).resolve()
         (root / ".git").mkdir()  # what is above is not part of the repository
-        hint = None
+        hint, top = "", Path()
         try:
             top = _repository(path)
-            hint = _HINT
-            submodules = _extract(top, _commit(name, top), root)
+            hint = _NAMES
+            identity = _commit(name, top)
+            hint = _DAMAGED
+            entries = _extract(top, identity, root)
+            submodules = tuple(one.path for one in entries if one.mode == _SUBMODULE)
+            skipped = _skipped(top, entries)
         except GitError as error:
             message = f"cannot read `git:{name}`: {one_line(str(error))}"
-            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=error.hint or hint))
+            if error.hint is None and hint:
+                hint = _completing(top) or hint
+            said = hint if error.hint is None else error.hint
+            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=said or None))
             revision = None
         else:
-            revision = Revision(name, top, root, submodules)
+            revision = Revision(name, top, root, submodules, skipped)
         yield revision
+
+
+def _completing(top: Path) -> str:
+    """Return how to complete a clone that lacks things on purpose; empty for any other one."""
+    with suppress(GitError):
+        if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
+            return _SHALLOW
+        _git(top, ["config", "--get-regexp", r"^remote\..*\.promisor$", "^true$"])
+        return _PARTIAL
+    return ""
 
 
 def is_revision(name: str, path: str) -> bool:
@@ -203,7 +235,7 @@ def _program() -> str:
     for entry in map(Path, os.get_exec_path()):
         if entry.is_absolute() and os.access(entry / name, os.X_OK) and (entry / name).is_file():
             return str(entry / name)
-    raise GitError("there is no `git` on PATH")
+    raise GitError("there is no `git` on PATH", "")
 
 
 def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "") -> bytes:
@@ -230,22 +262,22 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
                     timer.cancel()
                 if len(answer) > MOST:
                     process.kill()
-                    raise GitError(f"more than {MOST >> 20} MiB of files")
+                    raise GitError(f"more than {MOST >> 20} MiB of files", "")
             said.seek(0)
             lines = list(filter(None, said.read(10_000).decode("utf-8", "replace").splitlines()))
     except (OSError, ValueError) as error:
-        raise GitError(f"git cannot be run: {reason(error)}") from None
+        raise GitError(f"git cannot be run: {reason(error)}", "") from None
     if process.returncode:
         why = otherwise or f"`git {words[0]}` ended with status {process.returncode}"
-        fatal = [line for line in lines if line.startswith("fatal: ")]
+        bad = [line[len(_BAD[0]) :] for line in lines if line.startswith(_BAD)]
         said_to_do = next((line.strip() for line in lines if line.startswith("\tgit ")), "")
         hint = f"`{one_line(said_to_do)}`" if said_to_do else None
-        raise GitError(next(iter(fatal + lines), why).removeprefix("fatal: "), hint)
+        raise GitError("; ".join(dict.fromkeys(bad)) or next(iter(lines), why), hint)
     return answer
 
 
-def _extract(top: Path, commit: str, root: Path) -> tuple[str, ...]:
-    """Write a commit's interface files, package.xml files and links; return its submodules."""
+def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
+    """Write a commit's interface files, package.xml files and links; return all its entries."""
     listed = _git(top, ["ls-tree", "-r", "-z", "--full-tree", commit])
     *lines, rest = listed.split(b"\0")
     entries = [_entry(line) for line in lines]
@@ -262,8 +294,19 @@ def _extract(top: Path, commit: str, root: Path) -> tuple[str, ...]:
                 target.write_bytes(contents[identity])
         _link(root, {path: contents[identity] for mode, identity, path in wanted if mode == _LINK})
     except (OSError, ValueError) as error:
-        raise GitError(f"its files cannot be written to `{root}`: {reason(error)}") from None
-    return tuple(one.path for one in entries if one.mode == _SUBMODULE)
+        raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
+    return entries
+
+
+def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
+    """Return what git leaves out of the working tree, if any file of a commit is not there."""
+    if all(os.path.lexists(top / one.path) for one in entries if _is_wanted(one)):
+        return frozenset()
+    *lines, rest = _git(top, ["ls-files", "-t", "-z"]).split(b"\0")
+    if rest or not all(line[1:2] == b" " for line in lines):
+        raise GitError("git's list of files is damaged")
+    found = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
+    return frozenset(found)
 
 
 def _link(root: Path, links: dict[str, bytes]) -> None:

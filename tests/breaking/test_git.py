@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import stat
 from pathlib import Path
@@ -63,11 +64,13 @@ PROGRAMS = """\
     rev-parse = touch {mark}
     ls-tree = touch {mark}
     cat-file = touch {mark}
+    ls-files = touch {mark}
     config = touch {mark}
 [alias]
     rev-parse = !touch {mark}
     ls-tree = !touch {mark}
     cat-file = !touch {mark}
+    ls-files = !touch {mark}
 [diff "x"]
     textconv = touch {mark}
     command = touch {mark}
@@ -239,6 +242,37 @@ def test_what_git_says_to_do_is_the_hint(monkeypatch, capsys):
     assert "hint: `git config --global --add safe.directory " in capsys.readouterr().out
 
 
+def test_the_hint_fits_what_is_wrong(capsys):
+    folder = changed("r")
+    for name, place, hints in (
+        ("HEAD~9", "r/p", ["git branch --all", "git tag", "git fetch"]),
+        ("-p", "r/p", ["git branch --all", "git tag", "git fetch"]),
+        ("HEAD", ".", []),
+    ):
+        assert main(["breaking", place, "--against", f"git:{name}"]) == 2
+        said = capsys.readouterr().out
+        assert re.findall("`(git .*?)`", said) == hints
+        for one in hints:
+            git(*one.split()[1:], cwd=folder)
+    blob = git("rev-parse", "HEAD:p/msg/A.msg", cwd=folder).decode().strip()
+    lost = folder / ".git/objects" / blob[:2] / blob[2:]
+    lost.chmod(stat.S_IWRITE | stat.S_IREAD)
+    lost.write_bytes(b"")
+    assert main(["breaking", "r/p", "--against", "git:HEAD"]) == 2
+    said = capsys.readouterr().out
+    assert re.findall("`(git fsck)`", said)
+    assert "fetch" not in said
+
+
+@NO_SH
+def test_git_is_quoted_without_its_marks(alone, monkeypatch, capsys):
+    changed("r")
+    lines = "warning: x\\nerror: a is empty\nfatal: a is corrupt\nerror: a is empty\n"
+    instead(monkeypatch, alone / "bin", f"printf '{lines}' >&2\nexit 1")
+    assert main(["breaking", "r/p", "--against", "git:HEAD"]) == 2
+    assert "cannot read `git:HEAD`: a is empty; a is corrupt\n" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("every", ["blob:none", "tree:0", "depth"])
 def test_what_a_clone_lacks_is_an_error_and_is_not_fetched(alone, every, capsys):
     changed("o")
@@ -252,10 +286,10 @@ def test_what_a_clone_lacks_is_an_error_and_is_not_fetched(alone, every, capsys)
     Path("gone").rename("o")
     assert main(["breaking", "c/p", "--against", "git:HEAD~1"]) == 2
     quoted = capsys.readouterr().out.split("`")
-    commands = [one for one in quoted if one.startswith("git fetch")]
+    (command,) = (one for one in quoted if one.startswith("git fetch"))
     if every != "depth" and version() < (2, 36):
         return  # which does not know the command
-    git(*commands[every != "depth"].split()[1:], cwd="c")
+    git(*command.split()[1:], cwd="c")
     assert compare(capsys, "c/p", "--against", "git:HEAD~1")[:2] == BROKEN
 
 
@@ -321,6 +355,32 @@ def test_submodules_are_said_not_to_be_compared(capsys):
         found = (status, codes, summary["not_compared"])
         assert found == (0, ["IDL520"] if expected else [], expected)
         assert compare(capsys, "r/p", "--against", "git:HEAD")[1] == []
+
+
+@pytest.mark.parametrize("cone", ["--cone", "--no-cone"])
+def test_what_a_sparse_checkout_leaves_out_is_said_not_to_be_compared(cone, capsys):
+    folder = changed("r")
+    write(folder / "p/package.xml", "<package><name>p</name></package>")
+    write(folder / "ü q/package.xml", "<package><name>q</name></package>")
+    write(folder / "ü q/msg/Left.msg", "p/A[] all\n")
+    git("add", ".", cwd=folder)
+    git("commit", "-qm", "q", cwd=folder)
+    git("sparse-checkout", "init", cone, cwd=folder)
+    git("sparse-checkout", "set", "p" if cone == "--cone" else "/p/", cwd=folder)
+    assert not (folder / "ü q").exists()
+    expected = (0, ["IDL520"], ["q/msg/Left"])
+    status, codes, summary = compare(capsys, "r", "--against", "git:HEAD")
+    assert (status, codes, summary["not_compared"]) == expected
+    (folder / "p/msg/Same.msg").unlink()  # which is removed, not left out
+    status, codes, summary = compare(capsys, "r", "--against", "git:HEAD")
+    assert (status, sorted(codes)) == (1, ["IDL501", "IDL520"])
+    write(folder / "p/msg/Same.msg", "int8 same\n")
+    for place in ("ü q", "elsewhere/q"):  # there although the index leaves it out, or moved
+        write(folder / place / "package.xml", "<package><name>q</name></package>")
+        write(folder / place / "msg/Left.msg", "p/A all\n")
+        status, codes, _ = compare(capsys, "r", "--against", "git:HEAD")
+        assert (status, codes) == (1, ["IDL507"])
+        shutil.rmtree(folder / place)
 
 
 def tree(*entries):

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 GIT = "git:"
+_CHECK_OUT = "`git sparse-checkout disable` checks out all files"
 
 
 class BreakingOptions(NamedTuple):
@@ -177,7 +178,8 @@ def _compare(
     known = {one.name for model in before.models.values() for one in model.own} | before.broken
     others = _of_others(given, known, revision) if revision else frozenset()
     submodules = tuple(revision.unknown(options.paths)) if revision else ()
-    out = before.broken | after.broken | others
+    skipped = _skipped(before, after, revision) if revision else frozenset()
+    out = before.broken | after.broken | others | skipped
     old, new = (_without(side.models, out) for side in (before, after))
     with stage("compare", options.against):
         changes = [
@@ -192,6 +194,7 @@ def _compare(
         for names, reason, hint in (
             (before.broken, f"there are errors in {options.against}", before.error),
             (elsewhere, "other git repositories hold their history", None),
+            (skipped, "this sparse checkout leaves them out", _CHECK_OUT),
         )
         if names
     )
@@ -215,6 +218,17 @@ def _of_others(
         for file in (each.file for each in one.files)
         if (name := ir.TypeName(one.package, file.kind, file.name)) not in known
         and not revision.holds(file.path)
+    )
+
+
+def _skipped(before: Side, after: Side, revision: Revision) -> frozenset[ir.TypeName]:
+    """Return the interfaces that are missing because git did not check out their files."""
+    there = {own.name for model in after.models.values() for own in model.own} | after.broken
+    return frozenset(
+        own.name
+        for model in before.models.values()
+        for own in model.own
+        if own.name not in there and own.source and revision.is_skipped(own.source.path)
     )
 
 
