@@ -11,6 +11,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.suggest import building
 from idlc.disk.find import look
 from idlc.disk.packages.enclosing import MANIFEST
+from idlc.disk.packages.facts import home_of
 from idlc.disk.packages.inputs import packages
 from idlc.disk.read import is_file, read_bytes
 from idlc.disk.scope import scope
@@ -52,7 +53,8 @@ def _compiled(package: str) -> type:
     given = packages(look((".",), Report(), where.exclude).files, where, report)
     if not given:
         return distribution_class(package, {})
-    gen(GenOptions((".",), package, scope=where, vendor_deps=settings.vendor_deps), report)
+    home = home_of(Path.cwd(), package).relative_to(Path.cwd()).as_posix()
+    gen(GenOptions((".",), home, scope=where, vendor_deps=settings.vendor_deps), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)

@@ -48,6 +48,7 @@ def distribution_class(
     index = {f"{environment.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
 
     def run_commands(self: Any) -> None:
+        getattr(self, "set_defaults", lambda: None)()  # looks for packages that nothing names
         absent = sorted({*packages}.difference(self.packages or ()))
         if absent and _BUILDS & {*self.commands}:
             raise SystemExit(_NOT_INSTALLED.format(package=package, absent=", ".join(absent)))

@@ -38,6 +38,37 @@ def test_code_stays_where_the_lock_is(capsys):
     assert "ws/bot/src/bot (unchanged)" in capsys.readouterr().out
 
 
+FIND = "from setuptools import find_packages, setup\nsetup(name='bot', "
+CFG = "[options]\npackages = find:\n[options.packages.find]\n"
+
+
+@pytest.mark.parametrize(
+    ("files", "home"),
+    [
+        ({"setup.py": FIND + "packages=find_packages('src'), package_dir={'': 'src'})"}, "src/bot"),
+        ({"setup.py": FIND + "packages=find_packages(), package_dir={'': 'a/b/'})"}, "a/b/bot"),
+        ({"setup.py": FIND + "packages=['bot'], package_dir={'bot': 'python'})"}, "python"),
+        ({"setup.py": FIND + "packages=['bot'], package_dir={'': '../out'})"}, "bot"),
+        ({"setup.py": FIND + "packages=['bot'], package_dir={'': '/out'})"}, "bot"),
+        ({"setup.py": FIND + "packages=['bot'], package_dir=computed())"}, "bot"),
+        ({"setup.py": FIND + "packages=computed(), package_dir={'': 'src'})"}, "src/bot"),
+        ({"setup.cfg": "[options]\npackages=find:\npackage_dir =\n    =src\n"}, "src/bot"),
+        ({"setup.cfg": f"{CFG}where = src\n"}, "src/bot"),
+        ({"pyproject.toml": '[tool.setuptools]\npackage-dir = {"" = "lib"}'}, "lib/bot"),
+        ({"pyproject.toml": '[tool.setuptools.packages.find]\nwhere = ["lib"]'}, "lib/bot"),
+        ({"pyproject.toml": "[tool.setuptools"}, "bot"),
+        ({"src/other/__init__.py": ""}, "src/bot"),
+    ],
+)
+def test_a_package_is_compiled_where_setup_py_takes_it_from(files, home):
+    plain = {"setup.py": "from setuptools import setup\nsetup(name='bot')\n"}
+    write_all(FILES)
+    write_all({f"ws/bot/{path}": text for path, text in {**plain, **files}.items()})
+    assert main(["gen", "ws/bot"]) == 0
+    (lock,) = Path().rglob("idlc.lock")
+    assert lock.parent.as_posix() == f"ws/bot/{home}"
+
+
 def test_other_folders_need_a_place(capsys):
     write_all({"loose/msg/A.msg": "bool a\n"})
     assert main(["gen", "loose"]) == 2

@@ -34,6 +34,7 @@ class Facts(msgspec.Struct, frozen=True):
     files are all that it has. `generates` is whether its CMakeLists.txt
     generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
     whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    `files` are the paths of interface files in the package's folder by name within the package.
     `folders` are those with files by dotted name, and whether they are Python packages.
     """
 
@@ -44,6 +45,7 @@ class Facts(msgspec.Struct, frozen=True):
     modules: Mapping[str, Source]
     setup_py: Source | None = None
     setup_cfg: Source | None = None
+    pyproject: Source | None = None
     cmake: Source | None = None
     generates: bool = False
     native: bool = False
@@ -51,6 +53,7 @@ class Facts(msgspec.Struct, frozen=True):
     whole: bool = False
     outputs: tuple[Output, ...] = ()
     known: frozenset[str] = frozenset()
+    files: Mapping[str, str] = {}
     folders: Mapping[str, bool] = {}
 
     def declared(self, *tags: str) -> dict[str, Statement]:

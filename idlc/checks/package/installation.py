@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from fnmatch import fnmatchcase
 from functools import lru_cache
@@ -16,9 +17,9 @@ from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 
 if TYPE_CHECKING:
-    import ast
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    from idlc.checks.package.python_packages import Layout
     from idlc.checks.package.setup_py import DataFiles, Setup
 
 _INDEX = "share/ament_index/resource_index"
@@ -28,8 +29,6 @@ CODES = (
     codes.NO_LIBRARY_INSTALLED,
     codes.CLASSES_NOT_INSTALLED,
 )
-_FINDERS = ("find_packages", "find_namespace_packages")
-_FIND = "find_packages(exclude=['test'])"
 
 
 @lru_cache(maxsize=16)
@@ -45,56 +44,89 @@ def _built_by_setup(facts: Facts) -> Setup | None:
     return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
 
 
-def wiring(setup: Source, package: str, keys: Sequence[str], folders: Mapping[str, bool]) -> Report:
+def wiring(
+    setup: Source,
+    package: str,
+    keys: Mapping[str, str],
+    folders: Mapping[str, bool],
+    others: tuple[Source | None, Source | None] | None = None,
+) -> Report:
     """Return what keeps a setup.py from installing interfaces and their classes.
 
-    `keys` are the interfaces as `kind/Name.kind`, `folders` those of the package by dotted name,
-    and whether each has an `__init__.py`.
+    `keys` are the interfaces as `kind/Name.kind` with their files, `folders` those of the package
+    by dotted name, and whether each has an `__init__.py`. `others` are setup.cfg and
+    pyproject.toml; without these, only what setup() is given is judged.
     """
     from idlc.checks.package.libraries import unusable_entry
+    from idlc.checks.package.python_packages import layout
 
     report = Report()
     read = _read(setup)
     report.extend(_missing_interfaces(read, package, keys))
     report.extend(unusable_entry(read, package))
-    report.extend(_missing_packages(read, package, keys, folders))
+    view = layout(read, *(others or (None, None)), folders)
+    if view and (others or "packages" in read.arguments):
+        report.extend(_missing_packages(read, view, package, keys, folders))
     return report
+
+
+def _layout(facts: Facts, setup: Setup) -> Layout | None:
+    from idlc.checks.package.python_packages import layout
+
+    return layout(setup, facts.setup_cfg, facts.pyproject, facts.folders)
 
 
 def installed(facts: Facts, model: Model, report: Report) -> None:
     """setup.py installs interfaces, their classes, and what C++ tools load."""
     setup = _built_by_setup(facts)
     if setup is not None and model.own:
-        keys = sorted(f"{one.name.kind}/{one.name.name}.{one.name.kind}" for one in model.own)
-        report.extend(wiring(setup.source, facts.name, keys, facts.folders))
-    elif setup is not None:
-        report.extend(_absent_folders(setup, facts.name, (), facts.folders))
+        names = sorted(f"{one.name.kind}/{one.name.name}.{one.name.kind}" for one in model.own)
+        keys = {name: facts.files.get(name, name) for name in names}
+        others = (facts.setup_cfg, facts.pyproject)
+        report.extend(wiring(setup.source, facts.name, keys, facts.folders, others))
+    elif setup is not None and (view := _layout(facts, setup)):
+        report.extend(_absent_folders(setup, view, facts.name, (), facts.folders))
 
 
-def _missing_interfaces(setup: Setup, package: str, keys: Sequence[str]) -> Iterator[Diagnostic]:
+def _missing_interfaces(
+    setup: Setup, package: str, keys: Mapping[str, str]
+) -> Iterator[Diagnostic]:
     """Yield the problem with interface files that `ros2 interface show` will not find."""
     entries = setup.data_files
     if entries is None:
         return
     share = f"share/{package}"
-    kinds = sorted({key.partition("/")[0] for key in keys})
-    missing = [kind for kind in kinds if _lacks(entries, f"{share}/{kind}", keys, kind)]
+    missing = [kind for kind in _kinds(keys) if _lacks(entries, f"{share}/{kind}", keys, kind)]
     index = _lacks(entries, f"{_INDEX}/rosidl_interfaces", ())
     if not missing and not index:
         return
     what = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
     what += ["the index entry of the interfaces"] if index else []
-    lines = [f"('{share}/{kind}', glob('{kind}/*.{kind}'))" for kind in missing]
+    patterns = sorted({_pattern(key, file) for key, file in keys.items()})
+    lines = [
+        f"('{share}/{kind}', glob('{one}'))"
+        for kind in missing
+        for one in patterns
+        if one.endswith(f".{kind}")
+    ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
     problem = codes.INTERFACES_NOT_INSTALLED.at(
-        _place(setup, "data_files"),
+        setup.place("data_files"),
         f"{enumerated(what)} {'are' if missing else 'is'} not among the `data_files`",
     )
     yield _with_data_files(problem, setup, lines, uses_glob=True)
 
 
-def _lacks(entries: Sequence[DataFiles], folder: str, keys: Sequence[str], kind: str = "") -> bool:
+def _pattern(key: str, file: str) -> str:
+    """Return the pattern for all interface files of a kind in the folder of one."""
+    folder, kind = file.rpartition("/")[0], key.split("/")[0]
+    if not re.fullmatch(r"[\w./ -]+", folder):  # it becomes part of a program
+        folder = kind
+    return f"{folder}/*.{kind}"
+
+
+def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
     """Return whether entries are known not to install files into a folder of the prefix."""
     there = [one for one in entries if one.folder is None or one.folder.rstrip("/") == folder]
     patterns = [pattern for one in there for pattern in _files(one)]
@@ -128,131 +160,110 @@ def _with_data_files(
     return msgspec.structs.replace(problem, hint=hint, edits=(*imports, *edits) if edits else ())
 
 
-def _place(setup: Setup, argument: str) -> Span:
-    """Return where an argument of setup() is, or the call."""
-    from idlc.checks.package.python_files import span_of
-
-    node: ast.AST | None = setup.arguments.get(argument, setup.call)
-    listed = setup.list_of(argument)
-    if listed is not None and listed.elts:
-        node = listed.elts[0]
-    return span_of(setup.source, node) if node else Span(setup.source, 0, 0)
-
-
 def _missing_packages(
-    setup: Setup, package: str, keys: Sequence[str], folders: Mapping[str, bool]
+    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
 ) -> Iterator[Diagnostic]:
-    """Yield the problem with generated packages that `packages` leaves out."""
-    kinds = sorted({key.partition("/")[0] for key in keys})
-    support = f"{package}._idlc"
-    wanted = [package, *(f"{package}.{kind}" for kind in kinds), support]
-    wanted += sorted(name for name in folders if name.startswith(f"{support}."))
-    if "packages" not in setup.arguments:
+    """Yield the problem with generated packages that setuptools leaves out."""
+    if view.installed is None or any(one.startswith(f"{package}.") for one in view.roots):
         return
-    parts = setup.items(setup.arguments["packages"])
-    covered = set()
-    for part in parts:
-        text = setup.text(part.node) if part.is_element else None
-        found = {text} if text else _covered(setup, part.node, wanted)
-        if found is None:
-            return
-        covered |= found
-    missing = [name for name in wanted if name not in covered]
-    if missing:
-        listed = enumerated([f"`{name}`" for name in missing])
-        verb = "is" if len(missing) == 1 else "are"
-        problem = codes.CLASSES_NOT_INSTALLED.at(
-            _place(setup, "packages"),
-            f"{listed} {verb} not among the `packages`: the classes of "
-            "the interfaces are not installed",
-        )
-        yield _with_packages(problem, setup, package, folders)
-    else:
-        yield from _absent_folders(setup, package, keys, folders)
-
-
-def _covered(setup: Setup, node: ast.expr, wanted: Sequence[str]) -> set[str] | None:
-    """Return which packages a call of find_packages finds; `None` if that cannot be seen."""
-    import ast
-
-    from idlc.checks.package.setup_py import name_of_call
-
-    call = setup.value(node)
-    if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
-        return None
-    given = dict(zip(("where", "exclude", "include"), call.args, strict=False))
-    given |= {one.arg: one.value for one in call.keywords if one.arg}
-    chosen = []
-    for name in ("include", "exclude"):
-        items = setup.items(given.get(name))
-        texts = [setup.text(item.node) for item in items]
-        if None in texts or not all(item.is_element for item in items):
-            return None
-        chosen.append([text for text in texts if text is not None])
-    include, exclude = chosen
-    return {
-        one
-        for one in wanted
-        if any(fnmatchcase(one, pattern) for pattern in include or ["*"])
-        and not any(fnmatchcase(one, pattern) for pattern in exclude)
-    }
+    support = f"{package}._idlc"
+    wanted = [package, *(f"{package}.{kind}" for kind in _kinds(keys)), support]
+    wanted += sorted(name for name in view.packages(folders) if name.startswith(f"{support}."))
+    missing = [one for one in wanted if not view.installed.covers(one, view.folder(one))]
+    if not missing:
+        yield from _absent_folders(setup, view, package, keys, folders)
+        return
+    listed = enumerated([f"`{name}`" for name in missing])
+    what = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
+    if not (view.installed.names or view.installed.finders):
+        what = "nothing names the `packages`, and setuptools does not choose among several folders"
+    problem = codes.CLASSES_NOT_INSTALLED.at(
+        view.installed.place, f"{what}: the classes of the interfaces are not installed"
+    )
+    yield _with_packages(problem, setup, view, package, folders)
 
 
 def _absent_folders(
-    setup: Setup, package: str, keys: Sequence[str], folders: Mapping[str, bool]
+    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
 ) -> Iterator[Diagnostic]:
     """Yield the problem with packages that are listed and have no folder."""
     from idlc.checks.package.python_files import span_of
 
-    if not setup.whole or "package_dir" in setup.arguments:
+    if not setup.whole:
         return
     support = f"{package}._idlc"
-    made = {f"{package}.{key.partition('/')[0]}" for key in keys} | ({package} if keys else set())
+    kinds = _kinds(keys)
+    made = {f"{package}.{kind}" for kind in kinds} | ({package} if kinds else set())
+    there = view.packages(folders)
     for item in setup.items(setup.arguments.get("packages")):
         name = setup.text(item.node) if item.is_element else None
-        if not name or name in made or name.replace("/", ".") in folders:
+        if not name or name in made or name.replace("/", ".") in there:
             continue
-        if keys and support not in folders and f"{name}.".startswith(f"{support}."):
+        if kinds and support not in there and f"{name}.".startswith(f"{support}."):
             continue  # the build makes it
         problem = codes.CLASSES_NOT_INSTALLED.at(
             span_of(setup.source, item.node),
-            f"`packages` names `{name}`, and there is no folder `{name.replace('.', '/')}`",
+            f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`",
         )
-        yield _with_packages(problem, setup, package, folders)
+        yield _with_packages(problem, setup, view, package, folders)
 
 
 def _with_packages(
-    problem: Diagnostic, setup: Setup, package: str, folders: Mapping[str, bool]
+    problem: Diagnostic, setup: Setup, view: Layout, package: str, folders: Mapping[str, bool]
 ) -> Diagnostic:
     """Return a problem with the edits after which `packages` is worked out by setuptools."""
     from idlc.checks.package.python_files import range_of
-    from idlc.checks.package.setup_edits import appended, imported, quote_of
+    from idlc.checks.package.setup_edits import appended, argument, imported, quote_of
 
-    node = setup.arguments["packages"]
+    root = view.roots.get("", "")
+    where = f"'{root}', " if root not in ("", ".") else ""
+    if problem.span and problem.span.source is not setup.source:
+        return msgspec.structs.replace(problem, hint=_elsewhere(problem.span, view, root))
+    find, imports = imported(setup, "setuptools", "find_packages")
+    call = f"{find}({where}exclude=['test'])"
+    hint = f"write `packages={call}`"
     listed = setup.list_of("packages")
-    names = [setup.text(item.node) for item in setup.items(node) if item.is_element]
-    tops = {name for name, has_init in folders.items() if has_init and "." not in name}
-    known = len(names) == len(setup.items(node)) and all(
+    target = setup.value(setup.arguments.get("packages"))
+    items = setup.items(setup.arguments.get("packages"))
+    names = [setup.text(item.node) for item in items if item.is_element]
+    there = view.packages(folders)
+    tops = {name for name, has_init in there.items() if has_init and "." not in name}
+    known = len(names) == len(items) and all(
         name and name.partition(".")[0] == package for name in names
     )
     edits: tuple[Edit, ...] = ()
-    find, imports = imported(setup, "setuptools", "find_packages")
-    call = _FIND.replace("find_packages", find)
-    hint = f"write `packages={call}`"
-    if setup.list_of("packages") is listed and "package_dir" not in setup.arguments:
-        target = setup.value(node)
-        if target is not None and (known or listed is None) and tops <= {package, "test"}:
+    if "packages" not in setup.arguments:
+        edits = argument(setup, f"packages={call}")
+    elif view.roots.keys() <= {""} and target is not None:
+        if (known or listed is None) and tops <= {package, "test"}:
             start, end = range_of(setup.source, target)
             text = call.replace("'", quote_of(setup.source, target))
-            edits = (*imports, Edit(Span(setup.source, start, end), text))
+            edits = (Edit(Span(setup.source, start, end), text),)
         elif listed is not None:
-            own = f"*{find}(include=['{package}', '{package}.*'])"
-            edits = (*imports, *appended(setup.source, listed, [own]))
+            own = f"*{find}({where}include=['{package}', '{package}.*'])"
+            edits = appended(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
     also = ", with `from setuptools import find_packages`" if imports else ""
     return msgspec.structs.replace(
-        problem, hint=hint + also + ("; --fix does" if edits else ""), edits=edits
+        problem,
+        hint=hint + also + ("; --fix does" if edits else ""),
+        edits=(*imports, *edits) if edits else (),
     )
+
+
+def _elsewhere(place: Span, view: Layout, root: str) -> str:
+    """Return how setup.cfg or pyproject.toml names the packages that setuptools is to find."""
+    if view.installed and view.installed.finders:
+        return "have its `where`, `include` and `exclude` find them"
+    if place.source.path.endswith(".toml"):
+        where = f'["{root or "."}"]'
+        return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"
+    also = f", and `where = {root}` in [options.packages.find]" if root else ""
+    return f"write `packages = find:`{also}"
+
+
+def _kinds(keys: Iterable[str]) -> list[str]:
+    return sorted({key.split("/")[0] for key in keys})
 
 
 def resource_marker(facts: Facts, _: Model, report: Report) -> None:
@@ -270,7 +281,7 @@ def resource_marker(facts: Facts, _: Model, report: Report) -> None:
         )
     elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
         problem = codes.NO_RESOURCE_MARKER.at(
-            _place(setup, "data_files"), f"`resource/{facts.name}` is not among the `data_files`"
+            setup.place("data_files"), f"`resource/{facts.name}` is not among the `data_files`"
         )
         line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
         report.add(_with_data_files(problem, setup, [line]))
@@ -283,7 +294,8 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
     from idlc.checks.package.python_files import span_of
 
     setup = _read(facts.setup_py)
-    elsewhere = bool({"package_dir", "py_modules"} & setup.arguments.keys())
+    view = _layout(facts, setup)
+    elsewhere = view is None or bool(view.roots) or "py_modules" in setup.arguments
     for text, node in setup.scripts:
         problem = _problem(text, facts, elsewhere=elsewhere)
         if problem:
@@ -325,7 +337,7 @@ def names(facts: Facts, _: Model, report: Report) -> None:
     if setup and found is not None and found.replace("-", "_") != facts.name:
         report.add(
             codes.NAME_MISMATCH.at(
-                _place(setup, "name"),
+                setup.place("name"),
                 f"setup.py calls the package `{found}`, package.xml `{facts.name}`",
                 hint="give both the same name",
             )

@@ -39,12 +39,12 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
     if not index or installs(setup):
         return
     edits = edits_for(setup)
-    by_hand = "; --fix does" if edits else f", as in `setup(**{RESULT}, ...)`"
     problem = codes.NO_LIBRARY_INSTALLED.at(
         span_of(setup.source, index[0].node),
-        f"`{package}` is entered in ROS 2's index without libraries for its types, and stops "
-        "`ros2 bag record`",
-        hint=f"give setup() what `idlc.build.{COMPILE}` returns{by_hand}",
+        f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
+        "installs no library for its types",
+        hint=f"pass `**{COMPILE}('{package}')` of `idlc.build` to setup()"
+        + ("; --fix does" if edits else ""),
     )
     yield msgspec.structs.replace(problem, edits=edits)
 

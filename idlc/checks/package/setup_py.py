@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import NamedTuple, TypeGuard
 
-from idlc.checks.package.python_files import parsed
-from idlc.diagnostics.source import Source
+from idlc.checks.package.python_files import parsed, span_of
+from idlc.diagnostics.source import Source, Span
 
 #: No text or list of a setup.py is longer than this; sums of names could double at each line.
 _MOST = 2000
@@ -249,6 +249,14 @@ class Setup:
         while isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):
             value = self.value(value.left)
         return value if isinstance(value, ast.List) else None
+
+    def place(self, argument: str) -> Span:
+        """Return where an argument of setup() is, or the call."""
+        node: ast.AST | None = self.arguments.get(argument, self.call)
+        listed = self.list_of(argument)
+        if listed is not None and listed.elts:
+            node = listed.elts[0]
+        return span_of(self.source, node) if node else Span(self.source, 0, 0)
 
     def first_use(self, *arguments: str) -> ast.stmt | None:
         """Return the statement of the block with setup() that begins to work out arguments.

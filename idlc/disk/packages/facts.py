@@ -15,7 +15,7 @@ from idlc.disk.find import CLOSING, KINDS, NOTHING, SKIPPED
 from idlc.disk.output import lock_file
 from idlc.disk.packages.enclosing import manifest
 from idlc.disk.packages.inputs import Inputs
-from idlc.disk.read import NOTHING_OPEN, Unsaved, shown
+from idlc.disk.read import NOTHING_OPEN, Unsaved, absolute, shown
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
@@ -26,6 +26,7 @@ _LIBRARIES = frozenset(
     "rclpy ros2cli ros2launch rosbag2_py rosidl_runtime_py sensor_msgs_py tf2_geometry_msgs "
     "tf2_ros tf_transformations".split()
 )
+_SETUP_FILES = ("setup.py", "setup.cfg", "pyproject.toml")
 _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
@@ -58,12 +59,18 @@ def facts(
         modules=modules,
         setup_py=_optional(folder / "setup.py", unsaved),
         setup_cfg=_optional(folder / "setup.cfg", unsaved),
+        pyproject=_optional(folder / "pyproject.toml", unsaved),
         cmake=cmake,
         generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
         whole=_whole(given, files, exclude),
         marker=(folder / "resource" / given.package).is_file(),
         outputs=tuple(Output(shown(at), one.package, one.inputs) for at, one in locks.items()),
+        files={
+            one.file.key: place.relative_to(folder).as_posix()
+            for one in given.files
+            if (place := absolute(one.file.path)).is_relative_to(folder)
+        },
         folders=_by_name(folder, files),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
     )
@@ -72,6 +79,25 @@ def facts(
 def folders(folder: Path) -> dict[str, bool]:
     """Return the folders with files, by dotted name, and whether each is a Python package."""
     return _by_name(folder, _files(folder))
+
+
+def home_of(folder: Path, package: str) -> Path:
+    """Return the folder from which setup.py takes a package, or where idlc compiled it before."""
+    homes = (folder / package, folder / "src" / package)
+    for home in homes:
+        if (home / lock_file.FILE).is_file():
+            return home
+    files = (_optional(folder / name, NOTHING_OPEN) for name in _SETUP_FILES)
+    setup, cfg, pyproject = files
+    if setup is not None:
+        from idlc.checks.package.python_packages import layout
+        from idlc.checks.package.setup_py import Setup
+
+        there = {"src": False} if (folder / "src").is_dir() else {}
+        view = layout(Setup(setup), cfg, pyproject, there)
+        if view is not None:
+            return folder / view.folder(package)
+    return homes[not homes[0].is_dir() and homes[1].is_dir()]
 
 
 def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:

@@ -9,9 +9,9 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.disk.find import is_path
 from idlc.disk.output.folder import Target
-from idlc.disk.output.lock_file import FILE
 from idlc.disk.packages import inputs
 from idlc.disk.packages.enclosing import declared_name, manifest
+from idlc.disk.packages.facts import home_of
 from idlc.disk.packages.requested import borrowed, completed, targets, unread_idl, wanted
 from idlc.disk.read import absolute, is_file, shown
 from idlc.disk.scope import Scope
@@ -56,7 +56,7 @@ def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
 def in_package(wanted: GenOptions) -> GenOptions:
     """Return options with what the package around implies where nothing was said.
 
-    A package that setup.py builds is compiled into the folder of its name.
+    A package that setup.py builds is compiled into the folder from which setup.py installs it.
     """
     if wanted.ament or (wanted.out and wanted.paths) or len(wanted.paths) > 1:
         return wanted
@@ -67,10 +67,9 @@ def in_package(wanted: GenOptions) -> GenOptions:
     name = declared_name(path, shown(path), Report())
     if not name or not is_file(path.parent / "setup.py"):
         return wanted
-    homes = (path.parent / name, path.parent / "src" / name)
-    out = next((home for home in homes if is_file(home / FILE)), homes[0])
     return wanted._replace(
-        paths=wanted.paths or (shown(path.parent),), out=wanted.out or shown(out)
+        paths=wanted.paths or (shown(path.parent),),
+        out=wanted.out or shown(home_of(path.parent, wanted.scope.package or name)),
     )
 
 

@@ -13,6 +13,7 @@ from idlc.disk.cache import templates as template_cache
 from idlc.disk.library import Library
 from idlc.disk.output.project import Done, Project
 from idlc.disk.packages.enclosing import declared_name, manifest
+from idlc.disk.packages.facts import home_of
 from idlc.disk.read import absolute, shown
 from idlc.disk.scope import scope
 from idlc.disk.settings import pyproject, user_templates
@@ -93,7 +94,8 @@ def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...
     included = (word for folder in settings.include for word in ("-I", folder))
     if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
         return ("gen", *included)
-    return ("gen", project.name, "-o", project.shown(own), *included)
+    home = home_of(project.path, own).relative_to(project.path).as_posix()
+    return ("gen", project.name, "-o", project.shown(home), *included)
 
 
 def keys_of(project: Project) -> set[str]:

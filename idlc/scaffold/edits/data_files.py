@@ -49,7 +49,7 @@ def add_interfaces(
 
     What is computed in it stays; `idlc check` and the build report what is missing then.
     """
-    problems = wiring(Source("setup.py", text), package, sorted(keys), folders)
+    problems = wiring(Source("setup.py", text), package, {key: key for key in keys}, folders)
     return apply(text, (edit for problem in problems for edit in problem.edits))[0]
 
 
