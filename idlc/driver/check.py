@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from idlc.model.link import Model
 
 
+#: How often fixes are made: one may be what another needs, or edit the place of another.
+_ROUNDS = 5
+
+
 class CheckOptions(msgspec.Struct, frozen=True):
     """What `idlc check` was asked to do."""
 
@@ -57,14 +61,20 @@ def check(options: CheckOptions, report: Report) -> Checked:
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0
-    if options.fix:
+    for rounds_left in reversed(range(_ROUNDS + 1)):
+        looked = Report()
+        checked, found = _once(options, looked)
+        edits = [one for problem in found for one in problem.edits]
+        if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
+            break
         from idlc.disk.output.rewrite import edit
 
-        found = _once(options, report)[1]
-        if not report.had_errors:
-            fixed = edit((one for problem in found for one in problem.edits), report, tidied)
-    checked, found = _once(options, report)
-    report.extend(found)
+        done = edit(edits, report, tidied)
+        fixed += done
+        if not done:
+            break
+    report.extend((*looked, *found))
+    report.notes += looked.notes
     return msgspec.structs.replace(checked, fixed=fixed)
 
 

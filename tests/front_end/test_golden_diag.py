@@ -37,6 +37,20 @@ def test_golden_case(path, tmp_path, capsys, monkeypatch):
     assert golden_text.write(case, found) == text
 
 
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_a_second_fix_changes_nothing(path, tmp_path, capsys, monkeypatch):
+    case = golden_text.read(path.read_text(encoding="utf-8"))
+    case = case._replace(head="$ idlc check . --fix\n")
+
+    def files():
+        return {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+    golden_text.run(case, tmp_path, capsys, monkeypatch)
+    fixed = files()
+    assert main(["check", ".", "--fix"]) in (0, 1, 2)
+    assert files() == fixed
+
+
 @pytest.mark.parametrize("code", CODES)
 def test_every_code_has_a_case(code):
     named = [path for path in CASES if path.stem.startswith(code)]

@@ -164,6 +164,15 @@ def test_what_is_not_installed_is_found_and_fixed_in_one_go(name, package, capsy
     assert len([line for line in before if line in after]) >= len(before) - 3
 
 
+@pytest.mark.parametrize(
+    "arguments", ["name='demo', packages=['demo']", "name='demo'", "packages=['demo'], name='demo'"]
+)
+def test_what_a_fix_makes_necessary_is_fixed_with_it(arguments, package, capsys):
+    path = package(f"from setuptools import setup\n\nsetup({arguments})\n")
+    idlc(capsys, "check", "--fix")
+    assert idlc(capsys, "check").startswith("no problems"), path.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", CALM)
 def test_what_cannot_be_seen_is_not_judged(name, package, capsys):
     package(CALM[name])
