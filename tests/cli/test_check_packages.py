@@ -68,6 +68,8 @@ CMAKE = {
     "generate_interfaces(demo a DEPENDENCIES nav_msgs std_msgs ADD_LINTER_TESTS)\n",
     "set(deps\r\n)\r\nrosidl_generate_interfaces(demo a DEPENDENCIES ${deps})\r\n": "set(deps\r\n"
     "  std_msgs\r\n)\r\nrosidl_generate_interfaces(demo a DEPENDENCIES ${deps})\r\n",
+    'rosidl_generate_interfaces(a "b (c)" DEPENDENCIES d)\n': "rosidl_generate_interfaces("
+    'a "b (c)" DEPENDENCIES d std_msgs)\n',
     "rosidl_generate_interfaces(demo a DEPENDENCIES ${computed})\n": None,
     "set(d x)\nlist(APPEND d ${y})\nrosidl_generate_interfaces(demo a DEPENDENCIES ${d})\n": None,
     "rosidl_generate_interfaces(demo a DEPENDENCIES std_msgs)\n": None,

@@ -5,7 +5,7 @@ import difflib
 import pytest
 from catkin_pkg.package import parse_package_string
 
-from idlc.scaffold.edits import data_files, launch_py, package_xml
+from idlc.scaffold.edits import cmake, data_files, launch_py, package_xml
 from idlc.scaffold.edits.console_script import add_script
 from idlc.scaffold.edits.outcome import Edited, Outcome, Refused, Script
 
@@ -268,3 +268,28 @@ def test_a_node_is_added_where_nodes_are_added_one_by_one():
     assert '        name="keeper",\n' in after
     assert compile(after, "x", "exec")
     assert launch_py.add_node(after, managed) == Edited(after)
+
+
+@pytest.mark.parametrize(
+    ("text", "new"),
+    [
+        ("set(dependencies\n)\n", "set(dependencies\n  nav_msgs\n  std_msgs\n)\n"),
+        ("set(dependencies\n  nav_msgs\n)\n", "set(dependencies\n  nav_msgs\n  std_msgs\n)\n"),
+        (
+            "set(dependencies\r\n  a\r\n)",
+            "set(dependencies\r\n  a\r\n  nav_msgs\r\n  std_msgs\r\n)",
+        ),
+        ("set(dependencies)", "set(dependencies nav_msgs std_msgs)"),
+        ("SET(dependencies a) # nav_msgs\n", "SET(dependencies a nav_msgs std_msgs) # nav_msgs\n"),
+        ("find_package(nav_msgs)\nf(std_msgs)\n", None),
+    ],
+)
+def test_dependencies_are_added_to_cmake(text, new):
+    outcome = cmake.add_dependencies(text, ["nav_msgs", "std_msgs"])
+    assert outcome == Edited(new or text)
+    assert cmake.add_dependencies(new or text, ["nav_msgs", "std_msgs"]) == outcome
+
+
+@pytest.mark.parametrize("text", ["", "set(others a)", "set(dependencies)\nset(dependencies)"])
+def test_dependencies_for_unusual_cmake_are_refused(text):
+    assert isinstance(cmake.add_dependencies(text, ["nav_msgs"]), Refused)

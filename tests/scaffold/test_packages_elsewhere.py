@@ -180,6 +180,8 @@ def test_interfaces_are_installed_from_where_they_lie(package, capsys):
         ("pyproject.toml", "[tool.setuptools]\npackages.find = { where = 'src' }"),
         ("pyproject.toml", "[tool.setuptools]\npackages.find = { where = ['a', 'b'] }"),
         ("pyproject.toml", "[tool.setuptools]\na = " + "[" * 5000),
+        ("pyproject.toml", "[tool.setuptools]\na = " + "9" * 5000),
+        ("pyproject.toml", "[tool.setuptools]\n" + ".".join("a" * 40_000) + " = 1"),
         ("setup.cfg", "[options]\npackages = find:\n[options.packages.find]\nwhere =\n  a\n  b"),
         ("setup.py", "from setuptools import setup\nsetup(name='demo', pbr=True)"),
         ("setup.py", "from setuptools import setup\nsetup(name='demo', **computed())"),

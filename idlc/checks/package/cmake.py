@@ -1,4 +1,4 @@
-"""Rules on the CMakeLists.txt of a package that generates interfaces."""
+"""The commands of a CMakeLists.txt, and rules on one that generates interfaces."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from idlc.diagnostics.report import Edit, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.model.link import Model
 
-_COMMAND = re.compile(r"\b([A-Za-z_]\w*)[ \t]*\(([^()]*)\)")
-_GENERATE = "rosidl_generate_interfaces"
+_COMMAND = re.compile(r'\b([A-Za-z_]\w*)[ \t]*\(([^()"]*(?:"[^"]*"[^()"]*)*)\)')
+#: The command that generates interfaces.
+GENERATE = "rosidl_generate_interfaces"
 _KEYWORD = "DEPENDENCIES"
 _OPTIONS = {"ADD_LINTER_TESTS", "LIBRARY_NAME", "SKIP_GROUP_MEMBERSHIP_CHECK", "SKIP_INSTALL"}
 _VARIABLE = re.compile(r"\$\{(\w+)\}")
@@ -48,7 +49,7 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
     if facts.cmake is None or not (facts.generates and model.own):
         return
     commands = list(calls(facts.cmake))
-    generating = [one for one in commands if one.name == _GENERATE]
+    generating = [one for one in commands if one.name == GENERATE]
     if len(generating) != 1:
         return
     (call,) = generating
@@ -69,10 +70,10 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
         if package not in seen and package != facts.name:
             problem = codes.MISSING_CMAKE_DEPENDENCY.at(
                 span,
-                f"`{facts.cmake.path}` does not give `{package}` to `{_GENERATE}`",
+                f"`{facts.cmake.path}` does not give `{package}` to `{GENERATE}`",
                 hint=f"add `{package}` {_where(named)}, and `find_package({package} REQUIRED)`",
             )
-            edits = (_listing(target, package, listed=bool(words)), *_finding(commands, package))
+            edits = (listing(target, package, listed=bool(words)), *_finding(commands, package))
             report.add(msgspec.structs.replace(problem, edits=edits))
 
 
@@ -87,8 +88,11 @@ def _where(named: list[str]) -> str:
     return f"to `set({named[0]} ...)`" if named else "to its `DEPENDENCIES`"
 
 
-def _listing(target: Call, package: str, *, listed: bool) -> Edit:
-    """Return the edit that adds a package to a list, laid out as its last word is."""
+def listing(target: Call, package: str, *, listed: bool) -> Edit:
+    """Return the edit that adds a package to a list, laid out as its last word is.
+
+    A command that has no such list yet gets the keyword, too, unless it is `set()`.
+    """
     last = target.places[-1]
     text = last.source.text
     margin = re.search(r"(?:\r\n?|\n)[ \t]*\Z", text[: last.start])
@@ -96,7 +100,7 @@ def _listing(target: Call, package: str, *, listed: bool) -> Edit:
         margin = re.match(r"[ \t]*((?:\r\n?|\n))", text[last.end :])
         return _insert(last, f"{margin[1]}  {package}" if margin else f" {package}")
     between = margin[0] if margin else " "
-    return _insert(last, f"{between}{package}" if listed else f"{between}DEPENDENCIES {package}")
+    return _insert(last, f"{between}{package}" if listed else f"{between}{_KEYWORD} {package}")
 
 
 def _finding(commands: list[Call], package: str) -> tuple[Edit, ...]:

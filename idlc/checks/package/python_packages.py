@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from idlc.checks.package.setup_py import Setup
 
 _FINDERS = ("find_packages", "find_namespace_packages")
-#: Characters of the longest pyproject.toml that is read.
+#: Characters of the longest setup.cfg or pyproject.toml that is read.
 _MOST = 100_000
 _MOST_ROOTS = 20
+#: Dots in a line of pyproject.toml: reading a key takes time by the square of its parts.
+_MOST_DOTS = 200
 #: What may have other code choose the packages.
 _HOOKS = frozenset({"distclass", "pbr", "py_modules", "setup_requires"})
 #: Folders that setuptools does not take for packages where it looks itself.
@@ -188,6 +190,8 @@ def _finder(setup: Setup, node: ast.expr) -> Finder | None:
 
 
 def _of_cfg(source: Source | None) -> Said | None:
+    if source and len(source.text) > _MOST:
+        return None
     options = dict(_options(source)) if source else {}
     packages, place = options.get(("options", "packages"), ([], None))
     lines = options.get(("options", "package_dir"), ([], None))[0]
@@ -237,7 +241,7 @@ def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str],
 def _of_toml(source: Source | None) -> Said | None:
     if source is None or "setuptools" not in source.text:
         return Said()
-    if len(source.text) > _MOST:
+    if len(source.text) > _MOST or any(one.count(".") > _MOST_DOTS for one in source.lines):
         return None
     if sys.version_info >= (3, 11):
         import tomllib
@@ -251,7 +255,7 @@ def _of_toml(source: Source | None) -> Said | None:
         where = _all_texts(finder.get("where", ["."]))
         include, exclude = (_all_texts(finder.get(key, [])) for key in ("include", "exclude"))
         names = _all_texts([] if isinstance(packages, dict) else packages or [])
-    except (tomllib.TOMLDecodeError, RecursionError, AttributeError, TypeError):
+    except (ValueError, RecursionError, AttributeError, TypeError):
         return None
     if roots is None or len(where) != 1:
         return None

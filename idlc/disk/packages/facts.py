@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from idlc.checks.package.cmake import GENERATE, calls
 from idlc.checks.package.facts import Facts, Output
 from idlc.checks.package.package_xml import statements
 from idlc.diagnostics.report import Report
@@ -126,9 +126,7 @@ def _whole(given: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
 
 def _generates(cmake: Source) -> bool:
     """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    code = re.sub(r"#[^\n]*", "", cmake.text)
-    calls = re.findall(r"rosidl_generate_interfaces\s*\(([^()]*)", code)
-    return any("SKIP_INSTALL" not in call.split() for call in calls)
+    return any(one.name == GENERATE and "SKIP_INSTALL" not in one.words for one in calls(cmake))
 
 
 def _files(folder: Path) -> Iterator[Path]:

@@ -10,6 +10,7 @@ import msgspec
 
 from idlc.breaking.change import LEVELS, Change
 from idlc.breaking.packages import called, compare
+from idlc.checks.package.cmake import calls
 from idlc.diagnostics.edits import apply
 from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Edit, Report, first_few
@@ -232,10 +233,10 @@ def _in_cmake(name: ir.TypeName, path: Path, report: Report, world: World) -> It
     if not unsaved.is_file(cmake):
         return
     source = unsaved.read_source(cmake, str(cmake), report)
-    pattern = rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?!\w)"
-    for match in re.finditer(pattern, source.text) if source else ():
-        assert source is not None
-        yield Span(source, *match.span(1))
+    pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?!\w)")
+    for place in (place for one in calls(source) for place in one.places) if source else ():
+        if match := pattern.search(place.text):
+            yield Span(place.source, place.start + match.start(1), place.start + match.end(1))
 
 
 def _answer(
