@@ -175,7 +175,7 @@ def _missing_packages(
         return
     listed = enumerated([f"`{name}`" for name in missing])
     what = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
-    if not (view.installed.names or view.installed.finders):
+    if view.installed.is_nothing:
         what = "nothing names the `packages`, and setuptools does not choose among several folders"
     problem = codes.CLASSES_NOT_INSTALLED.at(
         view.installed.place, f"{what}: the classes of the interfaces are not installed"
@@ -254,7 +254,7 @@ def _with_packages(
 def _elsewhere(place: Span, view: Layout, root: str) -> str:
     """Return how setup.cfg or pyproject.toml names the packages that setuptools is to find."""
     if view.installed and view.installed.finders:
-        return "have its `where`, `include` and `exclude` find them"
+        return "make its `where`, `include` and `exclude` match these packages"
     if place.source.path.endswith(".toml"):
         where = f'["{root or "."}"]'
         return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"

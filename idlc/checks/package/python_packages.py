@@ -53,12 +53,13 @@ class Finder(NamedTuple):
 class Installed(NamedTuple):
     """The packages that are named and looked for, and the place that says so.
 
-    Without names and finders, setuptools would find several packages, and installs none.
+    `is_nothing` is whether no place does: setuptools would find several, and installs none.
     """
 
     place: Span
     names: tuple[str, ...] = ()
     finders: tuple[Finder, ...] = ()
+    is_nothing: bool = False
 
     def covers(self, name: str, folder: str) -> bool:
         """Return whether a package in a folder is installed."""
@@ -131,19 +132,19 @@ def layout(
         wheres = [one.where for one in given[0].finders if _is_within(one.where)]
         roots = roots or ({"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {})
         return Layout(roots, given[0] if len(given) == 1 else None)
+    place = setup.place("packages")
     if "src" in folders:
-        roots = roots or {"": "src"}
-        return Layout(roots, Installed(setup.place("packages"), (), (Finder("src"),)))
+        return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
     tops = {name for name in folders if "." not in name} - _NOT_FOUND
     return Layout(
         roots or {},
-        Installed(setup.place("packages")) if len(tops) > 1 and not roots else None,
+        Installed(place, is_nothing=True) if len(tops) > 1 and not roots else None,
     )
 
 
 def _is_within(root: str) -> bool:
     """Return whether a folder is within the package's."""
-    return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and normpath(f"a/{root}/b")[:2] == "a/"
+    return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and ".." not in root.split("/")
 
 
 def _of_setup(setup: Setup) -> Said | None:
@@ -234,7 +235,7 @@ def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str],
         if header := _HEADER.match(text):
             section = header[1].strip()
         elif found := re.match(r"([\w.-]+)[ \t]*[=:]", text):
-            key, at = found[1].replace("-", "_"), start
+            key, at = found[1].replace("-", "_").lower(), start
             values = [text[found.end() :].strip()]
 
 

@@ -66,7 +66,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
 
     OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
     number of packages can share, there is nothing to build: `source PREFIX/setup.bash`. In a
-    package with a setup.py, PATH and OUT default to the package and the folder of its name.
+    package with a setup.py, PATH and OUT default to the package and the folder that setup.py takes
+    it from.
     """
     from idlc.cli import gen_run, output
     from idlc.diagnostics.report import Report
