@@ -53,6 +53,7 @@ class File:
         self.repeats = rng.random() < 0.5
         self.time = 1000
         self.lies = False
+        self.has_summary = rng.random() < 0.8
         if self.repeats or rng.random() < 0.5:
             self.data += DEFINED
         else:
@@ -80,19 +81,26 @@ class File:
         name = self.rng.choice(list(COMPRESS))
         stored = COMPRESS[name](records)
         first, last = min(times, default=0), max(times, default=0)
+        if not self.has_summary and self.rng.random() < 0.1:
+            first, last = 5, 6
         head = pack("<QQQI", first, last, len(records), zlib.crc32(records)) + text(name)
         whole = record(6, head + pack("<Q", len(stored)) + stored)
         at, behind, places = len(self.data), b"", b""
         self.data += whole
         if self.rng.random() < 0.8:
             for number, entries in indexes.items():
+                if self.rng.random() < 0.02:
+                    entries.pop()
+                    self.lies = self.has_summary
+                if not entries:
+                    continue
                 places += pack("<HQ", number, len(self.data) + len(behind))
                 packed = b"".join(pack("<QQ", *one) for one in entries)
                 behind += record(7, pack("<H", number) + text(packed))
             self.data += behind
         kept = self.rng.random() < 0.8
         if self.rng.random() < 0.02 and len(places) > 10:
-            places, self.lies = places[10:], True  # one channel of several
+            places, self.lies = places[10:], self.has_summary  # one channel of several
         content = pack("<QQQQ", first, last, at, len(whole)) + text(places if kept else b"")
         content += pack("<Q", len(behind)) + text(name) + pack("<QQ", len(stored), len(records))
         self.chunk_indexes.append(record(8, content))
@@ -111,12 +119,11 @@ class File:
                     self.data += record(15, pack("<I", 0))
                 case _:
                     self.chunk()
-        ending = self.rng.randrange(10)
-        if ending == 0:
+        if not self.has_summary and self.rng.random() < 0.5:
             return self.data
         self.data += record(15, pack("<I", 0))
         start = len(self.data)
-        if ending == 1:
+        if not self.has_summary:
             return self.data + record(2, pack("<QQI", 0, 0, 0)) + MAGIC
         chunks = self.chunk_indexes if self.rng.random() < 0.9 else self.chunk_indexes[1:]
         self.rng.shuffle(chunks)
