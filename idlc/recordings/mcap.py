@@ -41,13 +41,15 @@ class McapFacts:
     notes: list[str] = field(default_factory=list)
 
     def add(self, op: int, data: memoryview) -> None:
-        """Take note of a schema or a channel; the first of an id counts."""
+        """Take note of a schema or a channel; those of one id must be the same."""
         if op == mcap.SCHEMA_OP:
             schema = mcap.schema(data)
-            self.schemas.setdefault(schema.id, schema)
+            if self.schemas.setdefault(schema.id, schema) != schema:
+                raise RecordingError(f"schema {schema.id} is defined in two ways")
         elif op == mcap.CHANNEL_OP:
             channel = mcap.channel(data)
-            self.channels.setdefault(channel.id, channel)
+            if self.channels.setdefault(channel.id, channel) != channel:
+                raise RecordingError(f"channel {channel.id} is defined in two ways")
 
 
 def read_facts(source: Source, index: bool = True, check: bool = False) -> McapFacts:

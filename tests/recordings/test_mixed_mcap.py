@@ -187,6 +187,22 @@ def test_no_window_loses_a_message(tmp_path):
     assert lies
 
 
+@pytest.mark.parametrize("what", ["schema 1", "channel 2"])
+@pytest.mark.parametrize("chunked", [True, False])
+def test_an_id_that_is_defined_in_two_ways_is_an_error(what, chunked, tmp_path):
+    """Otherwise messages would be read as those of the other."""
+    path, file = tmp_path / "a.mcap", File(random.Random(SEED))
+    file.chunk()
+    changed = {"schema 1": (b"int8", b"bool"), "channel 2": (b"/b", b"/c")}[what]
+    if chunked:
+        file.chunk([DEFINED.replace(*changed)])
+    else:
+        file.data += DEFINED.replace(*changed)
+    path.write_bytes(file.data)
+    with pytest.raises(RecordingError, match=f"{what} is defined in two ways"):
+        open_recording(path)
+
+
 def test_a_file_that_is_cut_off_while_it_is_open_is_an_error(tmp_path):
     """It does not end the process, as a mapped file would."""
     path, data = tmp_path / "a.mcap", large()

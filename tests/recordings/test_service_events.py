@@ -131,12 +131,12 @@ def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path)
     path = rewritten(tmp_path / "a.mcap", hashes=False)
     with idlc.Recording(path, include=[str(FOLDER)]) as recording:
         assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
-    status, text = said("show", path, "/empty")
+    _, text = said("show", path, "/empty")
     assert "`/empty` is left out: there is no definition of `kit_msgs/msg/Empty`" in text
     assert "point -I to the package's sources" in text
-    with idlc.Recording(path) as recording:
-        with pytest.raises(RecordingError, match="there is no definition"):
-            recording["/empty"].to_arrow()
+    no_definition = pytest.raises(RecordingError, match="there is no definition")
+    with idlc.Recording(path) as recording, no_definition:
+        recording["/empty"].to_arrow()
     path = rewritten(tmp_path / "b.mcap", lambda text: "" if "float" in text else text)
     with idlc.Recording(path) as recording:
         assert recording["/empty"].to_arrow().num_rows == 15
