@@ -7,7 +7,9 @@ outside of the window; or an error, where the file contradicts itself.
 import os
 import random
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from io import FileIO
 from struct import pack
 
 import pytest
@@ -15,6 +17,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 import idlc
+from idlc.recordings import source
 from idlc.recordings.container import RecordingError, open_recording
 from idlc.recordings.messages import Window
 from tests.support.mcap_mutations import COMPRESS, MAGIC
@@ -233,6 +236,30 @@ def test_a_file_that_is_replaced_while_it_is_open_is_an_error(tmp_path):
         other.replace(path)
         with pytest.raises(RecordingError, match="was replaced while"):
             [topic.to_columns() for topic in recording.values()]
+
+
+def test_neighbours_are_read_from_a_file_that_is_opened_once(tmp_path, monkeypatch):
+    path, opened = tmp_path / "a.mcap", []
+    path.write_bytes(large())
+
+    def counted(*words):
+        opened.append(words)
+        return FileIO(*words)
+
+    with open_recording(path) as container:
+        monkeypatch.setattr(source, "FileIO", counted)
+        for topic in container.topics:
+            list(container.messages(topic, Window()))
+        assert len(opened) <= 2 * len(container.topics)
+
+
+def test_threads_read_one_file_at_once(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_bytes(large())
+    with idlc.Recording(path) as recording, ThreadPoolExecutor(4) as threads:
+        wanted = [topic.to_arrow() for topic in recording.values()]
+        for found in threads.map(lambda topic: topic.to_arrow(), [*recording.values()] * 10):
+            assert any(found.equals(one) for one in wanted)
 
 
 def test_many_files_are_one_recording_whatever_may_be_open_at_once(tmp_path):
