@@ -1,5 +1,7 @@
 """Recordings of messages that idlc does not read: of other encapsulations, or compressed."""
 
+from pathlib import Path
+
 import pytest
 
 import idlc
@@ -48,6 +50,15 @@ def test_topics_that_cannot_be_read_are_noted(start, notes, tmp_path):
     for command in ("show", "check"):
         (note,) = notes(path, command)
         assert f": messages of `/imu` {SENTENCES[start]}, and idlc reads only" in note
+
+
+def test_the_page_of_the_code_shows_the_warning(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made.by_mcap(Path("drive.mcap"), messages("0007"))
+    assert main(["check", "drive.mcap"]) == 0
+    shown = "".join(capsys.readouterr()).split("warning[IDL651]")[1].partition("\n\n")[0]
+    assert main(["explain", "IDL651"]) == 0
+    assert shown.replace("/imu", "/scan") in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("start", OTHERS)
