@@ -257,7 +257,16 @@ class _Walk:
             return
         counts: dict[int, int] = {}
         first, last = END_OF_TIME, 0
-        content = _content(self.source, self.last, self.room)
+        try:
+            content = _content(self.source, self.last, self.room)
+        except RecordingError as error:
+            if not self.entries:
+                raise
+            # reading the topics that it holds says so again; the others are not lost with them
+            reason = f"the chunk at byte {self.last.at} cannot be read: {error.message}"
+            self.facts.notes.append(reason)
+            content, counts = memoryview(b""), self.entries
+            first, last = self.last.first, self.last.last
         for (op, _, data), _ in zip(mcap.records(content), self.room.each(), strict=False):
             self.facts.add(op, data)
             if op == mcap.MESSAGE_OP and len(data) >= CHANNEL_AND_TIME.size:

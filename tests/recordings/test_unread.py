@@ -1,5 +1,6 @@
 """Recordings of messages that idlc does not read: of other encapsulations, or compressed."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -91,6 +92,21 @@ def test_a_damaged_chunk_does_not_keep_a_recording_from_being_shown(tmp_path, ca
     path.write_bytes(data[: at + 8] + bytes(64) + data[at + 72 :])
     assert main(["show", str(path)]) == 0
     assert "/imu" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_damaged_chunk_of_a_file_that_was_not_closed_costs_its_topics_only(compression, tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", made.messages(), compression, chunk_size=1)
+    data = path.read_bytes()
+    magic = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18"}[compression]
+    at = [found.start() for found in re.finditer(re.escape(magic), data)][30]
+    path.write_bytes(data[:at] + bytes(40) + data[at + 40 : -100])
+    with idlc.Recording(path) as recording:
+        assert "the chunk at byte " in " ".join(recording.notes)
+        with pytest.raises(RecordingError):
+            recording["/imu"].to_columns()
+        for name in recording.keys() - {"/imu"}:
+            assert len(recording[name].to_columns()) == 20
 
 
 @pytest.mark.parametrize("start", SENTENCES)
