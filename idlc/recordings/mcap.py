@@ -210,6 +210,7 @@ class _Walk:
         self.offsets = bytearray()
         self.entries: dict[int, int] = {}
         self.room = Room(source.size)
+        self.damaged = False
 
     def content(self, at: int, size: int) -> memoryview:
         """Return what a record holds."""
@@ -260,11 +261,13 @@ class _Walk:
         try:
             content = _content(self.source, self.last, self.room)
         except RecordingError as error:
-            if not self.entries:
+            if not self.entries or not self.entries.keys() <= self.facts.channels.keys():
                 raise
             # reading the topics that it holds says so again; the others are not lost with them
-            reason = f"the chunk at byte {self.last.at} cannot be read: {error.message}"
-            self.facts.notes.append(reason)
+            if not self.damaged:
+                what = f"the chunk at byte {self.last.at}, and perhaps others, cannot be read"
+                self.facts.notes.append(f"{what}: {error.message}")
+            self.damaged = True
             content, counts = memoryview(b""), self.entries
             first, last = self.last.first, self.last.last
         for (op, _, data), _ in zip(mcap.records(content), self.room.each(), strict=False):
