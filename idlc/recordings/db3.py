@@ -150,6 +150,9 @@ class Db3:
             columns = list(self.rows(f"PRAGMA table_xinfo({quoted})"))
             if any(column[6] in COMPUTED for column in columns):
                 raise RecordingError(f"`{self.name}`: columns of `{name}` are computed")
+            if "rowid" in {str(column[1]).lower() for column in columns}:
+                # it hides the numbers of rows, which no two have in common
+                raise RecordingError(f"`{self.name}`: a column of `{name}` is called rowid")
             found[str(name)] = {str(column[1]) for column in columns}
         for table, needed in (
             ("topics", {"id", "name", "type"}),

@@ -61,7 +61,8 @@ def _rows(
     end = LARGEST if window.end is None else min(window.end - 1, LARGEST)
     query = (
         "SELECT rowid, timestamp, data FROM messages NOT INDEXED WHERE rowid BETWEEN ? AND ? "  # noqa: S608
-        f"AND topic_id IN ({marks}) AND timestamp BETWEEN ? AND ? ORDER BY rowid"
+        f"AND topic_id IN ({marks}) AND (timestamp BETWEEN ? AND ? "
+        "OR typeof(timestamp) <> 'integer') ORDER BY rowid"
     )
     if start > end:
         return

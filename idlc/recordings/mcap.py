@@ -9,6 +9,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
+from struct import Struct
 
 from idlc.recordings import mcap_records as mcap
 from idlc.recordings.compression import Room, decompress
@@ -20,6 +21,8 @@ from idlc.recordings.source import Source
 END_OF_TIME = (1 << 64) - 1
 #: Bytes of a Message record before the message itself.
 MESSAGE_HEAD = 22
+#: How a message begins: with its sequence number between them.
+CHANNEL_AND_TIME = Struct("<HIQ")
 
 
 @dataclass
@@ -38,13 +41,15 @@ class McapFacts:
     notes: list[str] = field(default_factory=list)
 
     def add(self, op: int, data: memoryview) -> None:
-        """Take note of a schema or a channel; the first of an id counts."""
+        """Take note of a schema or a channel; those of one id must be the same."""
         if op == mcap.SCHEMA_OP:
             schema = mcap.schema(data)
-            self.schemas.setdefault(schema.id, schema)
+            if self.schemas.setdefault(schema.id, schema) != schema:
+                raise RecordingError(f"schema {schema.id} is defined in two ways")
         elif op == mcap.CHANNEL_OP:
             channel = mcap.channel(data)
-            self.channels.setdefault(channel.id, channel)
+            if self.channels.setdefault(channel.id, channel) != channel:
+                raise RecordingError(f"channel {channel.id} is defined in two ways")
 
 
 def read_facts(source: Source, index: bool = True, check: bool = False) -> McapFacts:
@@ -191,9 +196,9 @@ def _loose(source: Source, counts: dict[int, int], at: int, end: int) -> Iterato
 
 
 class _Walk:
-    """A walk over all records of a file, which goes from head to head and opens what it must.
+    """A walk over all records of a file, which opens every chunk.
 
-    That is every chunk if their indexes are not to be used.
+    Nothing else says whether a chunk has more messages than its indexes name.
     """
 
     def __init__(self, source: Source, index: bool) -> None:
@@ -205,29 +210,27 @@ class _Walk:
         self.offsets = bytearray()
         self.entries: dict[int, int] = {}
         self.room = Room(source.size)
+        self.damaged = False
 
     def content(self, at: int, size: int) -> memoryview:
         """Return what a record holds."""
         return self.source.view(at + HEAD.size, size - HEAD.size)
 
-    def count(self, channel: int, messages: int, time: int) -> None:
-        """Count messages of a channel, the first of which came at a time."""
+    def count(self, channel: int, messages: int, first: int) -> None:
+        """Count messages of a channel, none of which came before the first time."""
         counts = self.facts.counts
         counts[channel] = counts.get(channel, 0) + messages
-        if messages and (self.facts.start is None or time < self.facts.start):
-            self.facts.start = time
+        if self.facts.start is None or first < self.facts.start:
+            self.facts.start = first
 
     def message(self, at: int, size: int) -> None:
         """Take note of a message outside of any chunk."""
-        self.count_one(self.source.view(at + HEAD.size, min(size - HEAD.size, 14)))
+        data = self.source.view(at + HEAD.size, min(size - HEAD.size, CHANNEL_AND_TIME.size))
+        if len(data) == CHANNEL_AND_TIME.size:
+            channel, _, time = CHANNEL_AND_TIME.unpack(data)
+            self.count(channel, 1, time)
         start = self.loose[0] if self.loose else at
         self.loose = (start, at + size)
-
-    def count_one(self, data: memoryview) -> None:
-        """Count a message."""
-        if len(data) >= 14:
-            channel, time = data[:2], data[6:14]
-            self.count(int.from_bytes(channel, "little"), 1, int.from_bytes(time, "little"))
 
     def end_of_loose(self) -> None:
         """Make one stretch of the messages outside of chunks until here."""
@@ -249,29 +252,35 @@ class _Walk:
         self.entries[channel] = self.entries.get(channel, 0) + entries // 16
         self.offsets += mcap.INDEX_OFFSET.pack(channel, at)
 
-    def end_of_chunk(self, *, cut_off: bool = False) -> None:
-        """Keep the chunk before; open it if it alone can say what its channels are.
-
-        Where the file is cut off, so may be what it has of indexes.
-        """
+    def end_of_chunk(self) -> None:
+        """Take note of what is in the chunk before, and of its indexes if they name all of it."""
         if self.last is None:
             return
-        if cut_off:
-            self.entries, self.offsets = {}, bytearray()
-        for channel, messages in self.entries.items():
-            self.count(channel, messages, self.last.first)
-        if not self.entries or not self.entries.keys() <= self.facts.channels.keys():
-            self.open(self.last, counting=not self.entries)
-        self.facts.chunks.append(self.last._replace(indexes=bytes(self.offsets) or None))
-        self.last, self.offsets, self.entries = None, bytearray(), {}
-
-    def open(self, chunk: Chunk, counting: bool) -> None:
-        """Take note of what stands in a chunk."""
-        content = _content(self.source, chunk, self.room)
+        counts: dict[int, int] = {}
+        first, last = END_OF_TIME, 0
+        try:
+            content = _content(self.source, self.last, self.room)
+        except RecordingError as error:
+            if not self.entries or not self.entries.keys() <= self.facts.channels.keys():
+                raise
+            # reading the topics that it holds says so again; the others are not lost with them
+            if not self.damaged:
+                what = f"the chunk at byte {self.last.at}, and perhaps others, cannot be read"
+                self.facts.notes.append(f"{what}: {error.message}")
+            self.damaged = True
+            content, counts = memoryview(b""), self.entries
+            first, last = self.last.first, self.last.last
         for (op, _, data), _ in zip(mcap.records(content), self.room.each(), strict=False):
             self.facts.add(op, data)
-            if counting and op == mcap.MESSAGE_OP:
-                self.count_one(data)
+            if op == mcap.MESSAGE_OP and len(data) >= CHANNEL_AND_TIME.size:
+                channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
+                counts[channel] = counts.get(channel, 0) + 1
+                first, last = min(first, time), max(last, time)
+        for channel, messages in counts.items():
+            self.count(channel, messages, first)
+        indexes = bytes(self.offsets) if counts == self.entries else None
+        self.facts.chunks.append(self.last._replace(first=first, last=last, indexes=indexes))
+        self.last, self.offsets, self.entries = None, bytearray(), {}
 
 
 def _walk(source: Source, reason: str, index: bool) -> McapFacts:
@@ -298,7 +307,7 @@ def _walk(source: Source, reason: str, index: bool) -> McapFacts:
         ended = op == mcap.DATA_END_OP or (ended and op not in (mcap.MESSAGE_OP, mcap.CHUNK_OP))
         if op == mcap.FOOTER_OP:
             break
-    walk.end_of_chunk(cut_off=not ended)
+    walk.end_of_chunk()
     walk.end_of_loose()
     if ended:
         walk.facts.notes.append(f"{reason}: read from its records")

@@ -61,20 +61,36 @@ def messages(
     with of_file(source.name):
         room = Room(source.size)
         wanted = (chunk for chunk in chunks if may_have(chunk, window))
-        for group in _groups(source, wanted, room):
-            buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
-            opened, offsets, at = [], [], 0
-            for chunk, head in group:
-                one = Opened(chunk, at, at := at + head.size)
-                found = _indexed(source, one, channels)
-                _fill(source, one, head, buffer, found, check)
-                if found is None:
-                    found = np.array(_walked(buffer, one, channels, room), np.int64)
-                opened.append(one)
-                offsets.append(found)
-            made = _messages(buffer, opened, offsets, channels).within(window)
+        groups = _groups(source, wanted, room)
+        while True:
+            with source.opened():  # not while others work with what was read
+                group = next(groups, None)
+                if group is None:
+                    return
+                made = _read(source, group, channels, room, check).within(window)
             if len(made):
                 yield unpacked(made, room)
+
+
+def _read(
+    source: Source,
+    group: list[tuple[Chunk, ChunkHead]],
+    channels: Collection[int],
+    room: Room,
+    check: bool,
+) -> Ranges:
+    """Return the messages of some channels in neighbours."""
+    buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
+    opened, offsets, at = [], [], 0
+    for chunk, head in group:
+        one = Opened(chunk, at, at := at + head.size)
+        found = _indexed(source, one, channels)
+        _fill(source, one, head, buffer, found, check)
+        if found is None:
+            found = np.array(_walked(buffer, one, channels, room), np.int64)
+        opened.append(one)
+        offsets.append(found)
+    return _messages(buffer, opened, offsets, channels)
 
 
 def may_have(chunk: Chunk, window: Window) -> bool:

@@ -13,7 +13,7 @@ from typing import Any, Protocol, TypeAlias
 from idlc.recordings.errors import RecordingError
 
 #: What is smaller is read with so much of what follows, which is mostly wanted next.
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 
 
 Read: TypeAlias = Callable[[int, memoryview], None]
@@ -29,7 +29,10 @@ class Source(Protocol):
         """Return so many bytes; raise RecordingError if the file has fewer."""
 
     def opened(self) -> AbstractContextManager[Read]:
-        """Give what fills a buffer with the bytes that begin at a place."""
+        """Give what fills a buffer with the bytes that begin at a place.
+
+        A local file is opened once for all that is read within this context.
+        """
 
     def close(self) -> None:
         """Release the file; views that somebody holds stay valid."""
@@ -46,23 +49,37 @@ class LocalFile:
         self._path = path.absolute()
         self._known: os.stat_result | None = None
         self._block = (0, memoryview(b""))
-        with self._file() as file:
+        self._held = threading.local()
+        with self._file() as file, self._errors():
             self.size = file.seek(0, 2)
 
     @contextmanager
-    def _file(self) -> Iterator[FileIO]:
+    def _errors(self) -> Iterator[None]:
         try:
-            with FileIO(self._path) as file:
-                now = os.fstat(file.fileno())
-                self._known = then = self._known or now
-                # some file systems number their files anew
-                same = os.path.samestat(now, then) or now.st_mtime_ns == then.st_mtime_ns
-                if not same:
-                    raise RecordingError(f"`{self.name}` was replaced while it was read")
-                yield file
+            yield
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise RecordingError(f"`{self.name}` cannot be read: {reason}") from None
+
+    @contextmanager
+    def _file(self) -> Iterator[FileIO]:
+        """Give the open file; within this context, the same thread opens it no other time."""
+        if file := getattr(self._held, "file", None):
+            yield file
+            return
+        with self._errors():
+            file = FileIO(self._path)
+        with file:
+            now = os.fstat(file.fileno())
+            self._known = then = self._known or now
+            # some file systems number their files anew
+            if not (os.path.samestat(now, then) or now.st_mtime_ns == then.st_mtime_ns):
+                raise RecordingError(f"`{self.name}` was replaced while it was read")
+            self._held.file = file
+            try:
+                yield file
+            finally:
+                self._held.file = None
 
     @contextmanager
     def opened(self) -> Iterator[Read]:
@@ -71,13 +88,14 @@ class LocalFile:
 
             def read(start: int, target: memoryview) -> None:
                 within(self, start, len(target))
-                file.seek(start)
                 done = 0
-                while done < len(target):
-                    if not (size := file.readinto(target[done:])):
-                        why = f"it was cut off at byte {start + done} while it was read"
-                        raise RecordingError(f"`{self.name}` cannot be read: {why}")
-                    done += size
+                with self._errors():
+                    file.seek(start)
+                    while done < len(target) and (size := file.readinto(target[done:])):
+                        done += size
+                if done < len(target):
+                    why = f"it was cut off at byte {start + done} while it was read"
+                    raise RecordingError(f"`{self.name}` cannot be read: {why}")
 
             yield read
 

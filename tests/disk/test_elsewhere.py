@@ -8,6 +8,7 @@ import ctypes
 import io
 import json
 import os
+import pathlib
 import shutil
 import signal
 import subprocess
@@ -359,6 +360,9 @@ def folding(monkeypatch):
 
     for name in functions:
         monkeypatch.setattr(os, name, wrapped(name))
+    if sys.version_info < (3, 11):  # pathlib has functions of os in a class of its own there
+        for name in ("stat", "replace", "unlink"):
+            monkeypatch.setattr(pathlib._NormalAccessor, name, staticmethod(wrapped(name)))
 
 
 @pytest.mark.usefixtures("folding")

@@ -133,6 +133,7 @@ def test_what_is_not_there_is_refused(tmp_path):
         ("CREATE TRIGGER t AFTER INSERT ON topics BEGIN SELECT 1; END", "holds a trigger"),
         ("CREATE VIRTUAL TABLE t USING fts5(a)", "holds a virtual table"),
         ("ALTER TABLE messages ADD COLUMN a AS (zeroblob(1000000000))", "are computed"),
+        ("ALTER TABLE messages ADD COLUMN RowId INTEGER", "is called rowid"),
         ("DROP TABLE messages", "no table of messages"),
         ("UPDATE topics SET name = x'00'", "values of other types"),
         ("UPDATE topics SET name = CAST(x'ff' AS TEXT)", "cannot be read"),

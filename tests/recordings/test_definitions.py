@@ -224,6 +224,32 @@ def test_a_message_without_fields_has_an_empty_definition():
     types, report = types_of(topic("a/msg/B", "", hash_=own))
     assert types.hash(types.topics[0]) == own
     assert list(report) == []
+    blank = Schema("a/msg/B", "ros2msg", "\n")
+    types, report = types_of(recorded(Topic("/x", "a/msg/B", 1, None, "cdr", blank), "rec"))
+    assert (types.topics, [one.code for one in report]) == ((), ["IDL652"])
+
+
+@pytest.mark.parametrize(("hash_", "code"), [(None, "IDL652"), ("here", ""), ("there", "")])
+def test_an_empty_definition_within_another_is_believed_by_its_hash(hash_, code):
+    text = f"String s\n{LINE}MSG: std_msgs/String\n"
+    name = ir.TypeName.parse("std_msgs/msg/A")
+    there, here = (
+        link(
+            "std_msgs",
+            [lower(parse(Source("x", one)), own, Report()) for own, one in pairs],
+            catalog,
+            Report(),
+        ).describer.hash(str(name))
+        for pairs in (
+            [(name, "String s"), (ir.TypeName.parse("std_msgs/msg/String"), "")],
+            [(name, "String s")],
+        )
+    )
+    types, report = types_of(
+        topic(str(name), text, hash_=hash_ and {"here": here, "there": there}[hash_])
+    )
+    assert types.hash(types.topics[0]) == (there if hash_ == "there" else here)
+    assert "".join(one.code for one in report) == code
 
 
 def test_idl_of_others_gives_way_to_what_is_known_here():

@@ -2,6 +2,7 @@
 
 import shutil
 import sqlite3
+from contextlib import closing
 from struct import pack, unpack_from
 
 import pytest
@@ -291,3 +292,14 @@ def test_a_wrong_checksum_of_the_summary_is_seen_on_wish(tmp_path):
     assert read(path, "/imu") == recorded("/imu")
     with open_recording(path, check=True) as container:
         assert "checksum of its summary is wrong" in container.notes[0]
+
+
+@pytest.mark.parametrize("time", ["'soon'", "1.5", "x'01'"])
+@pytest.mark.parametrize("window", [(None, None), (0, 1 << 62), (None, 5)])
+def test_a_row_without_a_time_is_lost_in_no_window(time, window, tmp_path):
+    (path,) = made.by_rosbags(tmp_path / "bag", MESSAGES, "db3").glob("*.db3")
+    with closing(sqlite3.connect(path)) as database:
+        database.execute(f"UPDATE messages SET timestamp = {time} WHERE id = 7")  # noqa: S608
+        database.commit()
+    with pytest.raises(RecordingError, match="values of other types"):
+        read(path, MESSAGES[6].topic, window)

@@ -7,7 +7,9 @@ outside of the window; or an error, where the file contradicts itself.
 import os
 import random
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from io import FileIO
 from struct import pack
 
 import pytest
@@ -15,6 +17,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 import idlc
+from idlc.recordings import source
 from idlc.recordings.container import RecordingError, open_recording
 from idlc.recordings.messages import Window
 from tests.support.mcap_mutations import COMPRESS, MAGIC
@@ -53,6 +56,7 @@ class File:
         self.repeats = rng.random() < 0.5
         self.time = 1000
         self.lies = False
+        self.has_summary = rng.random() < 0.8
         if self.repeats or rng.random() < 0.5:
             self.data += DEFINED
         else:
@@ -80,19 +84,26 @@ class File:
         name = self.rng.choice(list(COMPRESS))
         stored = COMPRESS[name](records)
         first, last = min(times, default=0), max(times, default=0)
+        if not self.has_summary and self.rng.random() < 0.1:
+            first, last = 5, 6
         head = pack("<QQQI", first, last, len(records), zlib.crc32(records)) + text(name)
         whole = record(6, head + pack("<Q", len(stored)) + stored)
         at, behind, places = len(self.data), b"", b""
         self.data += whole
         if self.rng.random() < 0.8:
             for number, entries in indexes.items():
+                if self.rng.random() < 0.02:
+                    entries.pop()
+                    self.lies = self.has_summary
+                if not entries:
+                    continue
                 places += pack("<HQ", number, len(self.data) + len(behind))
                 packed = b"".join(pack("<QQ", *one) for one in entries)
                 behind += record(7, pack("<H", number) + text(packed))
             self.data += behind
         kept = self.rng.random() < 0.8
         if self.rng.random() < 0.02 and len(places) > 10:
-            places, self.lies = places[10:], True  # one channel of several
+            places, self.lies = places[10:], self.has_summary  # one channel of several
         content = pack("<QQQQ", first, last, at, len(whole)) + text(places if kept else b"")
         content += pack("<Q", len(behind)) + text(name) + pack("<QQ", len(stored), len(records))
         self.chunk_indexes.append(record(8, content))
@@ -111,12 +122,11 @@ class File:
                     self.data += record(15, pack("<I", 0))
                 case _:
                     self.chunk()
-        ending = self.rng.randrange(10)
-        if ending == 0:
+        if not self.has_summary and self.rng.random() < 0.5:
             return self.data
         self.data += record(15, pack("<I", 0))
         start = len(self.data)
-        if ending == 1:
+        if not self.has_summary:
             return self.data + record(2, pack("<QQI", 0, 0, 0)) + MAGIC
         chunks = self.chunk_indexes if self.rng.random() < 0.9 else self.chunk_indexes[1:]
         self.rng.shuffle(chunks)
@@ -180,6 +190,22 @@ def test_no_window_loses_a_message(tmp_path):
     assert lies
 
 
+@pytest.mark.parametrize("what", ["schema 1", "channel 2"])
+@pytest.mark.parametrize("chunked", [True, False])
+def test_an_id_that_is_defined_in_two_ways_is_an_error(what, chunked, tmp_path):
+    """Otherwise messages would be read as those of the other."""
+    path, file = tmp_path / "a.mcap", File(random.Random(SEED))
+    file.chunk()
+    changed = {"schema 1": (b"int8", b"bool"), "channel 2": (b"/b", b"/c")}[what]
+    if chunked:
+        file.chunk([DEFINED.replace(*changed)])
+    else:
+        file.data += DEFINED.replace(*changed)
+    path.write_bytes(file.data)
+    with pytest.raises(RecordingError, match=f"{what} is defined in two ways"):
+        open_recording(path)
+
+
 def test_a_file_that_is_cut_off_while_it_is_open_is_an_error(tmp_path):
     """It does not end the process, as a mapped file would."""
     path, data = tmp_path / "a.mcap", large()
@@ -210,6 +236,30 @@ def test_a_file_that_is_replaced_while_it_is_open_is_an_error(tmp_path):
         other.replace(path)
         with pytest.raises(RecordingError, match="was replaced while"):
             [topic.to_columns() for topic in recording.values()]
+
+
+def test_neighbours_are_read_from_a_file_that_is_opened_once(tmp_path, monkeypatch):
+    path, opened = tmp_path / "a.mcap", []
+    path.write_bytes(large())
+
+    def counted(*words):
+        opened.append(words)
+        return FileIO(*words)
+
+    with open_recording(path) as container:
+        monkeypatch.setattr(source, "FileIO", counted)
+        for topic in container.topics:
+            list(container.messages(topic, Window()))
+        assert len(opened) <= 2 * len(container.topics)
+
+
+def test_threads_read_one_file_at_once(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_bytes(large())
+    with idlc.Recording(path) as recording, ThreadPoolExecutor(4) as threads:
+        wanted = [topic.to_arrow() for topic in recording.values()]
+        for found in threads.map(lambda topic: topic.to_arrow(), [*recording.values()] * 10):
+            assert any(found.equals(one) for one in wanted)
 
 
 def test_many_files_are_one_recording_whatever_may_be_open_at_once(tmp_path):

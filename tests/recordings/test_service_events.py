@@ -109,6 +109,14 @@ def test_a_definition_of_another_hash_gives_way_to_the_known_type(said, tmp_path
     assert "what is known here has the recorded hash and is used" in text
 
 
+def test_an_empty_definition_within_another_gives_way_to_the_known_type(said, tmp_path):
+    path = rewritten(tmp_path / "a.mcap", without_idl, hashes=False)
+    with idlc.Recording(path, include=[str(FOLDER)]) as recording, idlc.Recording(BAG) as sound:
+        with pytest.warns(UserWarning, match="there is no definition of `kit_msgs/msg/Branch`"):
+            found = recording[ASK].to_arrow()
+        assert found.equals(sound[ASK].to_arrow())
+
+
 def test_a_definition_of_another_hash_is_told_where_nothing_else_is_known(said, tmp_path):
     path = rewritten(tmp_path / "a.mcap", without_idl)
     _, text = said("check", path)
@@ -117,11 +125,18 @@ def test_a_definition_of_another_hash_is_told_where_nothing_else_is_known(said, 
 
 
 def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path):
-    """Also without a hash, as after `ros2 bag convert`; another hash is another message."""
-    path = rewritten(tmp_path / "a.mcap", hashes=False)
-    with idlc.Recording(path) as recording:
+    """Where its hash says so, or, after `ros2 bag convert` left that out, what is known here."""
+    with idlc.Recording(BAG) as recording:
         assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
-    assert "no definition" not in said("show", path, "/empty")[1]
+    path = rewritten(tmp_path / "a.mcap", hashes=False)
+    with idlc.Recording(path, include=[str(FOLDER)]) as recording:
+        assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
+    _, text = said("show", path, "/empty")
+    assert "`/empty` is left out: there is no definition of `kit_msgs/msg/Empty`" in text
+    assert "point -I to the package's sources" in text
+    no_definition = pytest.raises(RecordingError, match="there is no definition")
+    with idlc.Recording(path) as recording, no_definition:
+        recording["/empty"].to_arrow()
     path = rewritten(tmp_path / "b.mcap", lambda text: "" if "float" in text else text)
     with idlc.Recording(path) as recording:
         assert recording["/empty"].to_arrow().num_rows == 15

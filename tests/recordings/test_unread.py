@@ -1,5 +1,8 @@
 """Recordings of messages that idlc does not read: of other encapsulations, or compressed."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 import idlc
@@ -50,6 +53,15 @@ def test_topics_that_cannot_be_read_are_noted(start, notes, tmp_path):
         assert f": messages of `/imu` {SENTENCES[start]}, and idlc reads only" in note
 
 
+def test_the_page_of_the_code_shows_the_warning(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    made.by_mcap(Path("drive.mcap"), messages("0007"))
+    assert main(["check", "drive.mcap"]) == 0
+    shown = "".join(capsys.readouterr()).split("warning[IDL651]")[1].partition("\n\n")[0]
+    assert main(["explain", "IDL651"]) == 0
+    assert shown.replace("/imu", "/scan") in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("start", OTHERS)
 def test_other_topics_are_not_noted(start, notes, tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", messages(start))
@@ -80,6 +92,21 @@ def test_a_damaged_chunk_does_not_keep_a_recording_from_being_shown(tmp_path, ca
     path.write_bytes(data[: at + 8] + bytes(64) + data[at + 72 :])
     assert main(["show", str(path)]) == 0
     assert "/imu" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_damaged_chunk_of_a_file_that_was_not_closed_costs_its_topics_only(compression, tmp_path):
+    path = made.by_mcap(tmp_path / "a.mcap", made.messages(), compression, chunk_size=1)
+    data = path.read_bytes()
+    magic = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18"}[compression]
+    at = [found.start() for found in re.finditer(re.escape(magic), data)][30]
+    path.write_bytes(data[:at] + bytes(40) + data[at + 40 : -100])
+    with idlc.Recording(path) as recording:
+        assert "the chunk at byte " in " ".join(recording.notes)
+        with pytest.raises(RecordingError):
+            recording["/imu"].to_columns()
+        for name in recording.keys() - {"/imu"}:
+            assert len(recording[name].to_columns()) == 20
 
 
 @pytest.mark.parametrize("start", SENTENCES)

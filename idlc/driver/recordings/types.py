@@ -76,7 +76,11 @@ def recorded_types(version: Version, around: Around, scope: Scope, report: Repor
     """
     told, others = Report(), Report()
     types = RecordedTypes(version, around, scope, told)
-    broken = {**dict.fromkeys(types.wrong, WRONG), **dict.fromkeys(types.broken, UNREADABLE)}
+    broken = {
+        **dict.fromkeys(types.empty, ABSENT),
+        **dict.fromkeys(types.wrong, WRONG),
+        **dict.fromkeys(types.broken, UNREADABLE),
+    }
     broken = {name: why for name, why in broken.items() if around.library.source(name) is not None}
     if broken:
         trial = RecordedTypes(version, around, scope, others, broken)
@@ -211,6 +215,20 @@ class RecordedTypes:
                         found.add(name)
         return found
 
+    @property
+    def empty(self) -> set[ir.TypeName]:
+        """The empty definitions of types that have fields here, unless a recorded hash agrees."""
+        found: set[ir.TypeName] = set()
+        contents = Contents()
+        for name, one in self.texts.items():
+            here = None if one.text else self._around.library.source(name)
+            if here is not None and not contents.same(name, one, here):
+                found.add(name)
+        for topic in self.topics if found else ():
+            if topic.recorded.topic.hash and topic.recorded.topic.hash == self.hash(topic):
+                found -= self.names_of(topic)
+        return found
+
     def may_stand_in(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
         """Return whether no recorded hash says that broken definitions were others than here."""
         typed = {id(one.recorded): one for one in self.topics}
@@ -235,15 +253,15 @@ def _empty_ones(
 ) -> Iterator[tuple[ir.TypeName, Source]]:
     """Yield the messages whose definitions are empty because they are.
 
-    Their hashes say so, or where none was recorded, what is known here or their encoding.
+    Their hashes say so, or what is known here where none was recorded. Otherwise an empty
+    definition may be one that the recorder did not find.
     """
     for topic in topics:
         name, recorded = topic.interface, topic.topic.hash
         if name is None or name.kind != "msg" or name in texts:
             continue
         empty = Describer({name: ir.Message(name=name)}).hash(str(name))
-        said = empty if topic.topic.schema and topic.topic.schema.is_blank else None
-        if (recorded or around.hash(name, name) or said) == empty:
+        if (recorded or around.hash(name, name)) == empty:
             path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
             yield name, Source(path, "", topic.recording)
 
