@@ -71,12 +71,13 @@ def is_path(text: str) -> bool:
 class Found(msgspec.Struct, frozen=True):
     """What paths mean: interface files, each once, sorted, and the folders of packages.
 
-    `empty` are the given folders without interface files.
+    `empty` are the given folders without interface files, `folders` all that were looked into.
     """
 
     files: tuple[InterfaceFile, ...]
     packages: tuple[Path, ...]
     empty: tuple[str, ...]
+    folders: tuple[Path, ...]
 
 
 def find(
@@ -114,9 +115,10 @@ def look(
     found: dict[str, InterfaceFile] = {}
     packages: dict[Path, None] = {}
     empty: dict[str, None] = {}
+    folders: list[Path] = []
     for given in paths:
         seen = not is_folder(Path(given))
-        for path in _under(given, report, unsaved):
+        for path in _under(given, report, unsaved, folders):
             whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
             if exclude.has(whole):
                 continue
@@ -130,11 +132,11 @@ def look(
         if not seen:
             empty.setdefault(given)
     files = sorted(found.values(), key=lambda file: (file.shown, file.given))
-    return Found(tuple(files), tuple(sorted(packages)), tuple(empty))
+    return Found(tuple(files), tuple(sorted(packages)), tuple(empty), tuple(folders))
 
 
-def _under(given: str, report: Report, unsaved: Unsaved) -> Iterator[Path]:
-    """Yield the interface and package.xml files that one path means."""
+def _under(given: str, report: Report, unsaved: Unsaved, folders: list[Path]) -> Iterator[Path]:
+    """Yield the interface and package.xml files that one path means; add the folders to a list."""
     path = Path(given)
     if path.suffix in KINDS and unsaved.is_file(path) and not path.exists():
         yield path
@@ -146,7 +148,7 @@ def _under(given: str, report: Report, unsaved: Unsaved) -> Iterator[Path]:
         report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
         return
     if stat.S_ISDIR(mode):
-        yield from walk(path, report)
+        yield from walk(path, report, folders)
         whole = absolute(path)
         for new in unsaved.new_below(whole):
             inside = new.relative_to(whole)
@@ -190,9 +192,10 @@ def _similar(path: Path) -> str | None:
     return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
 
 
-def walk(folder: Path, report: Report) -> Iterator[Path]:
+def walk(folder: Path, report: Report, folders: list[Path] | None = None) -> Iterator[Path]:
     """Yield each interface file and package.xml below a folder, in no particular order.
 
+    Each folder is added to `folders` before it is listed.
     Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
@@ -202,6 +205,8 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
     seen: set[tuple[int, int]] = set()
     while waiting:
         here = waiting.pop()
+        if folders is not None:
+            folders.append(here)
         try:
             status = here.stat()
             entries = sorted(os.scandir(here), key=lambda entry: entry.name)

@@ -10,7 +10,6 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.built_in_files import file_of, inside
-from idlc.disk.read import is_file
 from idlc.driver.workspace import State, Wishes
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
@@ -135,17 +134,6 @@ class World:
         wishes = {name: getattr(self.settings, name) for name in Wishes.__struct_fields__}
         self.projects.settle(Wishes(**wishes))
         return ""
-
-    def notice_rename(self) -> bool:
-        """Look whether the client has renamed the file that it was told to, and return that.
-
-        An editor that has the file in no buffer says nothing of it.
-        """
-        one = self.renaming
-        is_new = one is not None and self.projects.have(one.old) and not is_file(one.old)
-        if one is not None and is_new:
-            self.projects.changed_on_disk((one.old, one.new))
-        return is_new
 
     def known(self, uri: str) -> Known | None:
         """Return what is known of an interface file; `None` if it is not looked at."""

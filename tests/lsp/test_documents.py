@@ -281,3 +281,15 @@ def test_a_folder_without_settings_or_packages_is_looked_at(editor, tmp_path):
     assert codes(one.pull(uri)) == ["IDL201"]
     (tmp_path / "B.txt").write_text("x")
     assert one.pull((tmp_path / "B.txt").as_uri()) == []
+
+
+def test_files_that_change_while_the_editor_says_nothing(editor, package):
+    """For a client that watches nothing, long after its last message."""
+    folder = package({"msg/Wheel.msg": "float64 radius\n"})
+    one = editor(folder)
+    uri = one.open(folder / "msg/Wheel.msg")
+    assert one.wait(uri) == []
+    for name in ("New", "Newer"):
+        path = folder / f"msg/{name}.msg"
+        path.write_text("flot64 x\n")
+        assert "IDL201" in codes(one.wait(path.as_uri()))

@@ -5,6 +5,7 @@ Whatever an editor does around it, what its user sees is afterwards what was ask
 
 import random
 import re
+from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
@@ -57,6 +58,49 @@ def test_rename_undo_redo(client, cmake):
             client.write(client.folder / path, text)
     client.move(client.folder / "base/msg/Pose.msg", client.folder / "base/msg/Waypoint.msg")
     assert client.files() == RENAMED
+
+
+def test_a_file_that_is_renamed_long_after_the_edits(client):
+    """As on a busy machine, when the server has looked around in between."""
+    edit = client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    *edits, move = edit.document_changes
+    client.apply(lsp.WorkspaceEdit(document_changes=edits), "Pose")
+    client.server.rest()
+    client.server.idle()
+    assert "IDL201" in {code for _, code, _ in client.problems()}
+    old, new = (Path(one.removeprefix("file://")) for one in (move.old_uri, move.new_uri))
+    client.move_silently(old, new)
+    client.server.idle()
+    assert client.files() == RENAMED
+    assert "IDL201" not in {code for _, code, _ in client.problems()}
+
+
+def _replace(path, text):
+    path.with_suffix(".new").write_text(text)
+    path.with_suffix(".new").replace(path)
+
+
+CHANGES = {
+    "a new file": lambda folder: (folder / "base/msg/Bad.msg").write_text("flot64 x\n"),
+    "a new folder": lambda folder: write(folder, {"more/deep/msg/Bad.msg": "flot64 x\n"}),
+    "in place": lambda folder: (folder / "base/msg/Pose.msg").write_text("flot64 x\n"),
+    "replaced": lambda folder: _replace(folder / "base/msg/Pose.msg", "flot64 x\n"),
+    "removed": lambda folder: (folder / "base/msg/Pose.msg").unlink(),
+    "a folder renamed": lambda folder: (folder / "base").rename(folder / ".base"),
+    "package.xml": lambda folder: (folder / "base/package.xml").write_text("<package>"),
+    "settings": lambda folder: (folder / "pyproject.toml").write_text("[tool.idlc]\nx = 1\n"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_changes_that_nobody_tells_of(tmp_path, change):
+    """As a branch that is checked out in a terminal, for a client that watches nothing."""
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    CHANGES[change](folder)
+    client.server.idle()
+    assert client.problems() != before
 
 
 def test_two_renames_in_a_row(client):

@@ -71,6 +71,7 @@ class Server:
         given = [lsp.WorkspaceFolder(uri=one.as_uri(), name=one.name) for one in folders]
         params = lsp.InitializeParams(capabilities=capabilities, workspace_folders=given)
         self.ask(lsp.INITIALIZE, params)
+        self.tell(lsp.INITIALIZED, lsp.InitializedParams())
 
     def _hear(self, *words: Any) -> None:
         self.told.append(words)
@@ -90,6 +91,10 @@ class Server:
     def rest(self) -> None:
         """Send nothing for a while."""
         self._session.prepare()
+
+    def idle(self) -> None:
+        """Send nothing for longer."""
+        self._session.idle()
 
 
 class Simulated:

@@ -61,7 +61,7 @@ class Move(Part, frozen=True, tag="rename", tag_field="kind"):
 
 def prepare(world: World, asked: AtPosition) -> Renamed | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
-    world.notice_rename()
+    world.projects.notice_changes()  # of which a client may not have told yet
     known = world.known(asked.text_document.uri)
     found = spot(world, known, asked.position) if known else None
     if known is None or found is None:
