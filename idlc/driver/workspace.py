@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.suggest import without_options
 from idlc.disk.find import Found, look, root_of
 from idlc.disk.machine import environment
 from idlc.disk.packages import inputs
@@ -129,7 +130,7 @@ class Workspace:
         self._packages: tuple[inputs.Inputs, ...] = ()
         there = Found((), (), (), ())
         begun = time.time_ns()
-        with working_in(self.folder):
+        with working_in(self.folder), without_options():
             wishes = self._wishes
             self._settings = settings = pyproject.load(report, unsaved)
             selected = command_settings.selection(settings, report)
@@ -264,7 +265,7 @@ class Workspace:
         """Return what is known now."""
         found: dict[str, Report] = {}
         models: dict[str, list[Model]] = {}
-        with working_in(self.folder):
+        with working_in(self.folder), without_options():
             for distro, checker in self._checkers.items():
                 found[distro] = Report()
                 models[distro] = checker.check(self._packages, self._selection, found[distro])

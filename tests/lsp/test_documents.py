@@ -293,3 +293,14 @@ def test_files_that_change_while_the_editor_says_nothing(editor, package):
         path = folder / f"msg/{name}.msg"
         path.write_text("flot64 x\n")
         assert "IDL201" in codes(one.wait(path.as_uri()))
+
+
+def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
+    folder = package({"msg/Wheel.msg": "other/Tyre tyre\nnowhere/Tyre tyre2\n"})
+    (folder.parent / "other/msg").mkdir(parents=True)
+    (folder.parent / "other/msg/Tyre.msg").write_text("float64 x\n")
+    one = editor(folder)
+    found = one.wait(one.open(folder / "msg/Wheel.msg"))
+    beside, unknown = (problem.message for problem in found if problem.code == "IDL202")
+    assert "add `..` to `include` in [tool.idlc] of pyproject.toml" in beside
+    assert "add `DIR` to `include` in [tool.idlc] of pyproject.toml" in unknown
