@@ -157,11 +157,18 @@ class World:
 
     def offset(self, source: Source, position: Position) -> int:
         """Return the character of a text at a position."""
-        return positions.places(source.text, self.encoding).offset(position)
+        return self._places(source).offset(position)
 
     def range(self, span: Span) -> Range:
         """Return the range of a span."""
-        return positions.range_of(span, self.encoding)
+        return self._places(span.source).range(span.start, span.end)
+
+    def _places(self, source: Source) -> positions.Places:
+        """Return the places of a text; a client that keeps byte order marks counts them."""
+        skips_mark = positions.has_mark(source.text) and not any(
+            positions.has_mark(one.text) for one in self.documents
+        )
+        return positions.places(source.text, self.encoding, skips_mark=skips_mark)
 
     def location(self, span: Span, state: State) -> Location:
         """Return the location of a span; what is built in is a document of its own.

@@ -5,7 +5,6 @@ Whatever an editor does around it, what its user sees is afterwards what was ask
 
 import random
 import re
-from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
@@ -14,7 +13,7 @@ from idlc.disk.read import Unsaved
 from idlc.driver.workspace import Wishes, Workspace
 from idlc.lsp.protocol.errors import RequestError
 from tests.editors.scenario import RENAMED, RENAMING, write
-from tests.support.simulated import BEHAVIOURS, Server, Simulated
+from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 
 
 @pytest.fixture(params=BEHAVIOURS)
@@ -68,8 +67,7 @@ def test_a_file_that_is_renamed_long_after_the_edits(client):
     client.server.rest()
     client.server.idle()
     assert "IDL201" in {code for _, code, _ in client.problems()}
-    old, new = (Path(one.removeprefix("file://")) for one in (move.old_uri, move.new_uri))
-    client.move_silently(old, new)
+    client.move_silently(path_of(move.old_uri), path_of(move.new_uri))
     client.server.idle()
     assert client.files() == RENAMED
     assert "IDL201" not in {code for _, code, _ in client.problems()}
@@ -161,6 +159,50 @@ def test_a_file_in_two_folders_of_the_workspace(tmp_path, name):
     client = Simulated(folder, BEHAVIOURS[name], roots)
     rename(client)
     assert client.files() == RENAMED
+
+
+def test_a_folder_and_a_link_to_it_in_one_workspace(client):
+    """Each file is edited once, or the second edit would be of what the first one wrote."""
+    (client.folder.parent / "link").symlink_to(client.folder)
+    roots = client.folder, client.folder.parent / "link"
+    client = Simulated(client.folder, client.behaviour, roots)
+    edit = client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    files = [path_of(one.text_document.uri).resolve() for one in edit.document_changes[:-1]]
+    assert len(files) == len(set(files))
+    client.apply(edit, "Pose")
+    assert client.files() == RENAMED
+
+
+@pytest.mark.parametrize("is_kept", [False, True])
+@pytest.mark.parametrize("name", BEHAVIOURS)
+def test_positions_after_a_byte_order_mark(tmp_path, name, is_kept):
+    """Editors drop the mark when they read a file; one that keeps it counts it."""
+    cmake = "\ufeff" + RENAMING["base/CMakeLists.txt"].replace("\n", " ") + "\n# msg/Pose.msg.in\n"
+    files = {**RENAMING, "base/CMakeLists.txt": cmake}
+    folder = write(tmp_path.resolve() / "workspace", files)
+    client = Simulated(folder, BEHAVIOURS[name]._replace(syncs_cmake=is_kept))
+    client.coding = "utf-8" if is_kept else "utf-8-sig"
+    if is_kept:
+        client.open(folder / "base/CMakeLists.txt")
+    rename(client)
+    expected = cmake if is_kept else cmake[1:]
+    assert client.text(folder / "base/CMakeLists.txt") == expected.replace(
+        'Pose.msg"', 'Waypoint.msg"'
+    )
+
+
+@pytest.mark.parametrize("asking", ["one", "two"])
+def test_a_message_of_that_name_in_another_folder_is_another(tmp_path, asking):
+    """As in two checkouts of one workspace, which an editor has open side by side."""
+    folder = write(tmp_path.resolve(), {f"one/{path}": text for path, text in RENAMING.items()})
+    write(folder, {f"two/{path}": text for path, text in RENAMING.items()})
+    client = Simulated(folder, BEHAVIOURS["vscode"], (folder / "one", folder / "two"))
+    edit = client.ask_rename(folder / asking / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    client.apply(edit, "Pose")
+    expected = {name: RENAMED if name == asking else RENAMING for name in ("one", "two")}
+    assert client.files() == {
+        f"{name}/{path}": text for name, files in expected.items() for path, text in files.items()
+    }
 
 
 def test_an_editor_that_cannot_rename_files(tmp_path):

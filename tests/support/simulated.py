@@ -104,6 +104,7 @@ class Simulated:
         self.folder = folder
         self.behaviour = behaviour
         self.server = Server(*(roots or (folder,)), capabilities=behaviour.capabilities)
+        self.coding = "utf-8"
         self.texts: dict[Path, str] = {}
         self._versions: dict[Path, int] = {}
 
@@ -117,12 +118,12 @@ class Simulated:
 
     def text(self, path: Path) -> str:
         """Return the text of a buffer, or else of its file."""
-        return self.texts[path] if path in self.texts else path.read_text(encoding="utf-8")
+        return self.texts[path] if path in self.texts else path.read_text(encoding=self.coding)
 
     def open(self, path: Path) -> None:
         """Read a file into a buffer, if it is in none."""
         if path not in self.texts:
-            self.texts[path] = path.read_text(encoding="utf-8")
+            self.texts[path] = path.read_text(encoding=self.coding)
             self._versions[path] = 1
             if self._is_synced(path):
                 item = lsp.TextDocumentItem(path.as_uri(), "rosmsg", 1, self.texts[path])
@@ -146,7 +147,7 @@ class Simulated:
     def save(self, *paths: Path) -> None:
         """Write buffers to disk."""
         for path in paths:
-            path.write_text(self.texts[path], encoding="utf-8", newline="")
+            path.write_text(self.texts[path], encoding=self.coding, newline="")
             if self._is_synced(path):
                 document = lsp.TextDocumentIdentifier(uri=path.as_uri())
                 params = lsp.DidSaveTextDocumentParams(text_document=document)
@@ -183,7 +184,7 @@ class Simulated:
                 touched.append(self._edit(document.uri, document.version, one.edits, old))
             else:
                 assert isinstance(one, lsp.RenameFile)
-                self.move(_path(one.old_uri), _path(one.new_uri))
+                self.move(path_of(one.old_uri), path_of(one.new_uri))
         if self.behaviour.saves:
             self.save(*(path for path in touched if path in self.texts))
 
@@ -217,7 +218,7 @@ class Simulated:
             lsp.WORKSPACE_DIAGNOSTIC, lsp.WorkspaceDiagnosticParams(previous_result_ids=[])
         )
         return {
-            (_path(one.uri).relative_to(self.folder).as_posix(), problem.code, line)
+            (path_of(one.uri).relative_to(self.folder).as_posix(), problem.code, line)
             for one in answer.items
             for problem in one.items
             for line in [problem.range.start.line]
@@ -241,7 +242,7 @@ class Simulated:
             self.server.tell(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, params)
 
     def _edit(self, uri: str, version: int | None, edits: Iterable[Any], old: str) -> Path:
-        path = _path(uri)
+        path = path_of(uri)
         self.open(path)
         assert version in (None, self._versions[path])
         text = self.texts[path]
@@ -257,7 +258,7 @@ class Simulated:
         return path
 
 
-def _path(uri: str) -> Path:
+def path_of(uri: str) -> Path:
     assert uri.startswith("file://")
     return Path(uri.removeprefix("file://"))
 
