@@ -5,6 +5,7 @@ Whatever an editor does around it, what its user sees is afterwards what was ask
 
 import random
 import re
+from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
@@ -222,6 +223,25 @@ def test_the_same_name_changes_nothing(client):
 def test_names_that_are_refused(client, new):
     with pytest.raises(RequestError, match=r"such a name|already|no file"):
         client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, new)
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to("nowhere")])
+def test_names_of_what_is_no_file(client, make):
+    """A rename would fail after its edits, or replace a link."""
+    make(client.folder / "base/msg/Waypoint.msg")
+    with pytest.raises(RequestError, match="already"):
+        rename(client)
+
+
+def test_a_file_that_is_named_twice(asking):
+    client = asking
+    client.open(client.folder / "fleet/msg/Robot.msg")
+    old, new = (client.folder / f"base/msg/{name}.msg" for name in ("Pose", "Waypoint"))
+    moved = lsp.FileRename(old_uri=old.as_uri(), new_uri=new.as_uri())
+    params = lsp.RenameFilesParams(files=[moved, moved])
+    client.apply(client.server.ask(lsp.WORKSPACE_WILL_RENAME_FILES, params), "Pose")
+    client.move_silently(old, new)
+    assert client.files() == RENAMED
 
 
 def test_names_that_no_message_can_have(asking):

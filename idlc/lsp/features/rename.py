@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -150,7 +151,7 @@ def _rename_interface(
         raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
-    if is_file(target) or world.documents.at(target):
+    if os.path.lexists(target) or world.documents.at(target):
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
@@ -182,7 +183,7 @@ def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
     world.projects.forget()
     edits: dict[str, list[TextEdit]] = {}
     report = Report()
-    for one in asked.files:
+    for one in {each.old_uri: each for each in asked.files}.values():
         old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
         known = world.known(one.old_uri)
         if not (old and new and known and _is_other_name(old, new)):
