@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TypeAlias
 
 from idlc.diagnostics.report import Report
 from idlc.disk.find import look
 from idlc.disk.packages.enclosing import MANIFEST
+from idlc.disk.read import absolute
 
 #: When a file was written and last changed, its size and its number: all 0 if there is none.
 Stamp: TypeAlias = tuple[int, int, int, int]
@@ -32,16 +34,21 @@ def stamps(paths: Iterable[Path]) -> dict[str, Stamp]:
 
 
 class Picture:
-    """What files and folders were when they were read, which began at a time in nanoseconds."""
+    """What folders were before they were listed, and files when they were read.
 
-    def __init__(self, paths: Iterable[Path], begun: int) -> None:
+    That began at a time in nanoseconds.
+    """
+
+    def __init__(
+        self, folders: Mapping[Path, os.stat_result], files: Iterable[Path], begun: int
+    ) -> None:
         now = time.time_ns()
-        # what changed since then was perhaps read before that
-        self._stamps = {
-            path: _UNKNOWN if any(begun - TICK <= at <= now for at in stamp[:2]) else stamp
-            for path in paths
-            for stamp in (_stamp(path),)
-        }
+        self._stamps = {absolute(path): _stamp_of(status) for path, status in folders.items()}
+        for path in files:
+            stamp = _stamp(path)
+            # what changed since then was perhaps read before that
+            is_new = any(begun - TICK <= at <= now for at in stamp[:2])
+            self._stamps[path] = _UNKNOWN if is_new else stamp
 
     def is_true(self) -> bool:
         """Return whether they surely still are the same."""
@@ -50,7 +57,10 @@ class Picture:
 
 def _stamp(path: Path) -> Stamp:
     try:
-        status = path.stat()
+        return _stamp_of(path.stat())
     except (OSError, ValueError):
         return _NO_FILE
+
+
+def _stamp_of(status: os.stat_result) -> Stamp:
     return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino

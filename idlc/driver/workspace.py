@@ -128,7 +128,7 @@ class Workspace:
         self._fixed = report = Report()
         self._earlier: dict[str, Earlier] = {}
         self._packages: tuple[inputs.Inputs, ...] = ()
-        there = Found((), (), (), ())
+        there = Found((), (), (), {})
         begun = time.time_ns()
         with working_in(self.folder), without_options():
             wishes = self._wishes
@@ -145,7 +145,8 @@ class Workspace:
                 there = look(paths, report, found.exclude, unsaved)
                 self._packages = inputs.packages(there.files, self._scope, report, there.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
-            self._picture = Picture(self._read(there), begun)
+            files = (path for path in self._read(there) if not unsaved.has(path))
+            self._picture = Picture(there.folders, files, begun)
         self._places = {
             absolute(self.folder / one.file.path): (number, at)
             for number, given in enumerate(self._packages)
@@ -153,8 +154,7 @@ class Workspace:
         }
 
     def _read(self, there: Found) -> Iterator[Path]:
-        """Yield the absolute paths of the files and folders that a load reads below the folder."""
-        yield from (absolute(one) for one in there.folders)
+        """Yield the absolute paths of the files that a load reads in packages and for settings."""
         yield from (absolute(one.path) for one in there.files)
         homes = {self.folder, *there.packages, *(one.root for one in there.files)}
         homes |= {self._settings.folder} if self._settings.folder else set()

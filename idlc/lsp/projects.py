@@ -108,6 +108,8 @@ class Projects:
 
     def __init__(self, documents: Documents) -> None:
         self._documents = documents
+        #: Whether folders are to be read again of which the client has not been told since.
+        self.have_news = False
         self._wishes = Wishes()
         self._folders: dict[Path, Project] = {}
         self._strays: dict[tuple[Path, tuple[str, ...]], Project] = {}
@@ -140,6 +142,7 @@ class Projects:
 
     def forget(self) -> None:
         """Let everything be read again when it is needed."""
+        self.have_news = True
         for project in self:
             project.forget()
 
@@ -160,6 +163,7 @@ class Projects:
         changed = [one for one in self if not one.is_current()]
         for project in changed:
             project.forget()
+        self.have_news |= bool(changed)
         return bool(changed)
 
     def all(self) -> list[Project]:

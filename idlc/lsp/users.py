@@ -34,12 +34,12 @@ def users(name: ir.TypeName, known: State, world: World) -> Iterator[tuple[State
     """
     source = text_of(name, known)
     file = known.path_of(source).resolve() if source else None
-    others = []
-    for state in states(world):
-        own = text_of(name, state)
-        path = state.path_of(own) if own else None
-        if path is not None and path in state.interfaces and path.resolve() != file:
-            others.append(state)
+    others = [
+        state
+        for state in states(world)
+        for path, (own, _) in state.interfaces.items()
+        if own.name == name and path.resolve() != file
+    ]
     for state, span, target in uses(world):
         if target == name and not any(state is one for one in others):
             yield state, span

@@ -148,7 +148,6 @@ class Workbench:
 
     def _save(self, _: OfDocument) -> None:
         self.world.projects.forget()
-        self._changed = True
 
     def _change_files(self, given: DidChangeFiles) -> None:
         paths = {path for one in given.changes if (path := uris.to_path(one.uri))}
@@ -172,7 +171,6 @@ class Workbench:
     def rest(self) -> None:
         """Do what can wait until the client says nothing."""
         if not self._is_watching and self.world.projects.notice_changes():
-            self._changed = True
             self.settle()
         self._refresh()
 
@@ -196,9 +194,9 @@ class Workbench:
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
-        if not self._changed:
+        if not (self._changed or self.world.projects.have_news):
             return
-        self._changed = False
+        self._changed = self.world.projects.have_news = False
         new_documents = [one for one in self.world.documents if one.uri not in self._prints]
         self._prints |= self._fingerprints(new_documents) if new_documents else {}
         from idlc.lsp.publish import diagnostics

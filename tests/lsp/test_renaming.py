@@ -12,6 +12,7 @@ from lsprotocol import types as lsp
 
 from idlc.disk.read import Unsaved
 from idlc.driver.workspace import Wishes, Workspace
+from idlc.lsp.protocol.capabilities import ADD_DEPENDENCY
 from idlc.lsp.protocol.errors import RequestError
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
@@ -100,6 +101,49 @@ def test_changes_that_nobody_tells_of(tmp_path, change):
     CHANGES[change](folder)
     client.server.idle()
     assert client.problems() != before
+
+
+def test_a_dependency_is_added_to_the_package_xml_that_is_on_disk(tmp_path):
+    """In an editor that tells of interface files only, package.xml may be newer than known."""
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    robot, xml = folder / "fleet/msg/Robot.msg", folder / "fleet/package.xml"
+    client.open(robot)
+    client.problems()
+    xml.write_text("<!-- a licence that somebody added -->\n\n" + xml.read_text())
+    words = {"command": ADD_DEPENDENCY, "arguments": [robot.as_uri(), "std_msgs"]}
+    client.server.ask(lsp.WORKSPACE_EXECUTE_COMMAND, lsp.ExecuteCommandParams(**words))
+    (edit,) = (given["edit"] for name, given, *_ in client.server.told if "applyEdit" in name)
+    ((uri, edits),) = edit["changes"].items()
+    assert uri == xml.as_uri()
+    lines = xml.read_text().split("\n")
+    for one in edits:
+        assert "<depend>base</depend>" in lines[one.range.start.line]  # after which it is put
+
+
+@pytest.mark.parametrize("name", ["neovim", "vscode"])
+def test_what_is_read_anew_for_a_request_is_told(tmp_path, name):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS[name])
+    robot = folder / "fleet/msg/Robot.msg"
+    client.open(robot)
+    (folder / "base/msg/Bad.msg").write_text("flot64 x\n")
+    client.server.told.clear()
+    client.ask_rename(robot, 0, 6, "Waypoint")
+    client.server.settle()
+    assert (folder / "base/msg/Bad.msg").as_uri() in str(client.server.told)
+
+
+def test_a_folder_that_is_gone_and_comes_back(tmp_path):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    folder.rename(tmp_path / "elsewhere")
+    client.server.idle()
+    assert client.problems() == set()
+    (tmp_path / "elsewhere").rename(folder)
+    client.server.idle()
+    assert client.problems() == before != set()
 
 
 def test_two_renames_in_a_row(client):

@@ -88,6 +88,10 @@ class Server:
         self._session.take(method, self._converter.unstructure(params))
         self._session.settle()
 
+    def settle(self) -> None:
+        """Let the server say what a loop does after messages."""
+        self._session.settle()
+
     def rest(self) -> None:
         """Send nothing for a while."""
         self._session.prepare()

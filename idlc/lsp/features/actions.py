@@ -59,6 +59,7 @@ class Guilty(NamedTuple):
 
 def actions(world: World, asked: AskedActions) -> list[Action]:
     """Return what can be done about the problems in a range, and about all of a document."""
+    world.projects.notice_changes()  # or edits may be of older files
     path = world.path(asked.text_document.uri)
     all_ = [Guilty(one, state, at, world) for at, one, state in problems(world) if at == path]
     found: list[Action] = []

@@ -22,6 +22,7 @@ def execute(world: World, asked: Command) -> None:
 
 
 def _declare(world: World, uri: str, package: str) -> None:
+    world.projects.notice_changes()  # or the edit may be of an older package.xml
     known = world.known(uri)
     path = world.path(uri)
     project = world.projects.of(path) if path else None
