@@ -119,6 +119,7 @@ class Workspace:
         self.folder = folder
         self._wishes = wishes
         self._paths = paths
+        self._earlier: dict[str, Earlier] = {}
 
     def load(self, unsaved: Unsaved) -> None:
         """Read what there is; problems that do not depend on texts are remembered.
@@ -126,7 +127,7 @@ class Workspace:
         Raises OSError if the folder is gone.
         """
         self._fixed = report = Report()
-        self._earlier: dict[str, Earlier] = {}
+        self._older, self._earlier = self._earlier, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
         there = Found((), (), (), {})
         begun = time.time_ns()
@@ -250,6 +251,7 @@ class Workspace:
             from idlc.driver.compare.earlier import Earlier
 
             found = Earlier(self.folder, against, self._settings, self._scope)
+            found.follow(self._older.get(against))
             self._earlier[against] = found
         return self._earlier[against]
 

@@ -3,11 +3,15 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
 
 from idlc.cli.main import main
+from idlc.diagnostics.report import Report
+from idlc.lsp.documents import Documents
+from idlc.lsp.protocol.parts import DocumentItem
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -304,3 +308,13 @@ def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
     beside, unknown = (problem.message for problem in found if problem.code == "IDL202")
     assert "add `..` to `include` in [tool.idlc] of pyproject.toml" in beside
     assert "add `DIR` to `include` in [tool.idlc] of pyproject.toml" in unknown
+
+
+def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
+    """Of a file that is open by two spellings of its URI."""
+    documents = Documents()
+    for name in ("A", "%41"):
+        documents.open(DocumentItem(f"file:///x/{name}.msg", "rosmsg", 1, f"# {name}\n"))
+    path = Path("/x/A.msg")
+    report = Report()
+    assert documents.unsaved().read_bytes(path, "A.msg", report) == documents.at(path).data

@@ -113,12 +113,38 @@ def test_a_dependency_is_added_to_the_package_xml_that_is_on_disk(tmp_path):
     xml.write_text("<!-- a licence that somebody added -->\n\n" + xml.read_text())
     words = {"command": ADD_DEPENDENCY, "arguments": [robot.as_uri(), "std_msgs"]}
     client.server.ask(lsp.WORKSPACE_EXECUTE_COMMAND, lsp.ExecuteCommandParams(**words))
-    (edit,) = (given["edit"] for name, given, *_ in client.server.told if "applyEdit" in name)
-    ((uri, edits),) = edit["changes"].items()
+    ((uri, edits),) = client.server.applied().changes.items()
     assert uri == xml.as_uri()
     lines = xml.read_text().split("\n")
     for one in edits:
         assert "<depend>base</depend>" in lines[one.range.start.line]  # after which it is put
+
+
+@pytest.mark.parametrize("is_free", [True, False])
+def test_a_file_gets_the_name_that_a_hint_says(client, is_free):
+    msg, cmake = client.folder / "base/msg", client.folder / "base/CMakeLists.txt"
+    (msg / "Track.msg").rename(msg / "way_track.msg")
+    cmake.write_text(cmake.read_text().replace("Track", "way_track"))
+    if not is_free:
+        (msg / "WayTrack.msg").write_text("int8 x\n")
+    client.open(msg / "way_track.msg")
+    start = lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0))
+    asked = lsp.CodeActionParams(
+        lsp.TextDocumentIdentifier((msg / "way_track.msg").as_uri()),
+        start,
+        lsp.CodeActionContext([]),
+    )
+    told = client.server.answer(lsp.TEXT_DOCUMENT_CODE_ACTION, asked)
+    commands = [one["command"] for one in told if "Rename" in one["title"]]
+    assert len(commands) == is_free
+    for one in commands:
+        assert one["title"] == "Rename the file to `WayTrack.msg`"
+        params = lsp.ExecuteCommandParams(one["command"], arguments=one["arguments"])
+        client.server.ask(lsp.WORKSPACE_EXECUTE_COMMAND, params)
+        client.apply(client.server.applied(), "way_track")
+        assert client.text(msg / "WayTrack.msg") == RENAMING["base/msg/Track.msg"]
+        assert "msg/WayTrack.msg" in client.text(cmake)
+        assert "way_track" not in str(client.files())
 
 
 @pytest.mark.parametrize("name", ["neovim", "vscode"])
@@ -144,6 +170,23 @@ def test_a_folder_that_is_gone_and_comes_back(tmp_path):
     (tmp_path / "elsewhere").rename(folder)
     client.server.idle()
     assert client.problems() == before != set()
+
+
+def test_the_folder_that_the_server_was_started_in_is_gone(tmp_path, monkeypatch):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    try:
+        here.rmdir()
+    except OSError:
+        pytest.skip("this system keeps the working folders of processes")
+    client.open(folder / "base/msg/Pose.msg")
+    client.write(folder / "base/msg/Pose.msg", "flot64 x\n")
+    assert client.problems() > before
+    rename(client, "Pose", "Waypoint")
 
 
 def test_two_renames_in_a_row(client):

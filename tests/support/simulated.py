@@ -78,10 +78,19 @@ class Server:
 
     def ask(self, method: str, params: object) -> Any:
         """Return the answer to a request; raises RequestError."""
-        answer = self._session.answer(method, self._converter.unstructure(params))
-        message = {"jsonrpc": "2.0", "id": 1, "result": answer}
-        body = json.loads(self._session.encode(message))
+        body = {"jsonrpc": "2.0", "id": 1, "result": self.answer(method, params)}
         return self._converter.structure(body, lsp.METHOD_TO_TYPES[method][1]).result
+
+    def answer(self, method: str, params: object) -> Any:
+        """Return the answer to a request as JSON; raises RequestError."""
+        answer = self._session.answer(method, self._converter.unstructure(params))
+        return json.loads(self._session.encode(answer))
+
+    def applied(self) -> lsp.WorkspaceEdit:
+        """Return the edit that the server asked for, which is one."""
+        (edit,) = (given["edit"] for name, given, *_ in self.told if "applyEdit" in name)
+        given = json.loads(self._session.encode(edit))
+        return self._converter.structure(given, lsp.WorkspaceEdit)
 
     def tell(self, method: str, params: object) -> None:
         """Send a notification."""

@@ -81,6 +81,11 @@ def _last(span: Span) -> Span:
     return span.at(span.text.rfind("/") + 1, len(span.text))
 
 
+def can_move_files(world: World) -> bool:
+    """Return whether the client renames files where an edit says so."""
+    return world.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
+
+
 def _home(name: ir.TypeName, asking: Known, world: World) -> Known | None:
     """Return the interface that a file means by a name, if it is one of the workspace's.
 
@@ -104,7 +109,7 @@ def rename(world: World, asked: AskedRename) -> dict[str, object] | None:
         target = found.element.target
         home = _home(target, known, world) if target else None
         assert home is not None
-        return _rename_interface(home, asked, known, world)
+        return rename_interface(home, asked.text_document.uri, asked.new_name, known, world)
     return _rename_definition(found.element, known, asked.new_name, world)
 
 
@@ -138,11 +143,14 @@ def _changes(known: Known, text: str, world: World) -> Iterable[Change] | None:
     return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
-def _rename_interface(
-    home: Known, asked: AskedRename, asking: Known, world: World
+def rename_interface(
+    home: Known, uri: str, new: str, asking: Known, world: World
 ) -> dict[str, object] | None:
-    """Return the edits for another name of a message, with the renaming of its file."""
-    old, new = home.interface.name, asked.new_name
+    """Return the edits for another name of an interface, with the renaming of its file.
+
+    It was asked for in the document `uri`, which `asking` is about.
+    """
+    old = home.interface.name
     path = home.state.path_of(home.source)
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
@@ -155,13 +163,12 @@ def _rename_interface(
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
-    if not world.supports("workspace", "workspaceEdit", "resourceOperations", "rename"):
+    if not can_move_files(world):
         raise RequestError(REQUEST_FAILED, _CANNOT_MOVE)
     report = Report()
     edits = _edits_of_users(home, new, report, world)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    uri = asked.text_document.uri
     here = world.path(uri)
     used = users(old, home.state, world)
     spans = (_last(one) for state, one in used if state.path_of(one.source) == here)
