@@ -8,7 +8,7 @@ from pathlib import Path
 
 from idlc.cli import output
 from idlc.diagnostics.report import Report
-from idlc.diagnostics.suggest import building
+from idlc.diagnostics.suggest import without_options
 from idlc.disk.find import look
 from idlc.disk.packages.enclosing import MANIFEST
 from idlc.disk.packages.facts import home_of
@@ -39,7 +39,7 @@ def compile_interfaces(package: str) -> dict[str, type]:
     here, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
-        with building():
+        with without_options():
             return {"distclass": _compiled(package)}
     finally:
         os.chdir(here)

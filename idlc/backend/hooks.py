@@ -18,7 +18,7 @@ from idlc.cli import output
 from idlc.cli.exit_status import ended
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.suggest import building, did_you_mean
+from idlc.diagnostics.suggest import did_you_mean, without_options
 from idlc.disk.machine import environment
 from idlc.disk.machine.distribution import Distribution
 from idlc.disk.packages.enclosing import MANIFEST
@@ -49,7 +49,7 @@ def finished(build: Callable[[Report], str | None]) -> str:
             )
             return 2
         try:
-            with building():
+            with without_options():
                 built.extend(filter(None, [build(report)]))
         except OSError as error:
             message = f"cannot write the archive: {reason(error)}"

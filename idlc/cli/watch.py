@@ -7,7 +7,7 @@ import time
 
 from idlc.cli.gen_run import once
 from idlc.diagnostics.visible import one_line
-from idlc.disk.watch import snapshot, stamps
+from idlc.disk.watch import Stamp, snapshot, stamps
 from idlc.driver.generate.gen import GenOptions
 from idlc.recordings.find import files
 
@@ -36,11 +36,11 @@ def run_again(wanted: GenOptions, style: str) -> int:
         return 0
 
 
-def _after(wanted: GenOptions) -> dict[str, tuple[int, int]]:
+def _after(wanted: GenOptions) -> dict[str, Stamp]:
     """Return a snapshot from a moment later, so that a burst of changes counts as one."""
     time.sleep(INTERVAL)
     return _snapshot(wanted)
 
 
-def _snapshot(wanted: GenOptions) -> dict[str, tuple[int, int]]:
+def _snapshot(wanted: GenOptions) -> dict[str, Stamp]:
     return snapshot(wanted.paths, wanted.scope.include) | stamps(files(wanted.paths))

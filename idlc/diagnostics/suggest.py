@@ -55,24 +55,24 @@ def package_hint(name: str, known: Iterable[str]) -> str:
     )
 
 
-_IN_BUILD: ContextVar[bool] = ContextVar("in_build", default=False)
+_HAS_OPTIONS: ContextVar[bool] = ContextVar("has_options", default=True)
 
 
 @contextmanager
-def building() -> Iterator[None]:
-    """Let hints within speak to someone who builds a package and types no options of idlc."""
-    before = _IN_BUILD.set(True)
+def without_options() -> Iterator[None]:
+    """Let hints name settings, for users of a build or an editor, who type no options of idlc."""
+    before = _HAS_OPTIONS.set(False)
     try:
         yield
     finally:
-        _IN_BUILD.reset(before)
+        _HAS_OPTIONS.reset(before)
 
 
 def including(folder: str) -> str:
     """Return the advice to look for packages in a folder, too."""
-    if _IN_BUILD.get():
-        return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
-    return f"add `-I {shlex.quote(folder)}`"
+    if _HAS_OPTIONS.get():
+        return f"add `-I {shlex.quote(folder)}`"
+    return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
 
 
 def closest_package(name: str, known: Iterable[str]) -> str | None:

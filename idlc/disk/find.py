@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -71,12 +71,14 @@ def is_path(text: str) -> bool:
 class Found(msgspec.Struct, frozen=True):
     """What paths mean: interface files, each once, sorted, and the folders of packages.
 
-    `empty` are the given folders without interface files.
+    `empty` are the given folders without interface files, `folders` all that were looked into,
+    with their status from before that.
     """
 
     files: tuple[InterfaceFile, ...]
     packages: tuple[Path, ...]
     empty: tuple[str, ...]
+    folders: Mapping[Path, os.stat_result]
 
 
 def find(
@@ -114,9 +116,10 @@ def look(
     found: dict[str, InterfaceFile] = {}
     packages: dict[Path, None] = {}
     empty: dict[str, None] = {}
+    folders: dict[Path, os.stat_result] = {}
     for given in paths:
         seen = not is_folder(Path(given))
-        for path in _under(given, report, unsaved):
+        for path in _under(given, report, unsaved, folders):
             whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
             if exclude.has(whole):
                 continue
@@ -130,11 +133,13 @@ def look(
         if not seen:
             empty.setdefault(given)
     files = sorted(found.values(), key=lambda file: (file.shown, file.given))
-    return Found(tuple(files), tuple(sorted(packages)), tuple(empty))
+    return Found(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
 
 
-def _under(given: str, report: Report, unsaved: Unsaved) -> Iterator[Path]:
-    """Yield the interface and package.xml files that one path means."""
+def _under(
+    given: str, report: Report, unsaved: Unsaved, folders: dict[Path, os.stat_result]
+) -> Iterator[Path]:
+    """Yield the interface and package.xml files that one path means; note folders as `walk`."""
     path = Path(given)
     if path.suffix in KINDS and unsaved.is_file(path) and not path.exists():
         yield path
@@ -146,7 +151,7 @@ def _under(given: str, report: Report, unsaved: Unsaved) -> Iterator[Path]:
         report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
         return
     if stat.S_ISDIR(mode):
-        yield from walk(path, report)
+        yield from walk(path, report, folders)
         whole = absolute(path)
         for new in unsaved.new_below(whole):
             inside = new.relative_to(whole)
@@ -190,9 +195,12 @@ def _similar(path: Path) -> str | None:
     return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
 
 
-def walk(folder: Path, report: Report) -> Iterator[Path]:
+def walk(
+    folder: Path, report: Report, folders: dict[Path, os.stat_result] | None = None
+) -> Iterator[Path]:
     """Yield each interface file and package.xml below a folder, in no particular order.
 
+    `folders` gets the status of each folder from before it was listed.
     Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
@@ -204,6 +212,8 @@ def walk(folder: Path, report: Report) -> Iterator[Path]:
         here = waiting.pop()
         try:
             status = here.stat()
+            if folders is not None:
+                folders[here] = status
             entries = sorted(os.scandir(here), key=lambda entry: entry.name)
         except OSError as error:
             report.add(unreadable(here.as_posix(), error))

@@ -144,6 +144,10 @@ class Unsaved:
         """Return whether there is such a file, on disk or only in the editor."""
         return is_file(path) or (bool(self._texts) and absolute(path) in self._texts)
 
+    def has(self, path: Path) -> bool:
+        """Return whether another text counts than that of an absolute path's file."""
+        return path in self._texts
+
     def new_below(self, folder: Path) -> Iterator[Path]:
         """Yield what lies below an absolute folder in the editor only."""
         for path in self._texts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,10 +11,16 @@ from pathlib import Path
 
 @contextmanager
 def working_in(folder: Path) -> Iterator[None]:
-    """Work in a folder, as after `cd`; one that is gone raises OSError."""
-    before = Path.cwd()
+    """Work in a folder, as after `cd`; one that is gone raises OSError.
+
+    If the folder from before is gone, which a server may outlive, the process stays in this one.
+    """
+    before = folder
+    with contextlib.suppress(OSError):
+        before = Path.cwd()
     os.chdir(folder)
     try:
         yield
     finally:
-        os.chdir(before)
+        with contextlib.suppress(OSError):
+            os.chdir(before)

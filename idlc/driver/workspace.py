@@ -6,14 +6,16 @@ next load: what an editor has open counts instead of what its file holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.diagnostics.report import Report, Severity
-from idlc.disk.find import look, root_of
+from idlc.diagnostics.suggest import without_options
+from idlc.disk.find import Found, look, root_of
 from idlc.disk.machine import environment
 from idlc.disk.packages import inputs
 from idlc.disk.packages.enclosing import MANIFEST, manifest
@@ -22,6 +24,7 @@ from idlc.disk.read import MAX_SIZE, Unsaved, absolute
 from idlc.disk.scope import scope
 from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings import pyproject
+from idlc.disk.watch import Picture
 from idlc.disk.working_folder import working_in
 from idlc.driver.check import checkers, judged
 from idlc.model import ir
@@ -37,6 +40,10 @@ if TYPE_CHECKING:
     from idlc.driver.compare.breaking import Side
     from idlc.driver.compare.earlier import Earlier
     from idlc.model.link import Model
+
+
+#: What a check of a package may read beside its interfaces.
+AROUND = (MANIFEST, pyproject.FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
 
 
 class Wishes(msgspec.Struct, frozen=True, rename="camel"):
@@ -112,6 +119,7 @@ class Workspace:
         self.folder = folder
         self._wishes = wishes
         self._paths = paths
+        self._earlier: dict[str, Earlier] = {}
 
     def load(self, unsaved: Unsaved) -> None:
         """Read what there is; problems that do not depend on texts are remembered.
@@ -119,9 +127,11 @@ class Workspace:
         Raises OSError if the folder is gone.
         """
         self._fixed = report = Report()
-        self._earlier: dict[str, Earlier] = {}
+        self._older, self._earlier = self._earlier, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
-        with working_in(self.folder):
+        there = Found((), (), (), {})
+        begun = time.time_ns()
+        with working_in(self.folder), without_options():
             wishes = self._wishes
             self._settings = settings = pyproject.load(report, unsaved)
             selected = command_settings.selection(settings, report)
@@ -136,15 +146,24 @@ class Workspace:
                 there = look(paths, report, found.exclude, unsaved)
                 self._packages = inputs.packages(there.files, self._scope, report, there.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
+            files = (path for path in self._read(there) if not unsaved.has(path))
+            self._picture = Picture(there.folders, files, begun)
         self._places = {
             absolute(self.folder / one.file.path): (number, at)
             for number, given in enumerate(self._packages)
             for at, one in enumerate(given.files)
         }
 
-    def holds(self, path: Path) -> bool:
-        """Return whether a file is one of those that are checked."""
-        return path in self._places
+    def _read(self, there: Found) -> Iterator[Path]:
+        """Yield the absolute paths of the files that a load reads in packages and for settings."""
+        yield from (absolute(one.path) for one in there.files)
+        homes = {self.folder, *there.packages, *(one.root for one in there.files)}
+        homes |= {self._settings.folder} if self._settings.folder else set()
+        yield from (home / name for home in homes for name in AROUND)
+
+    def is_current(self) -> bool:
+        """Return whether the folder surely holds what was read last."""
+        return self._picture.is_true()
 
     def counts(self, path: Path) -> bytes | None:
         """Return the text that counts for one of the files that are checked; `None` for others."""
@@ -232,6 +251,7 @@ class Workspace:
             from idlc.driver.compare.earlier import Earlier
 
             found = Earlier(self.folder, against, self._settings, self._scope)
+            found.follow(self._older.get(against))
             self._earlier[against] = found
         return self._earlier[against]
 
@@ -247,7 +267,7 @@ class Workspace:
         """Return what is known now."""
         found: dict[str, Report] = {}
         models: dict[str, list[Model]] = {}
-        with working_in(self.folder):
+        with working_in(self.folder), without_options():
             for distro, checker in self._checkers.items():
                 found[distro] = Report()
                 models[distro] = checker.check(self._packages, self._selection, found[distro])

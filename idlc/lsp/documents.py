@@ -113,8 +113,8 @@ class Documents:
         return self._open.pop(uri, None)
 
     def at(self, path: Path) -> Document | None:
-        """Return the open document of a file."""
-        return next((one for one in self if one.path == path), None)
+        """Return the open document of a file: of two URIs for it, that whose text counts."""
+        return next((one for one in reversed(self._open.values()) if one.path == path), None)
 
     def unsaved(self) -> Unsaved:
         """Return what counts instead of the files on disk."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic
 from idlc.disk.find import KINDS
+from idlc.disk.read import is_folder
 from idlc.driver.stages import InternalError
 from idlc.driver.workspace import State, Wishes, Workspace, alone
 from idlc.lsp.documents import Document, Documents
@@ -32,6 +33,12 @@ class Project:
     def is_loaded(self) -> bool:
         """Whether what is on disk was read."""
         return self._documents is not None
+
+    def is_current(self) -> bool:
+        """Return whether there is nothing else on disk than was read."""
+        if self._documents is None:
+            return self.failure is not None or not is_folder(self.folder)
+        return self.workspace.is_current()
 
     def forget(self) -> None:
         """Let everything be read again when it is needed."""
@@ -101,6 +108,8 @@ class Projects:
 
     def __init__(self, documents: Documents) -> None:
         self._documents = documents
+        #: Whether folders are to be read again of which the client has not been told since.
+        self.have_news = False
         self._wishes = Wishes()
         self._folders: dict[Path, Project] = {}
         self._strays: dict[tuple[Path, tuple[str, ...]], Project] = {}
@@ -133,6 +142,7 @@ class Projects:
 
     def forget(self) -> None:
         """Let everything be read again when it is needed."""
+        self.have_news = True
         for project in self:
             project.forget()
 
@@ -148,9 +158,13 @@ class Projects:
             for project in self:
                 project.follow(path, None)
 
-    def have(self, path: Path) -> bool:
-        """Return whether a file is one of those that are checked, as far as was looked."""
-        return any(one.has(path) for one in self)
+    def notice_changes(self) -> bool:
+        """Let folders be read again that changed on disk; return whether any did."""
+        changed = [one for one in self if not one.is_current()]
+        for project in changed:
+            project.forget()
+        self.have_news |= bool(changed)
+        return bool(changed)
 
     def all(self) -> list[Project]:
         """Return every project, with those that open files need which are in no other."""

@@ -27,10 +27,11 @@ from idlc.lsp.session import Session
 
 #: Messages in a row after which problems are told although more are waiting.
 MOST_IN_A_ROW = 500
-#: Seconds between looks at whether the client still lives.
-PATIENCE = 10.0
-#: Seconds without a message after which there is time for what nobody waits for.
+#: Seconds without a message after which there is time for what nobody waits for; it is twice as
+#: long until the next look at what changed and whether the client still lives, and so on.
 QUIET = 0.3
+#: Seconds between such looks at most.
+PATIENCE = 10.0
 #: What came in: a message, something that is none, or the end.
 Message: TypeAlias = "dict[str, Any]"
 Arrival: TypeAlias = "Message | RequestError | None"
@@ -63,6 +64,7 @@ class Server:
         # to search for garbage takes longer than any answer, and there is hardly any
         gc.disable()
         in_a_row = since = 0
+        wait = PATIENCE
         try:
             while True:
                 if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
@@ -71,8 +73,9 @@ class Server:
                 if since >= MOST_IN_A_ROW:
                     since = self._tidy()
                 try:
-                    arrival = self._arrivals.get(timeout=QUIET if since else PATIENCE)
+                    arrival = self._arrivals.get(timeout=wait)
                 except queue.Empty:
+                    wait = min(2 * wait, PATIENCE)
                     if since:
                         since = self._tidy()
                     elif self._session.client_is_gone():
@@ -82,6 +85,7 @@ class Server:
                     continue
                 in_a_row += 1
                 since += 1
+                wait = QUIET
                 if arrival is None or _is_exit(arrival):
                     return 0 if self._session.is_shut_down else 1
                 self._take(arrival)

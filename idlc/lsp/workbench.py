@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 
+from idlc.driver.workspace import AROUND
 from idlc.lsp.documents import Document
 from idlc.lsp.protocol import capabilities, uris
 from idlc.lsp.protocol.errors import INVALID_REQUEST, RequestError
@@ -24,10 +25,7 @@ from idlc.lsp.protocol.parts import (
 from idlc.lsp.world import RELATIVE, World
 
 #: What is watched on disk: what a check may read.
-WATCHED = (
-    "**/*.{msg,srv,action}",
-    "**/{package.xml,pyproject.toml,CMakeLists.txt,setup.py,setup.cfg,idlc.lock}",
-)
+WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(AROUND)}}}")
 #: What is shown in a document that may change with another.
 _SHOWN = ("inlayHint", "codeLens", "semanticTokens")
 
@@ -41,6 +39,8 @@ class Workbench:
         self._notify = notify
         self._ask = ask
         self._changed = False
+        #: Whether the client was asked to tell of changes on disk.
+        self._is_watching = False
         #: The problems that were told of each document, and the version that they were of.
         self._told: dict[str, tuple[int | None, bytes]] = {}
         #: What features show of each document, as a number, and the version that they show.
@@ -84,6 +84,7 @@ class Workbench:
                 "watchers": [{"globPattern": pattern} for pattern in WATCHED]
             }
             wanted.append(("workspace/didChangeWatchedFiles", options))
+            self._is_watching = True
         if world.supports("workspace", "didChangeConfiguration", "dynamicRegistration"):
             wanted.append(("workspace/didChangeConfiguration", {"section": "idlc"}))
         if wanted:
@@ -147,7 +148,6 @@ class Workbench:
 
     def _save(self, _: OfDocument) -> None:
         self.world.projects.forget()
-        self._changed = True
 
     def _change_files(self, given: DidChangeFiles) -> None:
         paths = {path for one in given.changes if (path := uris.to_path(one.uri))}
@@ -166,11 +166,11 @@ class Workbench:
         """Look for what a client does not tell, while it says nothing."""
         if not self.world.supports("workspace", "didChangeWatchedFiles", RELATIVE):
             self.world.lenses_moved()
+        self.rest()
 
     def rest(self) -> None:
         """Do what can wait until the client says nothing."""
-        if self.world.notice_rename():
-            self._changed = True
+        if not self._is_watching and self.world.projects.notice_changes():
             self.settle()
         self._refresh()
 
@@ -194,9 +194,9 @@ class Workbench:
 
     def settle(self) -> None:
         """Tell the client which problems there are now, where that changed."""
-        if not self._changed:
+        if not (self._changed or self.world.projects.have_news):
             return
-        self._changed = False
+        self._changed = self.world.projects.have_news = False
         new_documents = [one for one in self.world.documents if one.uri not in self._prints]
         self._prints |= self._fingerprints(new_documents) if new_documents else {}
         from idlc.lsp.publish import diagnostics

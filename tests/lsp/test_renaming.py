@@ -5,15 +5,17 @@ Whatever an editor does around it, what its user sees is afterwards what was ask
 
 import random
 import re
+from pathlib import Path
 
 import pytest
 from lsprotocol import types as lsp
 
 from idlc.disk.read import Unsaved
 from idlc.driver.workspace import Wishes, Workspace
+from idlc.lsp.protocol.capabilities import ADD_DEPENDENCY
 from idlc.lsp.protocol.errors import RequestError
 from tests.editors.scenario import RENAMED, RENAMING, write
-from tests.support.simulated import BEHAVIOURS, Server, Simulated
+from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 
 
 @pytest.fixture(params=BEHAVIOURS)
@@ -57,6 +59,134 @@ def test_rename_undo_redo(client, cmake):
             client.write(client.folder / path, text)
     client.move(client.folder / "base/msg/Pose.msg", client.folder / "base/msg/Waypoint.msg")
     assert client.files() == RENAMED
+
+
+def test_a_file_that_is_renamed_long_after_the_edits(client):
+    """As on a busy machine, when the server has looked around in between."""
+    edit = client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    *edits, move = edit.document_changes
+    client.apply(lsp.WorkspaceEdit(document_changes=edits), "Pose")
+    client.server.rest()
+    client.server.idle()
+    assert "IDL201" in {code for _, code, _ in client.problems()}
+    client.move_silently(path_of(move.old_uri), path_of(move.new_uri))
+    client.server.idle()
+    assert client.files() == RENAMED
+    assert "IDL201" not in {code for _, code, _ in client.problems()}
+
+
+def _replace(path, text):
+    path.with_suffix(".new").write_text(text)
+    path.with_suffix(".new").replace(path)
+
+
+CHANGES = {
+    "a new file": lambda folder: (folder / "base/msg/Bad.msg").write_text("flot64 x\n"),
+    "a new folder": lambda folder: write(folder, {"more/deep/msg/Bad.msg": "flot64 x\n"}),
+    "in place": lambda folder: (folder / "base/msg/Pose.msg").write_text("flot64 x\n"),
+    "replaced": lambda folder: _replace(folder / "base/msg/Pose.msg", "flot64 x\n"),
+    "removed": lambda folder: (folder / "base/msg/Pose.msg").unlink(),
+    "a folder renamed": lambda folder: (folder / "base").rename(folder / ".base"),
+    "package.xml": lambda folder: (folder / "base/package.xml").write_text("<package>"),
+    "settings": lambda folder: (folder / "pyproject.toml").write_text("[tool.idlc]\nx = 1\n"),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_changes_that_nobody_tells_of(tmp_path, change):
+    """As a branch that is checked out in a terminal, for a client that watches nothing."""
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    CHANGES[change](folder)
+    client.server.idle()
+    assert client.problems() != before
+
+
+def test_a_dependency_is_added_to_the_package_xml_that_is_on_disk(tmp_path):
+    """In an editor that tells of interface files only, package.xml may be newer than known."""
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    robot, xml = folder / "fleet/msg/Robot.msg", folder / "fleet/package.xml"
+    client.open(robot)
+    client.problems()
+    xml.write_text("<!-- a licence that somebody added -->\n\n" + xml.read_text())
+    words = {"command": ADD_DEPENDENCY, "arguments": [robot.as_uri(), "std_msgs"]}
+    client.server.ask(lsp.WORKSPACE_EXECUTE_COMMAND, lsp.ExecuteCommandParams(**words))
+    ((uri, edits),) = client.server.applied().changes.items()
+    assert uri == xml.as_uri()
+    lines = xml.read_text().split("\n")
+    for one in edits:
+        assert "<depend>base</depend>" in lines[one.range.start.line]  # after which it is put
+
+
+@pytest.mark.parametrize("is_free", [True, False])
+def test_a_file_gets_the_name_that_a_hint_says(client, is_free):
+    msg, cmake = client.folder / "base/msg", client.folder / "base/CMakeLists.txt"
+    (msg / "Track.msg").rename(msg / "way_track.msg")
+    cmake.write_text(cmake.read_text().replace("Track", "way_track"))
+    if not is_free:
+        (msg / "WayTrack.msg").write_text("int8 x\n")
+    client.open(msg / "way_track.msg")
+    start = lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0))
+    asked = lsp.CodeActionParams(
+        lsp.TextDocumentIdentifier((msg / "way_track.msg").as_uri()),
+        start,
+        lsp.CodeActionContext([]),
+    )
+    told = client.server.answer(lsp.TEXT_DOCUMENT_CODE_ACTION, asked)
+    commands = [one["command"] for one in told if "Rename" in one["title"]]
+    assert len(commands) == is_free
+    for one in commands:
+        assert one["title"] == "Rename the file to `WayTrack.msg`"
+        params = lsp.ExecuteCommandParams(one["command"], arguments=one["arguments"])
+        client.server.ask(lsp.WORKSPACE_EXECUTE_COMMAND, params)
+        client.apply(client.server.applied(), "way_track")
+        assert client.text(msg / "WayTrack.msg") == RENAMING["base/msg/Track.msg"]
+        assert "msg/WayTrack.msg" in client.text(cmake)
+        assert "way_track" not in str(client.files())
+
+
+@pytest.mark.parametrize("name", ["neovim", "vscode"])
+def test_what_is_read_anew_for_a_request_is_told(tmp_path, name):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS[name])
+    robot = folder / "fleet/msg/Robot.msg"
+    client.open(robot)
+    (folder / "base/msg/Bad.msg").write_text("flot64 x\n")
+    client.server.told.clear()
+    client.ask_rename(robot, 0, 6, "Waypoint")
+    client.server.settle()
+    assert (folder / "base/msg/Bad.msg").as_uri() in str(client.server.told)
+
+
+def test_a_folder_that_is_gone_and_comes_back(tmp_path):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    folder.rename(tmp_path / "elsewhere")
+    client.server.idle()
+    assert client.problems() == set()
+    (tmp_path / "elsewhere").rename(folder)
+    client.server.idle()
+    assert client.problems() == before != set()
+
+
+def test_the_folder_that_the_server_was_started_in_is_gone(tmp_path, monkeypatch):
+    folder = write(tmp_path.resolve() / "workspace", RENAMING)
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    client = Simulated(folder, BEHAVIOURS["neovim"])
+    before = client.problems()
+    try:
+        here.rmdir()
+    except OSError:
+        pytest.skip("this system keeps the working folders of processes")
+    client.open(folder / "base/msg/Pose.msg")
+    client.write(folder / "base/msg/Pose.msg", "flot64 x\n")
+    assert client.problems() > before
+    rename(client, "Pose", "Waypoint")
 
 
 def test_two_renames_in_a_row(client):
@@ -119,6 +249,50 @@ def test_a_file_in_two_folders_of_the_workspace(tmp_path, name):
     assert client.files() == RENAMED
 
 
+def test_a_folder_and_a_link_to_it_in_one_workspace(client):
+    """Each file is edited once, or the second edit would be of what the first one wrote."""
+    (client.folder.parent / "link").symlink_to(client.folder)
+    roots = client.folder, client.folder.parent / "link"
+    client = Simulated(client.folder, client.behaviour, roots)
+    edit = client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    files = [path_of(one.text_document.uri).resolve() for one in edit.document_changes[:-1]]
+    assert len(files) == len(set(files))
+    client.apply(edit, "Pose")
+    assert client.files() == RENAMED
+
+
+@pytest.mark.parametrize("is_kept", [False, True])
+@pytest.mark.parametrize("name", BEHAVIOURS)
+def test_positions_after_a_byte_order_mark(tmp_path, name, is_kept):
+    """Editors drop the mark when they read a file; one that keeps it counts it."""
+    cmake = "\ufeff" + RENAMING["base/CMakeLists.txt"].replace("\n", " ") + "\n# msg/Pose.msg.in\n"
+    files = {**RENAMING, "base/CMakeLists.txt": cmake}
+    folder = write(tmp_path.resolve() / "workspace", files)
+    client = Simulated(folder, BEHAVIOURS[name]._replace(syncs_cmake=is_kept))
+    client.coding = "utf-8" if is_kept else "utf-8-sig"
+    if is_kept:
+        client.open(folder / "base/CMakeLists.txt")
+    rename(client)
+    expected = cmake if is_kept else cmake[1:]
+    assert client.text(folder / "base/CMakeLists.txt") == expected.replace(
+        'Pose.msg"', 'Waypoint.msg"'
+    )
+
+
+@pytest.mark.parametrize("asking", ["one", "two"])
+def test_a_message_of_that_name_in_another_folder_is_another(tmp_path, asking):
+    """As in two checkouts of one workspace, which an editor has open side by side."""
+    folder = write(tmp_path.resolve(), {f"one/{path}": text for path, text in RENAMING.items()})
+    write(folder, {f"two/{path}": text for path, text in RENAMING.items()})
+    client = Simulated(folder, BEHAVIOURS["vscode"], (folder / "one", folder / "two"))
+    edit = client.ask_rename(folder / asking / "fleet/msg/Robot.msg", 0, 6, "Waypoint")
+    client.apply(edit, "Pose")
+    expected = {name: RENAMED if name == asking else RENAMING for name in ("one", "two")}
+    assert client.files() == {
+        f"{name}/{path}": text for name, files in expected.items() for path, text in files.items()
+    }
+
+
 def test_an_editor_that_cannot_rename_files(tmp_path):
     """As Emacs 28 without idlc.el: nothing rather than a half."""
     folder = write(tmp_path.resolve() / "workspace", RENAMING)
@@ -136,6 +310,25 @@ def test_the_same_name_changes_nothing(client):
 def test_names_that_are_refused(client, new):
     with pytest.raises(RequestError, match=r"such a name|already|no file"):
         client.ask_rename(client.folder / "fleet/msg/Robot.msg", 0, 6, new)
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, lambda path: path.symlink_to("nowhere")])
+def test_names_of_what_is_no_file(client, make):
+    """A rename would fail after its edits, or replace a link."""
+    make(client.folder / "base/msg/Waypoint.msg")
+    with pytest.raises(RequestError, match="already"):
+        rename(client)
+
+
+def test_a_file_that_is_named_twice(asking):
+    client = asking
+    client.open(client.folder / "fleet/msg/Robot.msg")
+    old, new = (client.folder / f"base/msg/{name}.msg" for name in ("Pose", "Waypoint"))
+    moved = lsp.FileRename(old_uri=old.as_uri(), new_uri=new.as_uri())
+    params = lsp.RenameFilesParams(files=[moved, moved])
+    client.apply(client.server.ask(lsp.WORKSPACE_WILL_RENAME_FILES, params), "Pose")
+    client.move_silently(old, new)
+    assert client.files() == RENAMED
 
 
 def test_names_that_no_message_can_have(asking):

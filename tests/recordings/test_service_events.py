@@ -121,7 +121,7 @@ def test_a_definition_of_another_hash_is_told_where_nothing_else_is_known(said, 
     path = rewritten(tmp_path / "a.mcap", without_idl)
     _, text = said("check", path)
     assert "IDL654" in text
-    assert "point -I to the files that the publisher used" in text
+    assert "add `-I DIR` with the files that the publisher used" in text
 
 
 def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path):

@@ -71,25 +71,43 @@ class Server:
         given = [lsp.WorkspaceFolder(uri=one.as_uri(), name=one.name) for one in folders]
         params = lsp.InitializeParams(capabilities=capabilities, workspace_folders=given)
         self.ask(lsp.INITIALIZE, params)
+        self.tell(lsp.INITIALIZED, lsp.InitializedParams())
 
     def _hear(self, *words: Any) -> None:
         self.told.append(words)
 
     def ask(self, method: str, params: object) -> Any:
         """Return the answer to a request; raises RequestError."""
-        answer = self._session.answer(method, self._converter.unstructure(params))
-        message = {"jsonrpc": "2.0", "id": 1, "result": answer}
-        body = json.loads(self._session.encode(message))
+        body = {"jsonrpc": "2.0", "id": 1, "result": self.answer(method, params)}
         return self._converter.structure(body, lsp.METHOD_TO_TYPES[method][1]).result
+
+    def answer(self, method: str, params: object) -> Any:
+        """Return the answer to a request as JSON; raises RequestError."""
+        answer = self._session.answer(method, self._converter.unstructure(params))
+        return json.loads(self._session.encode(answer))
+
+    def applied(self) -> lsp.WorkspaceEdit:
+        """Return the edit that the server asked for, which is one."""
+        (edit,) = (given["edit"] for name, given, *_ in self.told if "applyEdit" in name)
+        given = json.loads(self._session.encode(edit))
+        return self._converter.structure(given, lsp.WorkspaceEdit)
 
     def tell(self, method: str, params: object) -> None:
         """Send a notification."""
         self._session.take(method, self._converter.unstructure(params))
         self._session.settle()
 
+    def settle(self) -> None:
+        """Let the server say what a loop does after messages."""
+        self._session.settle()
+
     def rest(self) -> None:
         """Send nothing for a while."""
         self._session.prepare()
+
+    def idle(self) -> None:
+        """Send nothing for longer."""
+        self._session.idle()
 
 
 class Simulated:
@@ -99,6 +117,7 @@ class Simulated:
         self.folder = folder
         self.behaviour = behaviour
         self.server = Server(*(roots or (folder,)), capabilities=behaviour.capabilities)
+        self.coding = "utf-8"
         self.texts: dict[Path, str] = {}
         self._versions: dict[Path, int] = {}
 
@@ -112,12 +131,12 @@ class Simulated:
 
     def text(self, path: Path) -> str:
         """Return the text of a buffer, or else of its file."""
-        return self.texts[path] if path in self.texts else path.read_text(encoding="utf-8")
+        return self.texts[path] if path in self.texts else path.read_text(encoding=self.coding)
 
     def open(self, path: Path) -> None:
         """Read a file into a buffer, if it is in none."""
         if path not in self.texts:
-            self.texts[path] = path.read_text(encoding="utf-8")
+            self.texts[path] = path.read_text(encoding=self.coding)
             self._versions[path] = 1
             if self._is_synced(path):
                 item = lsp.TextDocumentItem(path.as_uri(), "rosmsg", 1, self.texts[path])
@@ -141,7 +160,7 @@ class Simulated:
     def save(self, *paths: Path) -> None:
         """Write buffers to disk."""
         for path in paths:
-            path.write_text(self.texts[path], encoding="utf-8", newline="")
+            path.write_text(self.texts[path], encoding=self.coding, newline="")
             if self._is_synced(path):
                 document = lsp.TextDocumentIdentifier(uri=path.as_uri())
                 params = lsp.DidSaveTextDocumentParams(text_document=document)
@@ -178,7 +197,7 @@ class Simulated:
                 touched.append(self._edit(document.uri, document.version, one.edits, old))
             else:
                 assert isinstance(one, lsp.RenameFile)
-                self.move(_path(one.old_uri), _path(one.new_uri))
+                self.move(path_of(one.old_uri), path_of(one.new_uri))
         if self.behaviour.saves:
             self.save(*(path for path in touched if path in self.texts))
 
@@ -212,7 +231,7 @@ class Simulated:
             lsp.WORKSPACE_DIAGNOSTIC, lsp.WorkspaceDiagnosticParams(previous_result_ids=[])
         )
         return {
-            (_path(one.uri).relative_to(self.folder).as_posix(), problem.code, line)
+            (path_of(one.uri).relative_to(self.folder).as_posix(), problem.code, line)
             for one in answer.items
             for problem in one.items
             for line in [problem.range.start.line]
@@ -236,7 +255,7 @@ class Simulated:
             self.server.tell(lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, params)
 
     def _edit(self, uri: str, version: int | None, edits: Iterable[Any], old: str) -> Path:
-        path = _path(uri)
+        path = path_of(uri)
         self.open(path)
         assert version in (None, self._versions[path])
         text = self.texts[path]
@@ -252,7 +271,7 @@ class Simulated:
         return path
 
 
-def _path(uri: str) -> Path:
+def path_of(uri: str) -> Path:
     assert uri.startswith("file://")
     return Path(uri.removeprefix("file://"))
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Report
 
 FILE = "pyproject.toml"
+#: The square of the dots in each line, added up, from which on reading takes a second.
+_COSTLY = 10_000_000
 
 
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
@@ -79,6 +81,10 @@ def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
     source = decode(data, name, report)
     if source is None:
         return Config()
+    if has_costly_keys(source):
+        whole = Span(source, 0, len(source.text))
+        report.add(codes.BAD_CONFIG.at(whole, "too many dots in a line: keys this deep are not read"))
+        return Config()
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -91,6 +97,11 @@ def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
     tool = document.get("tool", {})
     table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
     return _checked(table, source, path.parent, report)
+
+
+def has_costly_keys(source: Source) -> bool:
+    """Return whether reading a file as TOML might take long: quadratic in the parts of a key."""
+    return sum(line.count(".") ** 2 for line in source.text.splitlines()) > _COSTLY
 
 
 def _broken(source: Source, message: str) -> Diagnostic:

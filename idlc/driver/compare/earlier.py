@@ -41,7 +41,7 @@ class Earlier:
             msgspec.structs.replace(scope, unsaved=NOTHING_OPEN),
             allowed=command_settings.allowances(settings, ignored),
         )
-        self._commit: str | None = None
+        self.commit: str | None = None
         self._side: Side | None = None
 
     def side(self, packages: Sequence[Inputs]) -> Side:
@@ -56,13 +56,18 @@ class Earlier:
             self._side = found or Side({}, frozenset(), why)
         return self._side
 
+    def follow(self, older: Earlier | None) -> None:
+        """Remember which commit the name meant before the folder was read again."""
+        if older is not None and older.name == self.name:
+            self.commit = older.commit
+
     def has_moved(self) -> bool:
         """Return whether the name means another commit than when this was asked last."""
         if not self.name.startswith(GIT):
             return False
         name = self.name.removeprefix(GIT)
-        before, self._commit = self._commit, revision.commit(name, str(self._folder)) or ""
-        if before == self._commit:
+        before, self.commit = self.commit, revision.commit(name, str(self._folder)) or ""
+        if before == self.commit:
             return False
         self._side = None
         return before is not None

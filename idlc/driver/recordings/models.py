@@ -10,6 +10,7 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report, Severity
 from idlc.diagnostics.source import Span
+from idlc.diagnostics.suggest import including
 from idlc.disk.scope import Scope
 from idlc.driver.recordings.types import Around, RecordedTypes, recorded_types
 from idlc.driver.recordings.versions import Version, contradictions, read, versions
@@ -56,7 +57,7 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
             yield codes.RECORDED_HASH_DIFFERS.of(
                 f"{one.recorded.recording}: topic {topic.name}",
                 f"the definition of `{one.name}` is not that of what was recorded",
-                hint="point -I to the files that the publisher used",
+                hint=f"{including('DIR')} with the files that the publisher used",
                 place=one.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )

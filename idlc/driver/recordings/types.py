@@ -11,6 +11,7 @@ from idlc.checks.size import Extents, oversized
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.diagnostics.source import Source
+from idlc.diagnostics.suggest import including
 from idlc.disk.library import Library
 from idlc.disk.packages import nearby
 from idlc.disk.scope import Scope
@@ -285,7 +286,7 @@ def _typed(
             missing.setdefault((one.recording, why), []).append(one.topic.name)
     for (recording, why), names in missing.items():
         listed = first_few((f"`{name}`" for name in names), NAMED)
-        hint = None if "no type of" in why else "point -I to the package's sources"
+        hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
         report.add(
             codes.MISSING_DEFINITION.of(recording, f"{listed} is left out: {why}", hint=hint)
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -15,7 +16,8 @@ from idlc.driver.check import tidied
 from idlc.driver.workspace import State
 from idlc.lsp.edits import differences, of_documents, workspace_edit
 from idlc.lsp.features import generated
-from idlc.lsp.protocol.capabilities import UPDATE_KIND
+from idlc.lsp.features.rename import can_move_files
+from idlc.lsp.protocol.capabilities import RENAME_FILE, UPDATE_KIND
 from idlc.lsp.protocol.parts import AskedActions, Part, Range
 from idlc.lsp.publish import Shown, problems, shown
 from idlc.lsp.world import World
@@ -23,6 +25,8 @@ from idlc.lsp.world import World
 _FIX, _FIX_ALL, _UPDATE = "quickfix", "source.fixAll.idlc", UPDATE_KIND
 #: Hints that name what should stand there instead.
 _MEANT = re.compile(r"(?:did you mean|write|use) `")
+#: Hints that name what a file should be called.
+_OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 #: Of the names in a hint, so many are tried.
 MOST = 3
 
@@ -59,6 +63,7 @@ class Guilty(NamedTuple):
 
 def actions(world: World, asked: AskedActions) -> list[Action]:
     """Return what can be done about the problems in a range, and about all of a document."""
+    world.projects.notice_changes()  # or edits may be of older files
     path = world.path(asked.text_document.uri)
     all_ = [Guilty(one, state, at, world) for at, one, state in problems(world) if at == path]
     found: list[Action] = []
@@ -94,9 +99,22 @@ def _about(one: Guilty) -> Iterator[Action]:
         for title, edit in _offers(problem.hint or "", problem.span):
             if _helps(one, edit):
                 yield one.action(title, [edit], best=best)
+    if can_move_files(one.world) and (moved := _moved(one)):
+        yield moved
     remark = _remark(one) if problem.severity is Severity.WARNING else None
     if remark is not None and _helps(one, remark):
         yield one.action(f"Ignore {problem.code} here", [remark])
+
+
+def _moved(one: Guilty) -> Action | None:
+    """Return the action that gives a file the name that a hint says, if nothing has it."""
+    hint = _OTHER_FILE.match(one.problem.hint or "")
+    if hint is None or os.path.lexists(one.path.with_name(hint[1])):
+        return None
+    title = f"Rename the file to `{hint[1]}`"
+    arguments = [one.world.uri(one.path), hint[2]]
+    command: dict[str, object] = {"title": title, "command": RENAME_FILE, "arguments": arguments}
+    return Action(title, _FIX, diagnostics=(one.shown,), command=command)
 
 
 def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from idlc.lsp.edits import workspace_edit
-from idlc.lsp.features import generated
+from idlc.lsp.features import generated, rename
 from idlc.lsp.protocol import capabilities
 from idlc.lsp.protocol.errors import INVALID_PARAMS, RequestError
 from idlc.lsp.protocol.parts import Command
@@ -15,13 +15,24 @@ def execute(world: World, asked: Command) -> None:
     match asked.command, *asked.arguments:
         case capabilities.ADD_DEPENDENCY, str(uri), str(package):
             _declare(world, uri, package)
+        case capabilities.RENAME_FILE, str(uri), str(new):
+            _rename(world, uri, new)
         case capabilities.UPDATE_GENERATED, str(uri):
             generated.update(world, uri)
         case _:
             raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}` for these")
 
 
+def _rename(world: World, uri: str, new: str) -> None:
+    world.projects.forget()
+    known = world.known(uri)
+    edit = rename.rename_interface(known, uri, new, known, world) if known else None
+    if edit is not None:
+        world.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
+
+
 def _declare(world: World, uri: str, package: str) -> None:
+    world.projects.notice_changes()  # or the edit may be of an older package.xml
     known = world.known(uri)
     path = world.path(uri)
     project = world.projects.of(path) if path else None

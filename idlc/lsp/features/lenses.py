@@ -75,7 +75,7 @@ def _text(world: World, uri: str, kind: str) -> str:
         return ""
     name = known.interface.name
     if kind == _USERS:
-        return counted(len(list(users(name, world))), "use")
+        return counted(len(list(users(name, known.state, world))), "use")
     if kind == _BREAKS:
         return _what_breaks(known, world)
     model = known.state.model_of(known.interface)
@@ -112,6 +112,8 @@ def _what_breaks(known: Known, world: World) -> str:
     broken = {level for change in earlier.not_allowed(changes) for level in change.levels}
     if not broken:
         return f"breaks nothing against {earlier.name}"
-    count = len({state.path_of(span.source) for state, span in users(interface.name, world)})
+    count = len(
+        {state.path_of(span.source) for state, span in users(interface.name, known.state, world)}
+    )
     levels = ", ".join(level for level in LEVELS if level in broken)
     return f"breaks: {levels} for {counted(count, 'user')} against {earlier.name}"

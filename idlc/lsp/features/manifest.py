@@ -14,7 +14,7 @@ from idlc.disk.read import is_file
 from idlc.disk.working_folder import working_in
 from idlc.driver.workspace import State
 from idlc.lsp.protocol.parts import AskedReferences, AtPosition, Location, Position, Range
-from idlc.lsp.users import uses
+from idlc.lsp.users import states, uses
 from idlc.lsp.world import World
 
 _TOP = Range(Position(0, 0), Position(0, 0))
@@ -32,11 +32,10 @@ def named(world: World, asked: AtPosition) -> str | None:
 
 def definition(package: str, world: World) -> Location | None:
     """Return the package.xml of a package, or what is built in of it."""
-    states = list(_states(world))
-    for state in states:
+    for state in states(world):
         if path := _file(package, state):
             return Location(world.uri(path), _TOP)
-    for state in states:
+    for state in states(world):
         for name in state.library.interfaces(package)[:1]:
             if source := state.source(name):
                 return world.location(Span(source, 0, 0), state)
@@ -71,14 +70,9 @@ def _packages(source: Source) -> Iterator[tuple[str, Span]]:
                 yield one.text, Span(source, start, start + len(one.text))
 
 
-def _states(world: World) -> Iterator[State]:
-    found = (project.state(world.documents) for project in world.projects.all())
-    return (state for state in found if state is not None)
-
-
 def _manifests(world: World) -> Iterator[Path]:
     """Yield the package.xml files of the packages in all folders."""
-    for state in _states(world):
+    for state in states(world):
         for path in state.interfaces:
             if declared := manifest(path.parent.parent):
                 yield declared

@@ -6,12 +6,12 @@ import re
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.source import Span
 from idlc.driver.workspace import State
 from idlc.lsp.elements import Element, elements, spot
 from idlc.lsp.features import manifest
 from idlc.lsp.protocol.parts import AskedReferences, AtPosition, Location, Part, Range
-from idlc.lsp.users import users
+from idlc.lsp.users import text_of, users
 from idlc.lsp.world import Known, World
 from idlc.model import ir
 
@@ -74,15 +74,6 @@ def top(name: ir.TypeName, state: State, world: World) -> Location | None:
     return world.location(Span(source, 0, 0), state) if source else None
 
 
-def text_of(name: ir.TypeName, state: State) -> Source | None:
-    """Return the text that defines an interface."""
-    for model in state.models.values():
-        interface = model.interfaces.get(name)
-        if interface is not None and interface.source is not None:
-            return interface.source
-    return state.source(name)
-
-
 def references(world: World, asked: AskedReferences) -> list[Location]:
     """Return where the thing at a position is used, in all folders, and where it is defined."""
     if package := manifest.named(world, asked):
@@ -97,8 +88,8 @@ def references(world: World, asked: AskedReferences) -> list[Location]:
         return [world.location(span, found.known.state) for span in spans]
     first = top(found.name, found.known.state, world)
     declared = [first] if first and asked.context.include_declaration else []
-    used = [world.location(span, state) for state, span in users(found.name, world)]
     state, path = found.known.state, found.known.state.path_of(found.known.source)
+    used = [world.location(span, one) for one, span in users(found.name, state, world)]
     project = world.projects.of(path)
     span = project.workspace.declaration(path, found.name.package) if project else None
     used += [world.location(span, state)] if span else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -22,7 +23,7 @@ from idlc.lsp.features.navigation import mentions
 from idlc.lsp.protocol import uris
 from idlc.lsp.protocol.errors import REQUEST_FAILED, RequestError
 from idlc.lsp.protocol.parts import AskedFileRenames, AskedRename, AtPosition, Part, Range, TextEdit
-from idlc.lsp.users import users, uses
+from idlc.lsp.users import states, users, uses
 from idlc.lsp.world import Known, Renaming, World
 from idlc.model import ir, names
 
@@ -62,7 +63,7 @@ class Move(Part, frozen=True, tag="rename", tag_field="kind"):
 
 def prepare(world: World, asked: AtPosition) -> Renamed | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
-    world.notice_rename()
+    world.projects.notice_changes()  # of which a client may not have told yet
     known = world.known(asked.text_document.uri)
     found = spot(world, known, asked.position) if known else None
     if known is None or found is None:
@@ -70,7 +71,7 @@ def prepare(world: World, asked: AtPosition) -> Renamed | None:
     if found.part == "name" and found.element.meaning is not None:
         return Renamed(world.range(found.span), found.span.text)
     target = found.element.target
-    if found.part == "type" and target is not None and _home(target, world):
+    if found.part == "type" and target is not None and _home(target, known, world):
         span = _last(found.element.type)
         return Renamed(world.range(span), span.text)
     return None
@@ -81,13 +82,19 @@ def _last(span: Span) -> Span:
     return span.at(span.text.rfind("/") + 1, len(span.text))
 
 
-def _home(name: ir.TypeName, world: World) -> Known | None:
-    """Return an interface whose file is one of the workspace's."""
-    for project in world.projects.all():
-        state = project.state(world.documents)
-        for interface, source in state.interfaces.values() if state else ():
+def can_move_files(world: World) -> bool:
+    """Return whether the client renames files where an edit says so."""
+    return world.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
+
+
+def _home(name: ir.TypeName, asking: Known, world: World) -> Known | None:
+    """Return the interface that a file means by a name, if it is one of the workspace's.
+
+    Where its folder knows it from elsewhere, as what is installed, another folder may have it.
+    """
+    for state in sorted(states(world), key=lambda one: one is not asking.state):
+        for interface, source in state.interfaces.values():
             if interface.name == name:
-                assert state is not None
                 return Known(state, interface, source)
     return None
 
@@ -101,9 +108,9 @@ def rename(world: World, asked: AskedRename) -> dict[str, object] | None:
         raise RequestError(REQUEST_FAILED, "there is no name of this workspace here")
     if found.part == "type":
         target = found.element.target
-        home = _home(target, world) if target else None
+        home = _home(target, known, world) if target else None
         assert home is not None
-        return _rename_interface(home, asked, known, world)
+        return rename_interface(home, asked.text_document.uri, asked.new_name, known, world)
     return _rename_definition(found.element, known, asked.new_name, world)
 
 
@@ -137,11 +144,14 @@ def _changes(known: Known, text: str, world: World) -> Iterable[Change] | None:
     return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
-def _rename_interface(
-    home: Known, asked: AskedRename, asking: Known, world: World
+def rename_interface(
+    home: Known, uri: str, new: str, asking: Known, world: World
 ) -> dict[str, object] | None:
-    """Return the edits for another name of a message, with the renaming of its file."""
-    old, new = home.interface.name, asked.new_name
+    """Return the edits for another name of an interface, with the renaming of its file.
+
+    It was asked for in the document `uri`, which `asking` is about.
+    """
+    old = home.interface.name
     path = home.state.path_of(home.source)
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
@@ -150,19 +160,19 @@ def _rename_interface(
         raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
-    if is_file(target) or world.documents.at(target):
+    if os.path.lexists(target) or world.documents.at(target):
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
-    if not world.supports("workspace", "workspaceEdit", "resourceOperations", "rename"):
+    if not can_move_files(world):
         raise RequestError(REQUEST_FAILED, _CANNOT_MOVE)
     report = Report()
-    edits = _edits_of_users(old, new, path, report, world)
+    edits = _edits_of_users(home, new, report, world)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    uri = asked.text_document.uri
     here = world.path(uri)
-    spans = (_last(one) for state, one in users(old, world) if state.path_of(one.source) == here)
+    used = users(old, home.state, world)
+    spans = (_last(one) for state, one in used if state.path_of(one.source) == here)
     own = dict.fromkeys(Edit(Span(asking.source, one.start, one.end), new) for one in spans)
     world.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
     move = Move(world.uri(path), uris.from_path(target))
@@ -181,13 +191,13 @@ def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
     world.projects.forget()
     edits: dict[str, list[TextEdit]] = {}
     report = Report()
-    for one in asked.files:
+    for one in {each.old_uri: each for each in asked.files}.values():
         old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
         known = world.known(one.old_uri)
         if not (old and new and known and _is_other_name(old, new)):
             continue
         is_own = world.renaming is not None and _is_under_way(world.renaming, old, new, world)
-        found = _edits_of_users(known.interface.name, new.stem, old, report, world)
+        found = _edits_of_users(known, new.stem, report, world)
         for uri, some in found.items():
             if not is_own or world.documents.get(uri):
                 edits.setdefault(uri, []).extend(some)
@@ -213,16 +223,22 @@ def _is_under_way(renaming: Renaming, old: Path, new: Path, world: World) -> boo
 
 
 def _edits_of_users(
-    old: ir.TypeName, new: str, path: Path, report: Report, world: World
+    known: Known, new: str, report: Report, world: World
 ) -> dict[str, list[TextEdit]]:
-    """Return the edits of all files that name an interface: its users, and CMakeLists.txt."""
-    edits: dict[str, dict[TextEdit, None]] = {}  # two folders may hold the same file
-    for state, span in users(old, world):
-        uri = world.uri(state.path_of(span.source))
-        edits.setdefault(uri, {})[TextEdit(world.range(_last(span)), new)] = None
-    for span in _in_cmake(old, path, report, world):
-        uri = world.uri(Path(span.source.path))
-        edits.setdefault(uri, {})[TextEdit(world.range(span), new)] = None
+    """Return the edits of all files that name an interface: its users, and CMakeLists.txt.
+
+    Two folders may hold the same file, also by a link: it is edited once, where it is open.
+    """
+    old, path = known.interface.name, known.state.path_of(known.source)
+    used = users(old, known.state, world)
+    places = [(state.path_of(span.source), _last(span)) for state, span in used]
+    places += [(Path(span.source.path), span) for span in _in_cmake(old, path, report, world)]
+    places.sort(key=lambda place: world.documents.at(place[0]) is None)
+    edited: dict[Path, Path] = {}
+    edits: dict[str, dict[TextEdit, None]] = {}
+    for at, span in places:
+        if edited.setdefault(at.resolve(), at) == at:
+            edits.setdefault(world.uri(at), {})[TextEdit(world.range(span), new)] = None
     return {uri: list(some) for uri, some in edits.items()}
 
 
@@ -233,7 +249,7 @@ def _in_cmake(name: ir.TypeName, path: Path, report: Report, world: World) -> It
     if not unsaved.is_file(cmake):
         return
     source = unsaved.read_source(cmake, str(cmake), report)
-    pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?!\w)")
+    pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?![.-]?\w)")
     for place in (place for one in calls(source) for place in one.places) if source else ():
         if match := pattern.search(place.text):
             yield Span(place.source, place.start + match.start(1), place.start + match.end(1))

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from idlc.diagnostics.source import Span
 from idlc.lsp.elements import elements
-from idlc.lsp.features.navigation import text_of
 from idlc.lsp.features.symbols import sections
 from idlc.lsp.protocol.parts import AtPositions, OfDocument, Part, Range
+from idlc.lsp.users import text_of
 from idlc.lsp.world import CONTENT, Known, World, is_built_in
 from idlc.syntax.parse import parse
 

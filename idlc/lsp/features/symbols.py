@@ -5,6 +5,7 @@ from __future__ import annotations
 from idlc.diagnostics.source import Span
 from idlc.lsp.elements import Element, elements, section_names
 from idlc.lsp.protocol.parts import AskedSymbols, Location, OfDocument, Part, Range
+from idlc.lsp.users import states
 from idlc.lsp.world import Known, World
 from idlc.model import ir
 from idlc.model.spelling import spell
@@ -78,11 +79,9 @@ def _symbol(one: Element, world: World) -> Symbol:
 def workspace(world: World, asked: AskedSymbols) -> list[Found]:
     """Return the interfaces in whose full names the letters of a word occur in this order."""
     found: dict[Found, None] = {}
-    for project in world.projects.all():
-        state = project.state(world.documents)
-        for interface, source in state.interfaces.values() if state else ():
+    for state in states(world):
+        for interface, source in state.interfaces.values():
             if _fits(asked.query.lower(), str(interface.name).lower()):
-                assert state is not None
                 where = world.location(Span(source, 0, 0), state)
                 kind = _KINDS[interface.name.kind]
                 found[Found(interface.name.name, kind, where, interface.name.package)] = None

@@ -12,6 +12,8 @@ ENCODINGS = ("utf-8", "utf-16", "utf-32")
 DEFAULT_ENCODING = "utf-16"
 #: The command that declares a package in package.xml, for what is completed.
 ADD_DEPENDENCY = "idlc.addDependency"
+#: The command that gives a document's file, and its interface, another name.
+RENAME_FILE = "idlc.renameFile"
 #: The command that does what `idlc gen` does for a document, and the kind of action that offers it.
 UPDATE_GENERATED = "idlc.updateGenerated"
 UPDATE_KIND = "source.updateGenerated.idlc"
@@ -57,7 +59,7 @@ CAPABILITIES: dict[str, object] = {
     "foldingRangeProvider": True,
     "selectionRangeProvider": True,
     "documentLinkProvider": {},
-    "executeCommandProvider": {"commands": [ADD_DEPENDENCY, UPDATE_GENERATED]},
+    "executeCommandProvider": {"commands": [ADD_DEPENDENCY, RENAME_FILE, UPDATE_GENERATED]},
     "hoverProvider": True,
     "definitionProvider": True,
     "typeDefinitionProvider": True,

@@ -11,10 +11,15 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from functools import lru_cache
 
-from idlc.diagnostics.source import Span
 from idlc.lsp.protocol.parts import Position, Range
+from idlc.syntax.tree import BYTE_ORDER_MARK
 
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)")
+
+
+def has_mark(text: str) -> bool:
+    """Return whether a text begins with a byte order mark."""
+    return text.startswith(BYTE_ORDER_MARK)
 
 
 def lines_of(text: str) -> list[str]:
@@ -58,10 +63,16 @@ def in_lines(lines: Sequence[str], position: Position, encoding: str) -> tuple[i
 
 
 class Places:
-    """The places of one text in one encoding."""
+    """The places of one text in one encoding.
 
-    def __init__(self, text: str, encoding: str) -> None:
+    With `skips_mark`, the positions do not count a byte order mark, as editors do not that drop it
+    when they read a file.
+    """
+
+    def __init__(self, text: str, encoding: str, *, skips_mark: bool = False) -> None:
         self._encoding = encoding
+        self._skipped = len(BYTE_ORDER_MARK) if skips_mark and has_mark(text) else 0
+        text = text[self._skipped :]
         self._lines = lines_of(text)
         self._starts = [0]
         for line in self._lines[:-1]:
@@ -69,6 +80,7 @@ class Places:
 
     def position(self, offset: int) -> Position:
         """Return the position of a character; within a line's end, that end."""
+        offset = max(offset - self._skipped, 0)
         line = max(bisect_right(self._starts, offset) - 1, 0)
         before = self._lines[line][: offset - self._starts[line]].rstrip("\r\n")
         return Position(line, units(before, self._encoding))
@@ -76,7 +88,7 @@ class Places:
     def offset(self, position: Position) -> int:
         """Return the character at a position."""
         line, at = in_lines(self._lines, position, self._encoding)
-        return self._starts[line] + at
+        return self._skipped + self._starts[line] + at
 
     def range(self, start: int, end: int) -> Range:
         """Return the range of some characters."""
@@ -87,11 +99,6 @@ class Places:
 
 
 @lru_cache(maxsize=256)
-def places(text: str, encoding: str) -> Places:
+def places(text: str, encoding: str, *, skips_mark: bool) -> Places:
     """Return the places of a text."""
-    return Places(text, encoding)
-
-
-def range_of(span: Span, encoding: str) -> Range:
-    """Return the range of a span."""
-    return places(span.source.text, encoding).range(span.start, span.end)
+    return Places(text, encoding, skips_mark=skips_mark)

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Span
+from idlc.diagnostics.suggest import including
 from idlc.model import ir, names
 from idlc.model.lowering import idl_values, slips
 from idlc.model.lowering.fault import Fault
@@ -19,7 +20,6 @@ from idlc.model.lowering.types import STRINGS, as_parsed, positive
 from idlc.syntax import idl_tree
 from idlc.syntax.tree import OPTIONAL, Piece
 
-HINT = "idlc reads no other IDL; point -I to the package's .msg files instead"
 #: What IDL calls primitives; of two that it calls alike, the one that says what it is.
 _PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
 _CONSTANTS = "_Constants"
@@ -81,7 +81,8 @@ class _Lowering:
     def _foreign(self, piece: Piece, what: str) -> None:
         self.strange = True
         message = f"{what} is nothing that ROS 2 writes when it makes IDL of a .msg file"
-        self.report.add(codes.FOREIGN_IDL.at(self.file.span(piece), message, hint=HINT))
+        hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
+        self.report.add(codes.FOREIGN_IDL.at(self.file.span(piece), message, hint=hint))
 
     def _fault(self, fault: Fault) -> None:
         span = Span(self.file.source, fault.start, fault.end)
