@@ -344,6 +344,16 @@ def test_what_is_very_long_is_generated_and_laid_out_soon(here):
         assert status == 0, f"{words}: {out[:300]}"
 
 
+def test_a_pyproject_toml_of_deep_keys_is_refused_soon(here):
+    """Reading a key of TOML takes time by the square of its parts."""
+    make(here / "pkg", {A: "int8 a\n"})
+    (here / "pyproject.toml").write_text(f"[tool.idlc]\na{'.b' * 40_000} = 1\n")
+    ((status, out),) = limited([["check", "pkg"]]).values()
+    assert status == 2
+    assert "IDL611" in out
+    assert "too many dots" in out
+
+
 @pytest.mark.parametrize(
     "text",
     ["<a>" * 400_000 + "</a>" * 400_000, "<depend>é</depend>" * 100_000],

@@ -81,9 +81,9 @@ def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
     source = decode(data, name, report)
     if source is None:
         return Config()
-    if has_costly_keys(source):
+    if _has_costly_keys(source):
         whole = Span(source, 0, len(source.text))
-        report.add(codes.BAD_CONFIG.at(whole, "too many dots in a line: keys this deep are not read"))
+        report.add(codes.BAD_CONFIG.at(whole, "a line has too many dots"))
         return Config()
     if sys.version_info >= (3, 11):
         import tomllib
@@ -99,7 +99,7 @@ def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
     return _checked(table, source, path.parent, report)
 
 
-def has_costly_keys(source: Source) -> bool:
+def _has_costly_keys(source: Source) -> bool:
     """Return whether reading a file as TOML might take long: quadratic in the parts of a key."""
     return sum(line.count(".") ** 2 for line in source.text.splitlines()) > _COSTLY
 
