@@ -133,7 +133,7 @@ def test_an_empty_definition_is_that_of_a_message_without_fields(said, tmp_path)
         assert recording["/empty"].to_arrow().column_names == ["log_time", "publish_time"]
     _, text = said("show", path, "/empty")
     assert "`/empty` is left out: there is no definition of `kit_msgs/msg/Empty`" in text
-    assert "point -I to the package's sources" in text
+    assert "add `-I DIR` with the package's sources" in text
     no_definition = pytest.raises(RecordingError, match="there is no definition")
     with idlc.Recording(path) as recording, no_definition:
         recording["/empty"].to_arrow()
