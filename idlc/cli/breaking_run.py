@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
+from idlc.breaking import settings as breaking_settings
 from idlc.breaking.change import LEVELS
 from idlc.cli import output, reports
 from idlc.diagnostics.formats.github import notice
 from idlc.diagnostics.formats.terminal import counted
 from idlc.diagnostics.report import Report, first_few
 from idlc.disk.scope import scope
-from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings import pyproject
 from idlc.driver.check import Checked
 from idlc.driver.compare.breaking import GIT, BreakingOptions, Verdict, breaking
@@ -47,8 +47,8 @@ def compare(typed: BreakingWishes) -> int:
     """Compare versions, show what breaks and return the exit status."""
     report = Report()
     settings = pyproject.load(report)
-    against = typed.against or command_settings.against(settings, report)
-    allowed = command_settings.allowances(settings, report)
+    against = typed.against or breaking_settings.against(settings, report)
+    allowed = breaking_settings.allowances(settings, report)
     if against is None and not report.had_errors:
         raise click.UsageError(
             "give --against DIR, git:REF, idlc.lock, a recording, distro:NAME or graph"

@@ -6,10 +6,10 @@ import sys
 
 import msgspec
 
+from idlc.checks import settings as check_settings
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
 from idlc.disk.scope import scope
-from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings import pyproject
 from idlc.driver.check import Checked, CheckOptions, check
 
@@ -35,7 +35,7 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     wishes = wishes or Wishes()
     report = Report()
     settings = pyproject.load(report)
-    configured = command_settings.selection(settings, report)
+    configured = check_settings.selection(settings, report)
     chosen = configured.with_lists(wishes.select, wishes.ignore)
     checked = Checked(())
     if wishes.prefix is not None:

@@ -117,15 +117,15 @@ class InterfaceItem(pytest.Item):
 
 
 def _problems(path: Path) -> list[Diagnostic]:
+    from idlc.checks import settings as check_settings
     from idlc.diagnostics.report import Report
     from idlc.disk.scope import scope
-    from idlc.disk.settings import commands as command_settings
     from idlc.disk.settings import pyproject
     from idlc.driver.check import CheckOptions, check
 
     report = Report()
     settings = pyproject.load(report)
-    selection = command_settings.selection(settings, report)
+    selection = check_settings.selection(settings, report)
     if not report.had_errors:
         check(CheckOptions((str(path),), scope(settings), selection), report)
     return list(report)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.checks import settings as check_settings
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.suggest import without_options
 from idlc.disk.find import Found, look, root_of
@@ -22,7 +23,6 @@ from idlc.disk.packages.enclosing import MANIFEST, manifest
 from idlc.disk.packages.names import locks, places
 from idlc.disk.read import MAX_SIZE, Unsaved, absolute
 from idlc.disk.scope import scope
-from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings import pyproject
 from idlc.disk.watch import Picture
 from idlc.disk.working_folder import working_in
@@ -134,7 +134,7 @@ class Workspace:
         with working_in(self.folder), without_options():
             wishes = self._wishes
             self._settings = settings = pyproject.load(report, unsaved)
-            selected = command_settings.selection(settings, report)
+            selected = check_settings.selection(settings, report)
             self._selection = selected.with_lists(wishes.select, wishes.ignore)
             found = scope(
                 settings, wishes.package or None, wishes.include, wishes.exclude, wishes.distro

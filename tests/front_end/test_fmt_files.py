@@ -9,7 +9,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.driver.fmt import laid_out
+from idlc.driver.laid_out import laid_out
 from idlc.model.ir import TypeName
 from idlc.syntax.parse import parse, parse_definition
 from idlc.syntax.tree import Broken, Constant

@@ -10,7 +10,7 @@ from idlc.diagnostics.report import Diagnostic
 from idlc.diagnostics.visible import one_line
 
 
-def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     """Return one command for each problem."""
     return "".join(map(_command, diagnostics))
 

@@ -10,7 +10,7 @@ from idlc.diagnostics.formats import Run
 from idlc.diagnostics.report import Diagnostic, Severity
 
 
-def document(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     """Return the JSON document."""
     seen: dict[str, int] = {}
     return json.dumps([_issue(one, seen) for one in diagnostics], indent=2) + "\n"

@@ -14,7 +14,7 @@ from idlc.diagnostics.visible import one_line
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def document(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+def junit(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     """Return the XML document: a test for each problem, and a passed one for each clean file.
 
     A warning is a passed test with output, unless it fails the run as well: servers fail a build

@@ -18,7 +18,7 @@ from idlc.diagnostics.source import Span
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
-def document(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     """Return the JSON document; services keep those of several commands apart."""
     found = list(diagnostics)
     codes = sorted({one.code for one in found})
@@ -82,7 +82,7 @@ def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, objec
 def _location(span: Span | None, path: str) -> dict[str, object]:
     place: dict[str, object] = {"artifactLocation": _artifact(path)}
     if span is not None and span.source.path == path:
-        place["region"] = _region(span)
+        place["region"] = _physical_region(span)
     return {"physicalLocation": place}
 
 
@@ -94,7 +94,7 @@ def _artifact(path: str) -> dict[str, str]:
     return {"uri": quote(path, errors="replace")}
 
 
-def _region(span: Span) -> dict[str, int]:
+def _physical_region(span: Span) -> dict[str, int]:
     line, column = span.source.position(span.start)
     end_line, end_column = span.source.position(span.end)
     return {"startLine": line, "startColumn": column, "endLine": end_line, "endColumn": end_column}
@@ -104,6 +104,6 @@ def _change(edit: Edit) -> dict[str, object]:
     return {
         "artifactLocation": _artifact(edit.span.source.path),
         "replacements": [
-            {"deletedRegion": _region(edit.span), "insertedContent": {"text": edit.text}}
+            {"deletedRegion": _physical_region(edit.span), "insertedContent": {"text": edit.text}}
         ],
     }

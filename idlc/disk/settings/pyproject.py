@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -25,12 +25,13 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic, Report
 
 FILE = "pyproject.toml"
+_Shape = TypeVar("_Shape", bound=msgspec.Struct)
 #: The square of the dots in each line, added up, from which on reading takes a second.
 _COSTLY = 10_000_000
 
 
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
-    """`[tool.idlc]` as it is written; `disk.settings.commands` reads the tables of commands."""
+    """`[tool.idlc]` as it is written; `command_table` reads the tables of commands."""
 
     paths: Texts = ()
     include: Texts = ()
@@ -158,3 +159,15 @@ def _typed(folder: Path, path: str) -> str:
         return Path(os.path.relpath(whole)).as_posix() if folder != Path.cwd() else path
     except ValueError:
         return whole.as_posix()
+
+
+def command_table(
+    config: Config, name: str, shape: type[_Shape], report: Report
+) -> tuple[_Shape, Place | None]:
+    """Return the table of a command and its place, without one where there is no file."""
+    if config.source is None:
+        return shape(), None
+    place = Place(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
+    found = read_table(config.tables.get(name, {}), shape, place, report)
+    assert found is not None
+    return found, place

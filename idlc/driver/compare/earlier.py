@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from idlc.breaking import settings as breaking_settings
 from idlc.breaking.change import Change
 from idlc.diagnostics.report import Report, Severity
 from idlc.disk import revision
 from idlc.disk.packages.inputs import Inputs
 from idlc.disk.read import NOTHING_OPEN, absolute, is_folder
 from idlc.disk.scope import Scope
-from idlc.disk.settings import commands as command_settings
 from idlc.disk.settings.pyproject import Config
 from idlc.disk.working_folder import working_in
 from idlc.driver.compare.breaking import GIT, BreakingOptions, Side, earlier, not_allowed
@@ -31,7 +31,7 @@ class Earlier:
 
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
         ignored = Report()  # `idlc breaking` tells what is wrong in its table
-        said = wished or command_settings.against(settings, ignored) or ""
+        said = wished or breaking_settings.against(settings, ignored) or ""
         comparable = said.startswith(GIT) or (bool(said) and is_folder(absolute(folder / said)))
         self._folder = folder
         self.name = said if comparable else ""
@@ -39,7 +39,7 @@ class Earlier:
             (),
             self.name,
             msgspec.structs.replace(scope, unsaved=NOTHING_OPEN),
-            allowed=command_settings.allowances(settings, ignored),
+            allowed=breaking_settings.allowances(settings, ignored),
         )
         self.commit: str | None = None
         self._side: Side | None = None

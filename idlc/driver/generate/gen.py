@@ -93,7 +93,9 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if recordings and not report.had_errors:
         from idlc.driver.recordings.gen import recorded_packages
 
-        recorded, texts = recorded_packages(recordings, options, report)
+        recorded, texts = recorded_packages(
+            recordings, options.topics, options.scope, report, whole=bool(options.ament)
+        )
         named += recorded
     if report.had_errors:
         return ()

@@ -15,7 +15,7 @@ from idlc.disk.machine import environment
 from idlc.disk.packages import inputs
 from idlc.disk.packages.requested import borrowed
 from idlc.disk.read import absolute
-from idlc.driver.generate.gen import GenOptions
+from idlc.disk.scope import Scope
 from idlc.driver.recordings.models import check_versions, contradicted
 from idlc.driver.recordings.types import NAMED, Around, recorded_types
 from idlc.driver.recordings.versions import topics_of, versions
@@ -23,30 +23,30 @@ from idlc.model import ir
 
 
 def recorded_packages(
-    paths: Sequence[str], options: GenOptions, report: Report
+    paths: Sequence[str], topics_wanted: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> tuple[list[inputs.Inputs], Mapping[ir.TypeName, Source]]:
     """Return the packages of recorded types with all that these need, and their definitions.
 
-    Into a prefix, packages go whole, because they hide those of the same name in others.
+    `whole` packages are for a prefix, where they hide those of the same name in others.
     """
-    topics = topics_of(paths, options.topics, report)
+    topics = topics_of(paths, topics_wanted, report)
     if topics is None:
         return [], {}
     found = versions(topics)
     check_versions(found, report)
     if report.had_errors or not found:
         return [], {}
-    types = recorded_types(found[0], Around(options.scope, report), options.scope, report)
+    types = recorded_types(found[0], Around(scope, report), scope, report)
     report.extend(contradicted(types))
     names = types.names
-    if options.ament:
+    if whole:
         names = {package: set(types.library.interfaces(package)) for package in names}
     if not names:
         message = (
             f"no topic of {' or '.join(f'`{path}`' for path in paths)} has a type that is known"
         )
         report.add(codes.NO_INTERFACES.of(paths[0], message))
-    if not options.ament:
+    if not whole:
         _tell_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
     home = absolute(paths[0])

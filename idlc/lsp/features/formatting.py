@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from idlc.diagnostics.report import Report
-from idlc.driver.fmt import laid_out
+from idlc.driver.laid_out import laid_out
 from idlc.lsp.edits import differences
 from idlc.lsp.protocol.parts import AtPosition, OfDocument, OfRange, TextEdit
 from idlc.lsp.world import World
