@@ -22,12 +22,13 @@ ROSIDL_FILES = 30
 
 def gen(package: Path, out: Path) -> None:
     from idlc.diagnostics.report import Report
-    from idlc.disk.scope import Scope
-    from idlc.driver.generate.gen import GenOptions, gen
+    from idlc.generate.gen import GenOptions
+    from idlc.generate.gen import gen as gen_gen
+    from idlc.project.scope import Scope
 
     paths, include = (str(package),), (str(package.parent),)
     options = GenOptions(paths, str(out / package.name), Scope(package.name, include))
-    assert gen(options, Report()), f"idlc gen failed on {package}"
+    assert gen_gen(options, Report()), f"idlc gen failed on {package}"
 
 
 def idlc(files: list[Path], out: Path) -> int:

@@ -17,7 +17,7 @@ from benchmarks.measure import IDLC, Goal, Row
 from benchmarks.processes import ENVIRONMENT
 from benchmarks.starting import place
 from benchmarks.work import Work
-from idlc.lsp.protocol import framing
+from idlc.editor.protocol import framing
 
 LARGE = 261
 LINES = 30

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-__version__ = "0.2.0"
+from idlc.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from idlc.driver.recordings.load import load
-    from idlc.driver.recordings.recording import Recording
+    from idlc.recordings.load import load
+    from idlc.recordings.recording import Recording
 
 __all__ = ["Recording", "__version__", "load"]
 
@@ -15,11 +15,11 @@ __all__ = ["Recording", "__version__", "load"]
 def __getattr__(name: str) -> object:
     """Import what programs use when they ask for it."""
     if name == "Recording":
-        from idlc.driver.recordings.recording import Recording
+        from idlc.recordings.recording import Recording
 
         return Recording
     if name == "load":
-        from idlc.driver.recordings.load import load
+        from idlc.recordings.load import load
 
         return load
     raise AttributeError(f"module 'idlc' has no attribute {name!r}")

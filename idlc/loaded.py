@@ -3,6 +3,6 @@
 So they have names by which any process can import them, which pickling needs.
 """
 
-from idlc.disk.cache.loaded import folder
+from idlc.recordings.load import folder
 
 __path__ = [str(folder())]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from idlc.diagnostics import rulebook
-from idlc.diagnostics.code_pages import page
+from idlc.diagnostics import explain
+from idlc.diagnostics.explain import page
 from idlc.diagnostics.codes import CODES
 
 _SECTION = re.compile(r"### (IDL\d+) (\S+) \((.*)\)\n\n((?:.+\n)+)")
@@ -27,7 +27,7 @@ def _page(code: str) -> str:
 
 
 def _overview() -> Iterator[str]:
-    head, *sections = re.split(r"(?m)^## ", rulebook.document())
+    head, *sections = re.split(r"(?m)^## ", explain.document())
     yield head
     for section in sections:
         heading, _, text = section.partition("\n")

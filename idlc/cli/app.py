@@ -2,11 +2,71 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
 import click
 
-from idlc import __version__
-from idlc.cli.exit_status import PipeClosedError
-from idlc.cli.lazy_group import LazyGroup
+from idlc.cli.exit_status import PipeClosedError, ended
+from idlc.version import __version__
+
+
+class LazyGroup(click.Group):
+    """A group of commands, each with its line in the overview.
+
+    The module of a command is `modules` with its name; `meant` are words of other tools, each with
+    the command that is suggested for it.
+    """
+
+    def __init__(
+        self,
+        *args: Any,
+        overview: Mapping[str, str],
+        modules: str,
+        meant: Mapping[str, str] | None = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(*args, **more)
+        self._overview = overview
+        self._modules = modules
+        self._meant = meant or {}
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return the names in the order in which people need them."""
+        return list(self._overview)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Return a command by name; this imports it."""
+        if cmd_name not in self._overview:
+            return None
+        command: click.Command = import_module(f"{self._modules}{cmd_name}").command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that is asked for; suggest one for a name that there is not."""
+        name = args[0]
+        unknown = name not in self._overview and not name.startswith("-")
+        if unknown and not ctx.resilient_parsing:
+            raise click.UsageError(f"no such command: {name!r}; {self._hint(name)}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def _hint(self, name: str) -> str:
+        from idlc.diagnostics.text import did_you_mean
+
+        known = self._meant.get(name.lower())
+        close = f"did you mean `{known}`?" if known else did_you_mean(name, self._overview)
+        return close or f"the commands are {', '.join(self._overview)}"
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """Write the overview without importing any command."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(self._overview.items()))
+
 
 #: Each command with its line in the overview; its module is `idlc.cli.<name>`.
 COMMANDS = {
@@ -83,7 +143,7 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
 @click.group(
     cls=App,
     overview=COMMANDS,
-    modules="idlc.cli.commands.",
+    modules="idlc.cli.",
     meant=MEANT,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
@@ -94,3 +154,23 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
 )
 def app() -> None:
     """Compile ROS 2 interfaces (.msg, .srv, .action) to Python, without CMake or a compiler."""
+
+
+def run(words: list[str]) -> int:
+    """Run a command and return the exit status."""
+    return ended(lambda: _through_click(words))
+
+
+def _through_click(words: list[str]) -> object:
+    try:
+        return app.main(words, prog_name=_called_as(), standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return 2
+    except click.Abort as error:
+        raise KeyboardInterrupt from error
+
+
+def _called_as() -> str:
+    name = Path(sys.argv[0]).stem
+    return name if name == "rosidlc" else "idlc"

@@ -12,38 +12,38 @@ if TYPE_CHECKING:
 
 def packages(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer packages."""
-    from idlc.driver import completion
+    from idlc.cli import candidates
 
-    return completion.packages(word, _include(context), context.params.get("distro"))
+    return candidates.packages(word, _include(context), context.params.get("distro"))
 
 
 def types_and_paths(
     context: click.Context, _: click.Parameter, word: str
 ) -> list[CompletionItem[str]]:
     """Offer types and, in the shell's own way, files."""
-    from idlc.driver import completion
+    from idlc.cli import candidates
 
-    found = completion.types(word, _include(context), distro=context.params.get("distro"))
+    found = candidates.types(word, _include(context), distro=context.params.get("distro"))
     # bash forgets what was offered before files
     return [_item(word, "file"), *map(_item, found)]
 
 
 def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer the topics of the recordings that were typed."""
-    from idlc.driver import completion
+    from idlc.cli import candidates
 
     typed: Any = context.params.get("paths") or (context.params.get("wanted"),)
     # what comes before an option without its value is left as it was typed
-    return completion.topics(word, [path for path in (*typed, *context.args) if path])
+    return candidates.topics(word, [path for path in (*typed, *context.args) if path])
 
 
 def endpoint(context: click.Context, option: click.Parameter, word: str) -> list[str]:
     """Offer the types that an endpoint of a node can have; the topic is the user's."""
-    from idlc.driver import completion
+    from idlc.cli import candidates
     from idlc.scaffold.roles import ROLES
 
     kinds = [role.kind for role in ROLES if role.name == option.name and role.kind]
-    return completion.types(word, _include(context), kinds, bare="own")
+    return candidates.types(word, _include(context), kinds, bare="own")
 
 
 def templates(_: click.Context, __: click.Parameter, word: str) -> list[str]:
@@ -76,7 +76,7 @@ def rules(context: click.Context, option: click.Parameter, word: str) -> list[Co
 
 def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
     """Offer what a list of distributions can go on with."""
-    from idlc.model.distro import BY_NAME
+    from idlc.model.distros import BY_NAME
 
     before, comma, last = word.rpartition(",")
     return [f"{before}{comma}{name}" for name in BY_NAME if name.startswith(last)]

@@ -2,12 +2,43 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
+import io
 import os
 import sys
 from collections.abc import Callable
 
-from idlc.cli import streams
+#: What stands for signs that an encoding does not have.
+_PLAIN = {"→": "->", "…": "..."}
+
+
+def set_up() -> None:
+    """Let no text stop a command, and let what Windows redirects be what others redirect.
+
+    There, files and pipes would get the encoding of the country and other line ends, so that no
+    program could read them. PYTHONIOENCODING has the last word.
+    """
+    codecs.register_error("idlc", _readable)
+    for stream in (sys.stdout, sys.stderr):
+        if not isinstance(stream, io.TextIOWrapper):
+            continue
+        with contextlib.suppress(ValueError):  # it is closed
+            stream.reconfigure(errors="idlc")
+            if sys.platform == "win32" and not stream.isatty():
+                stream.reconfigure(newline="\n")
+                if not os.environ.get("PYTHONIOENCODING"):
+                    stream.reconfigure(encoding="utf-8", errors="idlc")
+
+
+def _readable(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Return what stands for the first sign that cannot be encoded, and where to go on."""
+    if isinstance(error, UnicodeEncodeError) and (plain := _PLAIN.get(error.object[error.start])):
+        return plain, error.start + 1
+    if isinstance(error, UnicodeEncodeError):
+        error.end = error.start + 1
+    return codecs.backslashreplace_errors(error)
+
 
 #: The statuses that shells give to a process ended by SIGINT or SIGPIPE.
 INTERRUPTED = 130
@@ -21,7 +52,7 @@ class PipeClosedError(Exception):
 
 def ended(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
-    streams.set_up()
+    set_up()
     try:
         os.getcwd()  # noqa: PTH109 - a server starts without pathlib
     except OSError:
@@ -45,10 +76,10 @@ def ended(command: Callable[[], object]) -> int:
 
 def _internal(error: Exception) -> int:
     """Show what must not happen as IDL901."""
+    from idlc.check.compiler import InternalError
     from idlc.cli import output
     from idlc.diagnostics import codes
     from idlc.diagnostics.report import Report
-    from idlc.driver.stages import InternalError
 
     cause, where, subject = error, "", ""
     if isinstance(error, InternalError):

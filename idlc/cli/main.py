@@ -4,7 +4,7 @@ import gc
 import sys
 from collections.abc import Sequence
 
-from idlc import __version__
+from idlc.version import __version__
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,16 +33,16 @@ def _run(words: list[str]) -> int:
         return 0
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and to import click takes longer than to check a file
-        from idlc.cli.check_run import check_paths
+        from idlc.cli.direct import check_paths
         from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
     if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
+        from idlc.cli.direct import run as serve
         from idlc.cli.exit_status import ended
-        from idlc.cli.lsp_run import run as serve
 
         return ended(serve)
-    from idlc.cli.click_runner import run
+    from idlc.cli.app import run
 
     return run(words)
 

@@ -98,7 +98,7 @@ def _one(context: click.Context, option: click.Parameter, value: str | None) -> 
 
 
 def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | None:
-    from idlc.model.distro import BY_NAME, listed, unknown_distro
+    from idlc.model.distros import BY_NAME, listed, unknown_distro
 
     for name in listed(value) if value is not None else ():
         if name not in BY_NAME:
@@ -132,13 +132,13 @@ def report_style(command: Command) -> Command:
 
 def check_rules(*lists: str | None) -> None:
     """Refuse lists of rules that name one that there is not."""
-    from idlc.checks.select import is_selector
+    from idlc.check.select import is_selector
 
     for words in lists:
         for word in (words or "").split(","):
             if word and not is_selector(word):
                 from idlc.diagnostics.codes import CATEGORIES, CODES
-                from idlc.diagnostics.suggest import did_you_mean
+                from idlc.diagnostics.text import did_you_mean
 
                 hint = did_you_mean(word, (*CATEGORIES, *(one.slug for one in CODES.values())))
                 hint = hint or "`idlc explain` lists the codes"

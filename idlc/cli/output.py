@@ -3,13 +3,60 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+import shutil
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TextIO
 
-from idlc.diagnostics import codes
-from idlc.diagnostics.formats import terminal
+from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report, Severity
-from idlc.diagnostics.visible import one_line, visible
+from idlc.diagnostics.text import one_line, visible
+
+#: What stands in our console scripts.
+_OURS = b"idlc.cli.main"
+
+
+def program() -> str:
+    """Return `idlc` if that is this program, else another name for it."""
+    for name in ("idlc", "rosidlc"):
+        found = shutil.which(name)
+        if found and _is_ours(Path(found)):
+            return name
+    return f"{Path(sys.executable).name} -m idlc"
+
+
+def _is_ours(path: Path) -> bool:
+    try:
+        return _OURS in path.read_bytes()
+    except OSError:
+        return False
+
+
+WIDTH = 30
+
+
+@contextmanager
+def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
+    """Give a function to tell what is done of how many; the bar goes away at the end."""
+    if not stream.isatty():
+        yield lambda _what, _done, _total: None
+        return
+    size = 0
+
+    def tell(what: str, done: int, total: int) -> None:
+        nonlocal size
+        full = WIDTH * min(done, total) // max(total, 1)
+        line = f"{'█' * full}{'░' * (WIDTH - full)} {done:,} of {total:,}  {one_line(what)[:40]}"
+        stream.write(f"\r{line.ljust(size)}")
+        stream.flush()
+        size = len(line)
+
+    try:
+        yield tell
+    finally:
+        stream.write(f"\r{' ' * size}\r")
 
 
 def colours(stream: TextIO) -> bool:

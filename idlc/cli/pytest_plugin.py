@@ -90,8 +90,8 @@ class InterfaceItem(pytest.Item):
 
     def runtest(self) -> None:
         """Fail with what idlc says about the file."""
-        from idlc.diagnostics.formats.terminal import text
         from idlc.diagnostics.report import Severity
+        from idlc.diagnostics.terminal import text
 
         found = _problems(self.path)
         strict = self.config.getoption("--idlc-strict")
@@ -117,15 +117,15 @@ class InterfaceItem(pytest.Item):
 
 
 def _problems(path: Path) -> list[Diagnostic]:
-    from idlc.checks import settings as check_settings
+    from idlc.check import select
+    from idlc.check.run import CheckOptions, check
     from idlc.diagnostics.report import Report
-    from idlc.disk.scope import scope
-    from idlc.disk.settings import pyproject
-    from idlc.driver.check import CheckOptions, check
+    from idlc.project.scope import scope
+    from idlc.project.settings import load_settings
 
     report = Report()
-    settings = pyproject.load(report)
-    selection = check_settings.selection(settings, report)
+    settings = load_settings(report)
+    selection = select.selection(settings, report)
     if not report.had_errors:
         check(CheckOptions((str(path),), scope(settings), selection), report)
     return list(report)

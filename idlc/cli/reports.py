@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TextIO
 
-from idlc import __version__
 from idlc.cli import output
-from idlc.diagnostics.formats import Run, document
-from idlc.diagnostics.formats.terminal import MANY, counted, statistics, summary
+from idlc.diagnostics.formats import DOCUMENTS, Run
 from idlc.diagnostics.report import Report
+from idlc.diagnostics.terminal import MANY, counted, statistics, summary
+from idlc.version import __version__
 
 if TYPE_CHECKING:
-    from idlc.driver.check import Checked
+    from idlc.check.run import Checked
 
 
 def write(
@@ -49,4 +49,4 @@ def write(
             facts |= {"distros": list(checked.distros)} if checked.distros else {}
             output.fact(stream, "summary", **output.counts(report), **facts)
         case _:
-            stream.write(document(style, report, Run(command, __version__, files, strict)))
+            stream.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))

@@ -1,1 +1,1 @@
-"""Text: what a file is and how a problem in it is shown."""
+"""Sources, problems as values with codes, and the formats in which they are shown."""

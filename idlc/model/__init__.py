@@ -1,1 +1,1 @@
-"""Model: what interface files mean."""
+"""What interface files mean: immutable values, linked by name, with hashes and the catalogue."""

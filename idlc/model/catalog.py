@@ -17,7 +17,7 @@ import msgspec
 
 from idlc.diagnostics.source import Source
 from idlc.model import ir
-from idlc.model.distro import DEFAULT, DISTROS, NEWEST, Distro, later
+from idlc.model.distros import DEFAULT, DISTROS, NEWEST, Distro, later
 
 #: The distribution that is meant where a function is not told.
 distro = DEFAULT

@@ -7,6 +7,8 @@ References are names, never pointers; "no bound" is `None`, never 0; a type that
 
 from __future__ import annotations
 
+import re
+from collections.abc import Hashable
 from typing import Literal, NamedTuple, TypeAlias
 
 import msgspec
@@ -221,3 +223,78 @@ Interface: TypeAlias = Message | Service | Action
 def element_of(type_: FieldType) -> Element:
     """Return what an array or sequence holds, or the type itself."""
     return type_.element if isinstance(type_, (Array, Sequence)) else type_
+
+
+_NUMBER = r"[+-]?(?:\d+(?:\.\d+)?(?:[eE][+-]?\d+)?|\d*(?:pi|π)(?:/\d+)?|inf|∞)%?"
+_RANGE = re.compile(
+    rf"\s*(?:{_NUMBER}\s*(?:\.\.\.?|…|-|\u2013|to)\s*{_NUMBER}|(?:[<>]=?|≤|≥)\s*{_NUMBER})\s*"
+)
+
+
+def spell(type_: FieldType, package: str = "") -> str:
+    """Return a type as written in a file of `package`, such as `string<=10[<=3]`."""
+    match type_:
+        case Array():
+            return f"{spell(type_.element, package)}[{type_.size}]"
+        case Sequence():
+            bound = "" if type_.bound is None else f"<={type_.bound}"
+            return f"{spell(type_.element, package)}[{bound}]"
+        case Primitive():
+            return type_.name
+        case String():
+            bound = "" if type_.bound is None else f"<={type_.bound}"
+            return f"{'w' * type_.wide}string{bound}"
+        case Ref():
+            name = type_.target
+            return name.name if name.package == package else f"{name.package}/{name.name}"
+        case Unknown():
+            return "?"
+
+
+def spell_value(value: Value) -> str:
+    """Return a value as a person would write it."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(spell_value, value))}]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def is_range(unit: str) -> bool:
+    """Return whether the text in the brackets of a comment is a range, and no unit."""
+    return _RANGE.fullmatch(unit) is not None
+
+
+_PLACES = frozenset({"source", "name_span", "type_span", "default_span", "value_span"})
+_CHAR, _UINT8 = Primitive("char"), Primitive("uint8")
+
+
+def meaning(interface: Interface) -> Hashable:
+    """Return a value that is equal for two interfaces exactly when they mean the same.
+
+    Comments and units count, spans and sources do not.
+    """
+    return _plain(interface)
+
+
+def content(interface: Interface) -> Hashable:
+    """Return a value that is equal for two interfaces if they differ in comments only.
+
+    What IDL does not tell counts as little: units besides those of fields, and `char`.
+    """
+    return _plain(interface, bare=True)
+
+
+def _plain(value: object, *, bare: bool = False) -> Hashable:
+    if isinstance(value, msgspec.Struct):
+        left_out = _PLACES
+        if bare:
+            left_out |= {"comment"} if isinstance(value, Field) else {"comment", "unit"}
+            value = _UINT8 if value == _CHAR else value
+        fields = (name for name in value.__struct_fields__ if name not in left_out)
+        inside = ((name, _plain(getattr(value, name), bare=bare)) for name in fields)
+        return type(value).__name__, *inside
+    if isinstance(value, tuple):
+        return tuple(_plain(one, bare=bare) for one in value)
+    # NaN is not equal to itself, 1 is to 1.0 and True
+    return type(value).__name__, repr(value)

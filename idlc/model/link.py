@@ -2,23 +2,245 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, MutableMapping
+from collections.abc import (
+    Callable,
+    Container,
+    Hashable,
+    Iterable,
+    Iterator,
+    Mapping,
+    MutableMapping,
+)
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias, TypeVar
+
+import msgspec
 
 from idlc.diagnostics import codes
-from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.report import Diagnostic, Report, Severity
 from idlc.diagnostics.source import Source, Span
-from idlc.diagnostics.suggest import did_you_mean, including, package_hint
-from idlc.model import catalog, derive, ir, names
-from idlc.model.circles import check_recursion
-from idlc.model.distro import DEFAULT, Distro, titles
-from idlc.model.lowering import slips
-from idlc.model.lowering.types import STRINGS
-from idlc.model.pool import Graph, Pool
+from idlc.diagnostics.text import did_you_mean, including, package_hint
+from idlc.language.parse import parse_any
+from idlc.model import catalog, derive, ir, lower_types, names
+from idlc.model.distros import DEFAULT, Distro, titles
+from idlc.model.lower import lower
+from idlc.model.lower_types import STRINGS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from idlc.model.describe import Describer
+
+Node = TypeVar("Node", bound=Hashable)
+Edge = TypeVar("Edge")
+#: Messages of a circle that are named.
+NAMED = 10
+
+
+def circles(
+    roots: Iterable[Node],
+    edges: Callable[[Node], Iterable[tuple[Edge, Node]]],
+    done: set[Node],
+) -> Iterator[tuple[list[Node], Edge]]:
+    """Yield each circle as the nodes on it, with the edge that leads from the last to the first.
+
+    Nodes in `done` are left out; every node that is reached becomes one of them.
+    """
+    for root in roots:
+        path: list[Node] = []
+        rest: list[Iterator[tuple[Edge, Node]]] = []
+        places: dict[Node, int] = {}
+        enter: Node | None = None if root in done else root
+        while enter is not None or path:
+            if enter is not None:
+                places[enter] = len(path)
+                path.append(enter)
+                rest.append(iter(edges(enter)))
+            edge, target = next(rest[-1], (None, None))
+            enter = None
+            if target is None or edge is None:
+                done.add(path[-1])
+                del rest[-1], places[path.pop()]
+            elif target in places:
+                yield path[places[target] :], edge
+            elif target not in done:
+                enter = target
+
+
+def check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
+    """Note each field that closes a circle."""
+    for path, field in circles(interfaces, pool.references, pool.searched):
+        if field.type_span is not None:
+            pool[path[-1]].errors.append(_circle(path, field.type_span))
+
+
+def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
+    """Return the problem with a circle of the messages on `path`."""
+    left_out = len(path) - NAMED
+    shown = [name.name for name in path[:NAMED]]
+    shown += [f"{left_out} more"] if left_out > 0 else []
+    circle = " → ".join((*shown, path[0].name))
+    return codes.RECURSIVE_TYPE.at(
+        span,
+        f"`{path[0].name}` contains itself: {circle}",
+        hint="ROS 2 has no recursive types; refer to the other message by an id",
+    )
+
+
+class Entry(msgspec.Struct):
+    """An interface, the fields of it that hold messages of other files, and its errors.
+
+    `linked` is whether its references were looked up.
+    """
+
+    interface: ir.Interface
+    references: tuple[tuple[ir.Field, ir.TypeName], ...]
+    errors: list[Diagnostic]
+    linked: bool = False
+
+
+class Lowered(msgspec.Struct, frozen=True):
+    """What a text means, what is wrong in it, and the fields that hold messages of other files."""
+
+    interface: ir.Interface
+    problems: Report
+    references: tuple[tuple[ir.Field, ir.TypeName], ...]
+
+
+#: Interfaces with what they refer to; `None` for what there is not.
+Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
+#: What was lowered before, by name; it holds for the same `Source` and distribution.
+Memory: TypeAlias = dict[ir.TypeName, Lowered]
+
+
+class Pool:
+    """Interfaces by name: those that were added, and those that a library has.
+
+    Pools of one library may share a `memory`, so that only texts that changed are lowered again.
+    """
+
+    def __init__(self, library: Library, memory: Memory | None = None) -> None:
+        self.library = library
+        self._memory = {} if memory is None else memory
+        self._entries: dict[ir.TypeName, Entry | None] = {}
+        #: The interfaces that were searched for circles.
+        self.searched: set[ir.TypeName] = set()
+
+    def add(self, interface: ir.Interface, problems: Iterable[Diagnostic] = ()) -> Entry:
+        """Add an interface with what is wrong in its file, unless it is there already."""
+        known = self._entries.get(interface.name)
+        if known is None or known.interface is not interface:
+            errors = [one for one in problems if one.severity is Severity.ERROR]
+            known = Entry(interface, tuple(_references(interface)), errors)
+            self._entries[interface.name] = known
+        return known
+
+    def remembered(self, name: ir.TypeName, source: Source) -> Lowered | None:
+        """Return what a text was lowered to before, after adding it; `None` if it is new."""
+        known = self._memory.get(name)
+        if known is None or known.interface.source is not source:
+            return None
+        self._add(known)
+        return known
+
+    def learn(self, interface: ir.Interface, problems: Report) -> Lowered:
+        """Add and remember what a text was lowered to."""
+        known = Lowered(interface, problems, tuple(_references(interface)))
+        self._memory[interface.name] = known
+        self._add(known)
+        return known
+
+    def _add(self, one: Lowered) -> None:
+        errors = [found for found in one.problems if found.severity is Severity.ERROR]
+        self._entries[one.interface.name] = Entry(one.interface, one.references, errors)
+
+    def get(self, name: ir.TypeName) -> Entry | None:
+        """Return an interface by name; `None` if there is none."""
+        if name not in self._entries:
+            source = self.library.source(name)
+            self._entries[name] = None
+            if source is not None and not self.remembered(name, source):
+                found = Report()
+                self.learn(lower(parse_any(source), name, found, self.library.distro), found)
+        return self._entries[name]
+
+    def __getitem__(self, name: ir.TypeName) -> Entry:
+        """Return an interface that was found before."""
+        entry = self._entries[name]
+        if entry is None:
+            raise KeyError(name)
+        return entry
+
+    def references(self, name: ir.TypeName) -> Iterator[tuple[ir.Field, ir.TypeName]]:
+        """Yield the references of an interface to others that were found."""
+        entry = self._entries.get(name)
+        for field, target in entry.references if entry else ():
+            if self._entries.get(target):
+                yield field, target
+
+    def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
+        """Return an interface with all that it refers to, `None` for what there is not."""
+        return tuple(one for one, _ in self.graph((name,)).values())
+
+    def graph(self, names: Iterable[ir.TypeName]) -> Graph:
+        """Return interfaces and all that they refer to, `None` for what there is not."""
+        found: Graph = {}
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
+            if name in found:
+                continue
+            entry = self._entries.get(name)
+            targets = tuple(target for _, target in entry.references) if entry else ()
+            found[name] = (entry.interface if entry else None, targets)
+            waiting += targets
+        return found
+
+    def is_sound(self, name: ir.TypeName) -> bool:
+        """Return whether an interface and all that it refers to exist and have no errors."""
+        entries = [self._entries.get(one.name) if one else None for one in self.reach(name)]
+        return all(entry is not None and not entry.errors for entry in entries)
+
+    def crossings(self) -> Iterator[tuple[str, str, Span]]:
+        """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
+        for entry in filter(None, self._entries.values()):
+            own = entry.interface.name.package
+            for field, target in entry.references:
+                if target.package != own and field.type_span is not None:
+                    yield own, target.package, field.type_span
+
+    @cached_property
+    def describer(self) -> Describer:
+        """Type descriptions and hashes, each made once."""
+        from idlc.model.describe import Describer
+
+        return Describer({})
+
+
+def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
+    """Yield the fields that hold messages of other files, derived structures' included."""
+    for message in derive.messages(interface):
+        yield from (one for one in message.holders if one[1].kind == "msg")
+
+
+def check_packages(pool: Pool, report: Report) -> None:
+    """Report each circle of packages, which no build tool could put into an order."""
+    edges: dict[str, dict[str, Span]] = {}
+    for package, target, span in pool.crossings():
+        edges.setdefault(package, {}).setdefault(target, span)
+    found = circles(
+        sorted(edges), lambda one: ((at, to) for to, at in edges.get(one, {}).items()), set()
+    )
+    for packages, span in found:
+        names = " → ".join((*packages, packages[0]))
+        report.add(
+            codes.PACKAGE_CIRCLE.at(
+                span,
+                f"packages that need each other cannot be built: {names}",
+                hint="move the messages that both use to a package of their own",
+            )
+        )
+
 
 #: Problems after which nearest names are no longer looked for; people see fewer than these.
 SUGGESTIONS = 200
@@ -258,7 +480,7 @@ class _Unknown:
         if name.lower() in _PRIMITIVES and name.lower() != name:
             other = f", or the message `{found}/{name}`" if found else ""
             return f"did you mean `{name.lower()}`{other}?"
-        return f"did you mean `{found}/{name}`?" if found else slips.type_hint(name)
+        return f"did you mean `{found}/{name}`?" if found else lower_types.type_hint(name)
 
 
 def _missing(target: ir.TypeName, library: Library) -> str:

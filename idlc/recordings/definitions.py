@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from typing import NamedTuple, TypeAlias
 
 from idlc.diagnostics.source import Source
-from idlc.disk.read import MAX_LINES
+from idlc.language.grammar import LINE_ENDS
 from idlc.model import ir, names
-from idlc.recordings.container import Schema, Topic
-from idlc.syntax.grammar import LINE_ENDS
+from idlc.project.files import MAX_LINES
+from idlc.recordings.containers.container import Schema, Topic
 
 IDL = "ros2idl"
 #: `unknown` is what a recorder says of a service that refers to no message.

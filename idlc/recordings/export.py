@@ -2,18 +2,159 @@
 
 from __future__ import annotations
 
+import json
 import os
 import secrets
 import sys
+from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from idlc.recordings.errors import RecordingError
+from idlc.model.ir import DUMMY_FIELD
+from idlc.recordings.containers.source import RecordingError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pyarrow as pa
+
+
+def storable(schema: pa.Schema) -> pa.Schema:
+    """Return a schema as Parquet can hold it, which knows no messages without fields.
+
+    They get the one that ROS 2 gives them for C++, for the same reason.
+    """
+    return _with_types(schema, lambda kind: _each(kind, _filled_type))
+
+
+def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch with the schema that is storable."""
+    import pyarrow as pa
+
+    if batch.schema == schema:
+        return batch
+    pairs = zip(batch.columns, schema, strict=True)
+    columns = [_filled(column, field.type) for column, field in pairs]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _with_types(schema: pa.Schema, made: Any) -> pa.Schema:
+    import pyarrow as pa
+
+    fields = [field.with_type(made(field.type)) for field in schema]
+    return pa.schema(fields, schema.metadata)
+
+
+def _each(kind: pa.DataType, made: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
+    """Return a type with another in the place of each in it, and of itself, inner ones first."""
+    import pyarrow as pa
+    from pyarrow import types
+
+    if types.is_struct(kind):
+        kind = pa.struct([one.with_type(_each(one.type, made)) for one in kind])
+    elif types.is_large_list(kind):
+        kind = pa.large_list(_each(kind.value_type, made))
+    elif types.is_fixed_size_list(kind):
+        kind = pa.list_(_each(kind.value_type, made), kind.list_size)
+    return made(kind)
+
+
+def _filled_type(kind: pa.DataType) -> pa.DataType:
+    """Return a struct that has fields."""
+    import pyarrow as pa
+
+    empty = pa.types.is_struct(kind) and not kind.num_fields
+    return pa.struct([pa.field(DUMMY_FIELD, pa.uint8())]) if empty else kind
+
+
+def _filled(column: pa.Array, kind: pa.DataType) -> pa.Array:
+    """Return a column, of which nothing is null, with the zeros that its new fields hold."""
+    import pyarrow as pa
+    from pyarrow import types
+
+    if column.type == kind:
+        return column
+    if types.is_struct(kind):
+        pairs = zip(column.flatten(), kind, strict=False)
+        made = [_filled(one, field.type) for one, field in pairs]
+        zeros = pa.array(bytes(len(column)), pa.uint8())
+        return pa.StructArray.from_arrays(made or [zeros], fields=list(kind))
+    if types.is_fixed_size_list(kind):
+        return pa.FixedSizeListArray.from_arrays(
+            _filled(column.flatten(), kind.value_type), kind.list_size
+        )
+    return pa.LargeListArray.from_arrays(column.offsets, _filled(column.values, kind.value_type))
+
+
+def textual(schema: pa.Schema) -> pa.Schema:
+    """Return a schema of numbers, times and texts: lists are JSON, bytes are in base64."""
+    return _with_types(schema, _text_type)
+
+
+def as_text(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch with the schema that is textual."""
+    import pyarrow as pa
+
+    pairs = zip(batch.columns, schema, strict=True)
+    columns = [_as_text(column, field.type) for column, field in pairs]
+    return pa.RecordBatch.from_arrays(columns, schema=schema)
+
+
+def _text_type(kind: pa.DataType) -> pa.DataType:
+    """Return the type that a column has in a file which knows no lists."""
+    import pyarrow as pa
+    from pyarrow import types
+
+    if types.is_duration(kind):
+        return pa.int64()
+    if types.is_nested(kind) or _is_bytes(kind):
+        return pa.string()
+    return _text_type(kind.value_type) if types.is_dictionary(kind) else kind
+
+
+def _is_bytes(kind: pa.DataType) -> bool:
+    from pyarrow import types
+
+    return bool(types.is_large_binary(kind) or types.is_fixed_size_binary(kind))
+
+
+def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
+    import pyarrow as pa
+    from pyarrow import types
+
+    if column.type == kind:
+        return column
+    if _is_bytes(column.type):
+        return pa.array([_base64(one) for one in column.to_pylist()], kind)
+    if types.is_nested(column.type):
+        values = _timeless(column).to_pylist()
+        return pa.array(
+            [json.dumps(one, default=_base64, ensure_ascii=False) for one in values], kind
+        )
+    return column.cast(kind)
+
+
+def _timeless(column: pa.Array) -> pa.Array:
+    """Return a column with times as texts: Python's own know no nanoseconds."""
+    return column.cast(_each(column.type, _timeless_type))
+
+
+def _timeless_type(kind: pa.DataType) -> pa.DataType:
+    import pyarrow as pa
+    from pyarrow import types
+
+    if types.is_timestamp(kind):
+        return pa.string()
+    if types.is_duration(kind):
+        return pa.int64()
+    return kind
+
+
+def _base64(one: bytes) -> str:
+    return b64encode(one).decode()
+
 
 #: What a name ends with, and the format that it means.
 STYLES = {
@@ -60,8 +201,6 @@ def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) ->
     import pyarrow as pa
     from pyarrow import parquet
 
-    from idlc.recordings.plain import storable, stored
-
     kept = storable(schema)
     with parquet.ParquetWriter(file, kept) as writer:
         for group in _groups(batches):
@@ -95,8 +234,6 @@ def _arrow(
 
 def _csv(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) -> None:
     from pyarrow import csv
-
-    from idlc.recordings.plain import as_text, textual
 
     plain = textual(schema)
     with csv.CSVWriter(file, plain) as writer:

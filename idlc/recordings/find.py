@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from glob import glob, has_magic
 from pathlib import Path
 
-from idlc.disk.find import KIND_FOLDERS, KINDS
-from idlc.disk.packages.enclosing import MANIFEST
-from idlc.disk.read import is_file, is_folder
-from idlc.recordings.bag import COMPRESSED, METADATA, SUFFIXES
+from idlc.project.files import is_file, is_folder
+from idlc.project.find import KIND_FOLDERS, KINDS
+from idlc.project.package_xml import MANIFEST
+from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
 
 #: What cannot be read, which opening it says.
 ROS_1 = ".bag"

@@ -9,7 +9,7 @@ from fractions import Fraction
 from math import ceil
 from typing import Any
 
-from idlc.recordings.errors import RecordingError
+from idlc.recordings.containers.source import RecordingError
 
 SECOND = 10**9
 #: A plain number below this counts seconds from the start of the recording, one above is a time of

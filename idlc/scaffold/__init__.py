@@ -1,1 +1,1 @@
-"""Scaffolding: what new packages, interfaces and nodes look like, and edits of the user's files."""
+"""New packages, interfaces and nodes, and their entries in the user's files."""

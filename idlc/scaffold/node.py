@@ -2,18 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from idlc.model import derive
-from idlc.scaffold import arguments, qos, spec
-from idlc.scaffold.import_list import ImportList
-from idlc.scaffold.line_breaks import call
-from idlc.scaffold.planned import Plan
-from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import Context, Part
+from idlc.scaffold import samples, spec
+from idlc.scaffold.layout import ImportList, call
+from idlc.scaffold.roles import ROLES, role
+from idlc.scaffold.roles.role import ACTIVATE, Context, Part, undo
 from idlc.scaffold.samples import Page
-from idlc.scaffold.states import StatesView, plain, remembered, states
+from idlc.scaffold.spec import Plan
 from idlc.scaffold.templates import Templates
+
+
+class StatesView(NamedTuple):
+    """What a lifecycle node does when its state changes."""
+
+    on_configure: tuple[str, ...]
+    on_activate: tuple[str, ...]
+
+
+def plain(parts: Sequence[Part]) -> tuple[str, ...]:
+    """Return the lines that set up a node without a lifecycle."""
+    return (*_lines(parts, "remember"), *_lines(parts, "create"), *_lines(parts, "work"))
+
+
+def remembered(parts: Sequence[Part], *, waits: bool) -> tuple[str, ...]:
+    """Return the lines that set up what a lifecycle node remembers."""
+    steps = ("self.undo_configure = ExitStack()", "self.undo_activate = ExitStack()")
+    pauses = ("self.activation: object = None", "self.pauses: set[Future] = set()")
+    return (*steps, *(pauses if waits else ()), *_lines(parts, "remember"))
+
+
+def states(parts: Sequence[Part], tasks: Iterable[tuple[str, str]], *, waits: bool) -> StatesView:
+    """Return what a lifecycle node does when it is configured, and when it starts to work.
+
+    `tasks` are the methods that begin to ask others, each with the function that makes a request.
+    A node that `waits` has coroutines, which must know how long it is active.
+    """
+    begun = ("self.activation = object()", *undo(ACTIVATE, "self.wake")) if waits else ()
+    started = [
+        line
+        for method, request in tasks
+        for line in call("self.spawn", [f"self.{method}", f"{request}(self.given)"], depth=2)
+    ]
+    work = (*begun, *_lines(parts, "work"), *started)
+    return StatesView(on_configure=_lines(parts, "create"), on_activate=work)
+
+
+def _lines(parts: Iterable[Part], which: str) -> tuple[str, ...]:
+    return tuple(line for part in parts for line in getattr(part, which))
+
 
 #: The module of the package that has what every `main` needs.
 MAIN_MODULE = "node_main"
@@ -21,7 +60,7 @@ MAIN_MODULE = "node_main"
 _OWN = (
     *("Any", "Callable", "Coroutine", "ExitStack", "Future", "WakingExecutor"),
     *("LifecycleNode", "LifecycleState", "Node", "TransitionCallbackReturn"),
-    *(name for preset in qos.PRESETS for name in (*preset.imports, preset.source)),
+    *(name for preset in role.QOS_PRESETS for name in (*preset.imports, preset.source)),
     *(name for role in ROLES for names in role.imports.values() for name in names),
 )
 #: The longest description of a node that fits wherever it stands.
@@ -52,7 +91,7 @@ class MainView(NamedTuple):
     node: str
     tasks: tuple[str, ...]
     arguments: tuple[str, ...]
-    requests: tuple[arguments.RequestView, ...]
+    requests: tuple[samples.RequestView, ...]
 
 
 class NodeView(NamedTuple):
@@ -106,7 +145,7 @@ def view(planned: Plan) -> NodeView:
         base="LifecycleNode" if node.lifecycle else "Node",
         summary=_summary(node),
         imports=_imports(planned, page),
-        constants=constants(node),
+        constants=node_constants(node),
         init_head=given.head,
         setup=(*given.setup, *created, *_declarations(node), *begun),
         parameters=tuple(map(_parameter, node.parameters)),
@@ -157,7 +196,7 @@ def _summary(node: spec.Node) -> str:
     return text if len(text) <= SUMMARY else f"The {kind} {node.name}."
 
 
-def constants(node: spec.Node) -> tuple[str, ...]:
+def node_constants(node: spec.Node) -> tuple[str, ...]:
     """Return the lines that define what qualities of service are called."""
     lines = {one.qos.constant: None for one in node.endpoints if one.qos.constant}
     return (*lines, "") if lines else ()
@@ -177,16 +216,16 @@ def _parameter(one: spec.Parameter) -> ParameterView:
     return ParameterView(one.name, one.word, one.annotation, f"list({value})" if several else value)
 
 
-def _requests(planned: Plan, page: Page) -> tuple[list[arguments.RequestView], list[str]]:
+def _requests(planned: Plan, page: Page) -> tuple[list[samples.RequestView], list[str]]:
     """Return the functions that make requests, and the lines that declare their arguments."""
     asking = planned.asking
     requests, declared = [], []
     for request, word, interface in asking:
         message = derive.sections(interface)[0]
         prefix = "" if len(asking) == 1 else f"{word}_"
-        requests.append(arguments.request(message, page, word, request.title, prefix))
+        requests.append(samples.request(message, page, word, request.title, prefix))
         positional = planned.once and len(asking) == 1
-        declared += arguments.lines(message, page, prefix, positional=positional)
+        declared += samples.lines(message, page, prefix, positional=positional)
     return requests, declared
 
 

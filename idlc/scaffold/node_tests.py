@@ -6,21 +6,19 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from idlc.model import derive
-from idlc.scaffold import node as node_module
-from idlc.scaffold import qos
-from idlc.scaffold.import_list import ImportList
-from idlc.scaffold.line_breaks import collection
-from idlc.scaffold.planned import Placed, Plan
-from idlc.scaffold.roles import ROLES
+from idlc.scaffold.layout import ImportList, collection
+from idlc.scaffold.node import node_constants
+from idlc.scaffold.roles import ROLES, role
 from idlc.scaffold.roles.role import Endpoint, TestContext, TestPart
 from idlc.scaffold.samples import Page
+from idlc.scaffold.spec import Placed, Plan
 from idlc.scaffold.templates import Templates
 
 #: Names that a test uses itself.
 _TAKEN = (
     *("Any", "Callable", "ChangeState", "Future", "GetParameters", "Node", "Start", "Transition"),
     *("MODULE", "OFFERED", "PARAMETERS", "CancelResponse"),
-    *(name for preset in qos.PRESETS for name in (*preset.imports, preset.source)),
+    *(name for preset in role.QOS_PRESETS for name in (*preset.imports, preset.source)),
     *(name for role in ROLES for names in role.test_imports.values() for name in names),
 )
 
@@ -58,7 +56,7 @@ def view(planned: Plan) -> TestView:
         node=node.name,
         module=f"{node.package}.{node.name}",
         imports=_collected(planned, parts, page).groups(("pytest", "signal")),
-        constants=(*filter(None, node_module.constants(node)), *_constants(planned), *of_parts),
+        constants=(*filter(None, node_constants(node)), *_constants(planned), *of_parts),
         parts=parts,
         has_parameters=bool(node.parameters),
         lifecycle=node.lifecycle,

@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from idlc.emit import pynames
-from idlc.model import ir
+from idlc.model import ir, python_names
+from idlc.scaffold.layout import call
 
 WIDTH = 99
 INDENT = "    "
@@ -72,8 +72,8 @@ def _spoken(name: ir.TypeName) -> tuple[str, str]:
     """Return the interface's class, and the part of it that a section is."""
     base, _, part = name.name.rpartition("_")
     if name.kind != "msg" and base:
-        return pynames.class_(name._replace(name=base)), f".{part}"
-    return pynames.class_(name), ""
+        return python_names.class_(name._replace(name=base)), f".{part}"
+    return python_names.class_(name), ""
 
 
 class Line(NamedTuple):
@@ -106,7 +106,7 @@ def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list
     """Return the lines that give each field of a variable a value, with its documentation."""
     found: list[str] = []
     for field in message.fields:
-        head = f"{variable}.{pynames.field(field.name)} = "
+        head = f"{variable}.{python_names.field(field.name)} = "
         nested = _nested(field, page)
         if nested:
             lines = [*map(str, _construct(nested, page, head, 0, "", {}))]
@@ -135,7 +135,7 @@ def _construct(
 def _field(
     message: ir.Message, field: ir.Field, page: Page, depth: int, given: Mapping[str, str]
 ) -> Iterator[Line]:
-    name = pynames.field(field.name)
+    name = python_names.field(field.name)
     nested = _nested(field, page)
     if field.name in given:
         value = [Line(depth, f"{name}={given[field.name]},")]
@@ -239,3 +239,85 @@ def literal(type_: ir.FieldType, value: ir.Value) -> str:
             number = float(value)
             return repr(number) if number - number == 0 else f"float('{number}')"
     return repr(value)
+
+
+#: What the parser has already.
+_TAKEN = {"help", "server_timeout"}
+HELP_WIDTH = 60
+
+
+class RequestView(NamedTuple):
+    """The function that makes a request or goal of what the command line says."""
+
+    function: str
+    type: str
+    what: str
+    value: str
+
+
+def request(message: ir.Message, page: Page, word: str, what: str, prefix: str) -> RequestView:
+    """Return the function for one request."""
+    given = {
+        field.name: f"given.{_dest(field, prefix)}"
+        for field in message.fields
+        if _type(field) is not None
+    }
+    value = constructed(message, page, head="return ", depth=1, given=given)
+    return RequestView(f"{word}_request", page.use(message.name), what, value)
+
+
+def lines(message: ir.Message, page: Page, prefix: str, *, positional: bool) -> list[str]:
+    """Return the lines that declare the arguments for a request's fields."""
+    return [
+        line
+        for field in message.fields
+        if (type_ := _type(field)) is not None
+        for line in _argument(message, field, type_, page, prefix, positional)
+    ]
+
+
+def _argument(
+    message: ir.Message, field: ir.Field, type_: str, page: Page, prefix: str, positional: bool
+) -> list[str]:
+    dest = _dest(field, prefix)
+    simple = isinstance(field.type, (ir.Primitive, ir.String))
+    option = "--" + dest.replace("_", "-")
+    words = [repr(option)]
+    if type_ == "bool":
+        words.append("action=argparse.BooleanOptionalAction")
+    elif positional and simple:
+        words = [repr(dest), f"type={type_}", "nargs='?'"]
+    else:
+        words.append(f"type={type_}")
+        if isinstance(field.type, ir.Array):
+            words.append(f"nargs={field.type.size}")
+        elif not simple:
+            words.append("nargs='*'")
+    words.append(f"default={sample(message, field, page)}")
+    text = textwrap.shorten(_help(field), HELP_WIDTH, placeholder=" ...")
+    words.append(f"help={text.replace('%', '%%')!r}")
+    return call("parser.add_argument", words, depth=1)
+
+
+def _help(field: ir.Field) -> str:
+    text = " ".join(filter(None, map(clean, field.comment))) or field.name.replace("_", " ")
+    return f"{text} [{clean(field.unit)}]" if field.unit else text
+
+
+def _dest(field: ir.Field, prefix: str) -> str:
+    name = python_names.field(f"{prefix}{field.name}")
+    return f"{name}_" if name in _TAKEN else name
+
+
+def _type(field: ir.Field) -> str | None:
+    """Return the type of a field's values on the command line; `None` where it has no place."""
+    match ir.element_of(field.type):
+        case ir.String():
+            return "str"
+        case ir.Primitive("bool"):
+            return "bool" if isinstance(field.type, ir.Primitive) else None
+        case ir.Primitive("byte"):
+            return None
+        case ir.Primitive(name):
+            return "float" if name.startswith("float") else "int"
+    return None

@@ -8,12 +8,12 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple, TypeAlias
 
-from idlc.scaffold import qos
+from idlc.model import ir
 from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import Endpoint, Role
+from idlc.scaffold.roles.role import DEFAULT_QOS, Endpoint, Request, Role, qos_preset
 
 #: Names that a module of a node cannot have in its package.
 TAKEN = frozenset({"msg", "srv", "action", "node_main"})
@@ -76,7 +76,7 @@ def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
     if preset is not None and role.kind != "msg":
         options = ", ".join(one.option for one in ROLES if one.kind == "msg")
         raise ValueError(f"--qos is for {options}")
-    quality = qos.DEFAULT if preset is None else qos.preset(preset)
+    quality = DEFAULT_QOS if preset is None else qos_preset(preset)
     return Endpoint(role, *role.read(text), quality)
 
 
@@ -137,3 +137,61 @@ def words(endpoints: Iterable[Endpoint]) -> list[str]:
 def class_name(name: str) -> str:
     """Return the class of a node: `command_publisher` is a CommandPublisher."""
     return "".join(part.capitalize() for part in name.split("_"))
+
+
+class Placed(NamedTuple):
+    """An endpoint with its interface, if its role has one, and a word for its names."""
+
+    endpoint: Endpoint
+    word: str
+    interface: ir.Interface | None
+
+
+class Asking(NamedTuple):
+    """An endpoint that sends a request or a goal, which the command line describes."""
+
+    request: Request
+    word: str
+    interface: ir.Interface
+
+
+class Plan(NamedTuple):
+    """A node with its endpoints and all messages that those may need."""
+
+    node: Node
+    endpoints: tuple[Placed, ...]
+    messages: Mapping[ir.TypeName, ir.Message]
+
+    @property
+    def asking(self) -> tuple[Asking, ...]:
+        """The endpoints that send requests or goals."""
+        return tuple(
+            Asking(placed.endpoint.role.request, placed.word, placed.interface)
+            for placed in self.endpoints
+            if placed.endpoint.role.request and placed.interface
+        )
+
+    @property
+    def once(self) -> bool:
+        """Whether the node does what it is asked to and ends: it only calls others."""
+        endpoints = self.node.endpoints
+        only = all(endpoint.role.request for endpoint in endpoints)
+        return bool(endpoints) and only and not self.node.lifecycle
+
+    @property
+    def packages(self) -> list[str]:
+        """The packages that the node's module imports, rclpy among them; its own is not."""
+        used = {placed.interface.name.package for placed in self.endpoints if placed.interface}
+        modules = {module for one in self.node.endpoints for module in one.role.imports}
+        libraries = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names
+        return sorted(({"rclpy"} | used | libraries) - {self.node.package})
+
+
+def plan(
+    node: Node,
+    interfaces: Iterable[ir.Interface | None],
+    messages: Mapping[ir.TypeName, ir.Message],
+) -> Plan:
+    """Return a node with the interfaces of its endpoints, in their order."""
+    placed = zip(node.endpoints, words(node.endpoints), interfaces, strict=True)
+    return Plan(node, tuple(Placed(*one) for one in placed), messages)

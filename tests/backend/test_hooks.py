@@ -17,8 +17,8 @@ from packaging.utils import parse_wheel_filename
 from idlc import backend
 from idlc.build import compile_interfaces
 from idlc.cli.main import main
-from idlc.disk.machine import environment
-from idlc.native.layouts import LAYOUTS
+from idlc.generate.native.layouts import LAYOUTS
+from idlc.project import prefixes
 from tests.support.programs import ended
 
 BUILD = '[build-system]\nrequires = ["idlc"]\nbuild-backend = "idlc.backend"\n'
@@ -77,7 +77,7 @@ def source(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def an_x86_64(monkeypatch):
-    monkeypatch.setattr(environment, "machine", lambda: "x86_64")
+    monkeypatch.setattr(prefixes, "machine", lambda: "x86_64")
 
 
 def built(folder, hook=backend.build_wheel, settings=None):
@@ -409,7 +409,7 @@ def test_without_a_library_a_package_is_not_registered(
     settings, source, tmp_path, capfd, monkeypatch
 ):
     if settings is None:
-        monkeypatch.setattr(environment, "machine", lambda: "")
+        monkeypatch.setattr(prefixes, "machine", lambda: "")
     wheel = built(tmp_path, settings=settings)
     assert wheel.name == "demo_msgs-1.2.3-py3-none-any.whl"
     files, _ = read(wheel)
@@ -433,7 +433,7 @@ def test_wheels_that_differ_have_different_names_and_a_platform_tag_of_pypi(
     names = {path.name for path in (tmp_path / "dist").iterdir()}
     assert len(wheels) == len(LAYOUTS)
     monkeypatch.setenv("ROS_DISTRO", "humble")
-    monkeypatch.setattr(environment, "ament_prefixes", tuple)
+    monkeypatch.setattr(prefixes, "ament_prefixes", tuple)
     assert built(tmp_path / "dist").name in names, "it is the same as with distro=humble"
     pure = built(tmp_path / "pure", settings={"libraries": "no"})
     assert pure.name == "demo_msgs-1.2.3-1humble-py3-none-any.whl"

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from idlc.breaking.packages import Comparison, compare
-from idlc.breaking.version import part_to_raise, raised
 from idlc.cli.main import main
+from idlc.compare.packages import Comparison, compare, part_to_raise, raised
 from tests.support.evolution import Evolution, compile_texts
 from tests.support.files import write
 from tests.support.tools import tool

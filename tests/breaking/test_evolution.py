@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
-from idlc.breaking.packages import compare
-from idlc.emit.render import render_package
+from idlc.compare.packages import compare
+from idlc.generate.python.render import render_package
 from tests.support import evolution, reference_cdr
 from tests.support.evolution import Evolution, compile_texts, old_bytes_are_misread
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
-from idlc.disk import revision
+from idlc.project import git as revision
 from tests.support.files import write
 from tests.support.repositories import changed, git, instead, version
 

@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import pytest
 
-from idlc.breaking.packages import compare
-from idlc.checks.size import oversized
 from idlc.cli.main import main
-from idlc.model.described import NotBelievedError, described
+from idlc.compare.packages import compare
+from idlc.model.from_description import NotBelievedError, model_of_description
+from idlc.wire.layout import oversized
 from tests.support import generated
 from tests.support.evolution import Evolution, compile_texts
 from tests.support.hostile import PAYLOADS, assert_harmless
@@ -38,7 +38,7 @@ def test_a_description_means_what_its_files_mean():
     for model in models():
         for name in map(str, model.messages):
             description = model.describer.description(name)
-            found = described(description, name, hash_of(model, name), "/node")
+            found = model_of_description(description, name, hash_of(model, name), "/node")
             assert found.describer.description(name)["type_description"] == {
                 **description["type_description"],
                 "fields": [
@@ -62,7 +62,9 @@ def test_descriptions_say_of_the_wire_what_files_say(seed):
     told = []
     for model in versions:
         name = "p/msg/A"
-        found = described(model.describer.description(name), name, hash_of(model, name), "/node")
+        found = model_of_description(
+            model.describer.description(name), name, hash_of(model, name), "/node"
+        )
         found.own = tuple(message for message in found.interfaces.values())
         told.append(found)
     reached = {message.name for model in told for message in model.own}
@@ -115,7 +117,9 @@ def test_a_spoiled_description_is_a_model_or_not_believed():
     refused = 0
     for seed in range(600):
         try:
-            found = described(spoiled(description, seed), name, hash_of(model, name), "/node")
+            found = model_of_description(
+                spoiled(description, seed), name, hash_of(model, name), "/node"
+            )
         except NotBelievedError as error:
             assert_harmless(str(error))
             refused += 1
@@ -139,7 +143,7 @@ def test_circles_and_depth_do_no_harm():
         "referenced_type_descriptions": [part("a/msg/B", "a/msg/A")],
     }
     with pytest.raises(NotBelievedError, match="contains itself"):
-        described(circle, "a/msg/A", "", "/node")
+        model_of_description(circle, "a/msg/A", "", "/node")
     names = [f"a/msg/A{n}" for n in range(5000)]
     chain = [part(one, after, after) for one, after in pairwise(names)]
     deep = {
@@ -147,14 +151,14 @@ def test_circles_and_depth_do_no_harm():
         "referenced_type_descriptions": [*chain[1:], part(names[-1])],
     }
     with pytest.raises(NotBelievedError, match="another type hash"):
-        described(deep, names[0], "", "/node")
+        model_of_description(deep, names[0], "", "/node")
 
 
 @pytest.fixture
 def say(monkeypatch, tmp_path, capsys):
     """Return what idlc says of a recorded graph, as status and text."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: ())
 
     def run(graph, *words):
         take_the_place(monkeypatch, graph)

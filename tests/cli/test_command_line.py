@@ -340,7 +340,7 @@ def test_ctrl_c_ends_with_the_status_that_shells_expect(monkeypatch, capsys):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("idlc.driver.check.look", interrupt)
+    monkeypatch.setattr("idlc.check.run.look", interrupt)
     assert main(["check", "."]) == 130
     assert capsys.readouterr().err.strip() == "interrupted"
 
@@ -350,7 +350,7 @@ def test_an_internal_error_shows_its_traceback_only_when_asked(monkeypatch, caps
         raise RuntimeError("oh")
 
     make("demo/msg/A.msg")
-    monkeypatch.setattr("idlc.syntax.parse.parse", fail)
+    monkeypatch.setattr("idlc.language.parse.parse", fail)
     assert main(["check", "demo"]) == 3
     shown = capsys.readouterr().err
     assert "IDL901" in shown
@@ -362,7 +362,7 @@ def test_an_internal_error_shows_its_traceback_only_when_asked(monkeypatch, caps
 
 
 def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch, capsys):
-    from idlc.emit import render
+    from idlc.generate.python import render
 
     make("demo/msg/A.msg")
     real = render.render_package
@@ -373,7 +373,7 @@ def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch,
             for file in real(model)
         )
 
-    monkeypatch.setattr("idlc.emit.render.render_package", broken)
+    monkeypatch.setattr("idlc.generate.python.render.render_package", broken)
     assert main(["gen", "demo", "-o", "out/demo"]) == 3
     shown = capsys.readouterr().err
     assert "stage `compile`" in shown
@@ -463,11 +463,9 @@ def test_watching_compiles_after_each_change_and_ctrl_c_ends_it():
 
 
 def test_only_the_python_of_the_nodes_complains_about_what_it_cannot_import(monkeypatch, capsys):
-    from idlc.cli.main import main
-
     make("demo/msg/A.msg", "stereo_msgs/DisparityImage image\nstd_msgs/Header header\n")
     here = {"rclpy": ["/ros/rclpy"]}
-    folders = "idlc.disk.machine.environment.python_folders"
+    folders = "idlc.project.prefixes.python_folders"
     monkeypatch.setattr(folders, lambda package: [Path(one) for one in here.get(package, ())])
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
     assert "warning[IDL617]" in capsys.readouterr().err

@@ -10,23 +10,23 @@ import click
 import pytest
 
 import idlc
-from idlc.checks.registry import advise
-from idlc.checks.select import Selection
+from idlc.check.compiler import compile_package, derived_names
+from idlc.check.registry import advise
+from idlc.check.select import Selection
 from idlc.cli import completion
-from idlc.cli.commands.check import command as check
+from idlc.cli.check import command as check
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.disk.library import Library
-from idlc.disk.output import lock_file
-from idlc.driver.stages import compile_package, derived_names
+from idlc.language.format import format_file
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
-from idlc.model.distro import BY_NAME, DISTROS, NEWEST
+from idlc.model.distros import BY_NAME, DISTROS, NEWEST
+from idlc.model.ir import meaning
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.model.meaning import meaning
-from idlc.syntax.format import format_file
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
+from idlc.project import lock
+from idlc.project.library import Library
 from tests.support.paths import SPEC
 
 HASHES = json.loads((SPEC / "distro_hashes.json").read_text("utf-8"))
@@ -47,7 +47,7 @@ ROSIDL = {
 def _nothing_is_installed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / ".git").mkdir()
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: ())
     monkeypatch.delenv("ROS_DISTRO", raising=False)
 
 
@@ -62,7 +62,7 @@ def install(tmp_path_factory, monkeypatch):
         for path, text in files.items():
             (prefix / "share" / path).parent.mkdir(parents=True, exist_ok=True)
             (prefix / "share" / path).write_text(text, encoding="utf-8")
-        monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: (prefix,))
+        monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: (prefix,))
         return prefix
 
     return make
@@ -125,7 +125,7 @@ def test_definitions_are_those_of_the_release_repositories(distro):
     texts = {name: catalog.source(name, distro).text for name in catalog.interfaces(distro)}
     for package, (version, expected) in PACKAGES[distro.name].items():
         names = [n for n in texts if n.package == package and str(n) not in NOT_RELEASED]
-        lines = "".join(f"{name} {lock_file.meaning(texts[name], package)}\n" for name in names)
+        lines = "".join(f"{name} {lock.meaning(texts[name], package)}\n" for name in names)
         assert sha256(lines.encode()).hexdigest() == expected, (package, version)
     assert PACKAGES[distro.name].keys() == set(catalog.packages(distro))
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from idlc.disk.machine.distribution import DEFAULT, distribution
-from idlc.driver.generate.libraries import target_of
-from idlc.native.layouts import LAYOUTS
+from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.prefix import target_of
+from idlc.project.prefixes import DEFAULT, distribution
 
 RELEASES = {
     "humble": "3.1.9",

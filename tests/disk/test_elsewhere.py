@@ -19,10 +19,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from idlc.cli import streams
+from idlc.cli import exit_status
 from idlc.cli.main import main
-from idlc.diagnostics.formats import sarif
-from idlc.disk.output import folder_lock, lock_file, transaction, whole_files, windows
+from idlc.diagnostics import formats
+from idlc.project import atomic, lock, windows
+from idlc.project import write as transaction
 from tests.support import programs
 from tests.support.files import write
 from tests.support.paths import ROOT
@@ -33,7 +34,7 @@ WINDOWS = sys.platform == "win32"
 def test_a_run_waits_for_another_one(tmp_path):
     """The real lock of this system, with another process."""
     code = (
-        "import sys\nfrom pathlib import Path\nfrom idlc.disk.output.folder_lock import alone\n"
+        "import sys\nfrom pathlib import Path\nfrom idlc.project.atomic import alone\n"
         "with alone(Path('out')), alone(Path('out/demo')):\n"
         "    print('in', flush=True)\n"
         "    sys.stdin.readline()\n"
@@ -95,7 +96,7 @@ def kernel(monkeypatch):
     made = Kernel(running={5})
     monkeypatch.setattr(ctypes, "WinDLL", lambda *_, **__: made, raising=False)
     monkeypatch.setattr(ctypes, "get_last_error", lambda: 87, raising=False)
-    for module in (folder_lock, transaction, whole_files):
+    for module in (atomic, transaction, atomic):
         monkeypatch.setattr(module, "sys", SimpleNamespace(platform="win32"))
     return made
 
@@ -107,15 +108,15 @@ def test_the_lock_of_windows(kernel, tmp_path):
         with windows.alone():
             entered.set()
 
-    with folder_lock.alone(tmp_path / "a"):
-        with folder_lock.alone(tmp_path / "a/b"):
+    with atomic.alone(tmp_path / "a"):
+        with atomic.alone(tmp_path / "a/b"):
             assert kernel.calls.count("CreateMutexW") == 1, "it does not wait for itself"
         thread = threading.Thread(target=other)
         thread.start()
         assert not entered.wait(0.3)
     thread.join(10)
     assert entered.is_set()
-    with contextlib.suppress(KeyError), folder_lock.alone(tmp_path):
+    with contextlib.suppress(KeyError), atomic.alone(tmp_path):
         raise KeyError
     assert not kernel.mutex.locked()
 
@@ -192,7 +193,7 @@ def test_a_file_is_closed_before_it_is_removed(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "write", write_nothing)
     monkeypatch.setattr(Path, "unlink", removing)
     with pytest.raises(OSError, match="No space"):
-        whole_files.create(str(tmp_path / "a.py"), b"x")
+        atomic.create(str(tmp_path / "a.py"), b"x")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -201,7 +202,7 @@ def test_ctrl_c_waits_until_files_are_in_place():
     done = []
 
     def moves():
-        with folder_lock.uninterrupted():
+        with atomic.uninterrupted():
             signal.raise_signal(signal.SIGINT)
             done.append("moved")
 
@@ -219,14 +220,14 @@ def printed(monkeypatch, text, encoding="cp1252", ends="\r\n"):
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding=encoding, newline=ends)
     monkeypatch.setattr(sys, "stdout", stream)
-    streams.set_up()
+    exit_status.set_up()
     stream.write(text)
     stream.flush()
     return raw.getvalue()
 
 
 def test_what_windows_redirects_is_what_others_redirect(monkeypatch):
-    monkeypatch.setattr(streams.sys, "platform", "win32")
+    monkeypatch.setattr(exit_status.sys, "platform", "win32")
     monkeypatch.delenv("PYTHONIOENCODING", raising=False)
     text = "größe → €\udcff\n"
     assert printed(monkeypatch, text) == "größe → €\\udcff\n".encode()
@@ -258,8 +259,8 @@ def test_xml_is_read_alike_whatever_encoding_it_is_written_in(here, capsys):
     ],
 )
 def test_paths_in_sarif(system, path, uri, monkeypatch):
-    monkeypatch.setattr(sarif, "sys", SimpleNamespace(platform=system))
-    assert sarif._artifact(path) == {"uri": uri}
+    monkeypatch.setattr(formats, "sys", SimpleNamespace(platform=system))
+    assert formats._artifact(path) == {"uri": uri}
 
 
 # files as git checks them out on Windows
@@ -311,8 +312,8 @@ def test_a_real_edit_is_still_noticed(here, capsys):
     module.write_bytes(module.read_bytes().replace(b"\n", b"\r\n") + b"# mine\r\n")
     assert main(["gen", "demo", "-o", "out/demo", "--check"]) == 1
     assert "was edited since" in capsys.readouterr().err
-    assert lock_file.digest(b"\x7fELF\0\r\n") != lock_file.digest(b"\x7fELF\0\n")
-    assert not lock_file.is_same(b"\x7fELF\0\r\n", b"\x7fELF\0\n")
+    assert lock.digest(b"\x7fELF\0\r\n") != lock.digest(b"\x7fELF\0\n")
+    assert not lock.is_same(b"\x7fELF\0\r\n", b"\x7fELF\0\n")
 
 
 def test_scaffolding_again_after_a_checkout_changes_nothing(here, capsys):

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.disk.find import find
-from idlc.disk.library import Library
-from idlc.disk.output.lock_file import meaning
-from idlc.disk.packages.requested import wanted
-from idlc.disk.scope import Scope
+from idlc.generate.requested import wanted
 from idlc.model.ir import TypeName
+from idlc.project.find import find
+from idlc.project.library import Library
+from idlc.project.lock import meaning
+from idlc.project.scope import Scope
 from tests.support.files import write
 
 MSG = "float64 speed\n"
@@ -20,7 +20,7 @@ MSG = "float64 speed\n"
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: ())
     return tmp_path
 
 
@@ -161,7 +161,7 @@ def test_package_xml_names_packages_in_include_folders():
 
 def test_the_first_include_folder_wins_then_prefixes_then_the_catalogue(monkeypatch):
     prefix = Path("ros").absolute()
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: (prefix,))
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: (prefix,))
     name = TypeName.parse("std_msgs/msg/Bool")
     assert library().source(name).path.startswith("<")
     make("ros/share/std_msgs/msg/Bool.msg")

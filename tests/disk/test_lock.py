@@ -10,7 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
-from idlc.disk.output import lock_file, tree
+from idlc.project import lock
+from idlc.project.lock import load_lock
 from tests.support.fuzzing import idlc
 
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9)
@@ -76,14 +77,14 @@ def attempt(folder: Path, data: bytes) -> None:
     out = folder / "out/demo"
     shutil.rmtree(out, ignore_errors=True)
     out.mkdir(parents=True)
-    (out / lock_file.FILE).write_bytes(data)
+    (out / lock.FILE).write_bytes(data)
     report = Report()
-    known = lock_file.load(out, "demo", report)
+    known = load_lock(out, "demo", report)
     assert [one.code for one in report] == ([] if known else ["IDL615"])
     here = str(folder / "demo")
     checked = idlc("gen", here, "-o", str(out), "--check")
     assert known or checked == 2
-    assert idlc("breaking", here, "--against", str(out / lock_file.FILE)) == 2 or known
+    assert idlc("breaking", here, "--against", str(out / lock.FILE)) == 2 or known
     assert idlc("gen", here, "-o", str(out)) == (0 if known else 2)
     assert sorted(path.name for path in folder.iterdir()) == [".git", "demo", "out"]
 
@@ -124,6 +125,6 @@ def test_other_bytes_are_refused(folder, data):
 @given(st.lists(st.text(string.ascii_letters + "_-.", min_size=1, max_size=9), min_size=1))
 def test_paths_that_may_be_ones_own_stay_below_their_folder(parts):
     path = "/".join(parts)
-    if tree.may_be_own(path):
+    if lock.may_be_own(path):
         assert not {"", ".", ".."} & set(parts)
         assert Path("/x", path).is_relative_to("/x")

@@ -11,7 +11,7 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.codes import CANNOT_WRITE
-from idlc.disk.machine.distribution import Distribution
+from idlc.project.prefixes import Distribution
 from tests.support.machine import running, tree
 
 OLD = {"msg/A.msg": "int8 a\n", "srv/Gone.srv": "---\n"}
@@ -149,10 +149,10 @@ def test_without_a_library_it_is_not_in_the_index(missing, idlc, tmp_path, monke
     assert idlc("gen", "arm", "--ament", "out")[0] == 0
     assert (tmp_path / "out" / INDEX / "packages" / "arm").is_file()
     if missing == "processor":
-        monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "riscv64")
+        monkeypatch.setattr("idlc.project.prefixes.machine", lambda: "riscv64")
     else:
         strange = Distribution("", "rosidl 9.9 in /opt/ros/zazzy")
-        monkeypatch.setattr("idlc.disk.output.overlay.distribution", lambda _: strange)
+        monkeypatch.setattr("idlc.generate.prefix.distribution", lambda _: strange)
     status, said = idlc("gen", "arm", "--ament", "out")
     assert status == 0
     assert "`arm` is not registered in the index of ROS 2" in said

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from idlc.disk.watch import Picture
+from idlc.project.find import Picture
 
 #: In nanoseconds; files that are written now are as if they were that old.
 SECOND = 1_000_000_000

@@ -6,16 +6,16 @@ import shutil
 
 import pytest
 
+from idlc.check.compiler import models_of
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.disk.find import look
-from idlc.disk.machine.distribution import Distribution
-from idlc.disk.packages.inputs import load
-from idlc.disk.scope import Scope
-from idlc.driver.stages import models_of
-from idlc.native.inspect import inspect
-from idlc.native.layouts import LAYOUTS
-from idlc.native.library import MACHINES, libraries
+from idlc.generate.native.inspect import inspect
+from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.library import MACHINES, libraries
+from idlc.project.find import look
+from idlc.project.inputs import load
+from idlc.project.prefixes import Distribution
+from idlc.project.scope import Scope
 
 LIBRARY = "lib/libarm__rosidl_typesupport_cpp.so"
 FIELDS = "lib/libarm__rosidl_typesupport_introspection_cpp.so"
@@ -120,17 +120,17 @@ def test_a_type_that_is_missing(here, said):
 
 
 def test_another_processor(here, said, monkeypatch):
-    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.project.prefixes.machine", lambda: "x86_64")
     (here / LIBRARY).write_bytes(made(machine="aarch64"))
     assert said() == (1, [(NAME, "is for another processor than x86_64")])
 
 
 def test_another_distribution(here, said, monkeypatch):
-    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.project.prefixes.machine", lambda: "x86_64")
     for name, fits in (("jazzy", True), ("kilted", True), ("humble", False), ("lyrical", False)):
         (here / LIBRARY).write_bytes(made(layout=name))
         there = Distribution("jazzy", "for this test")
-        monkeypatch.setattr("idlc.driver.prefix.distribution", lambda _, found=there: found)
+        monkeypatch.setattr("idlc.check.prefix.distribution", lambda _, found=there: found)
         status, found = said()
         assert (status, found) == (
             (0, [])
@@ -140,8 +140,8 @@ def test_another_distribution(here, said, monkeypatch):
 
 
 def test_the_distribution_that_is_named_is_noticed(here, said, capsys, monkeypatch):
-    monkeypatch.setattr("idlc.disk.machine.environment.machine", lambda: "x86_64")
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", tuple)
+    monkeypatch.setattr("idlc.project.prefixes.machine", lambda: "x86_64")
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", tuple)
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
     generate = ["gen", "arm", "--ament", "prefix"]
     for words, fits in ((["--distro", "humble"], False), (["--distro", "jazzy"], True)):

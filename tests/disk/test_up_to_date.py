@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.disk.output import up_to_date
-from idlc.disk.scope import Scope
-from idlc.driver.generate.gen import GenOptions, gen
+from idlc.generate import target
+from idlc.generate.gen import GenOptions, gen
+from idlc.project.scope import Scope
 
-PACKAGE = Path(up_to_date.__file__).parents[2]
-MAKERS = [path for path in up_to_date._MAKERS if path.is_dir()]
+PACKAGE = Path(target.__file__).parents[2]
+MAKERS = [path for path in target._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)
     for maker in MAKERS
@@ -25,14 +25,14 @@ FOLDERS = [
 def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     for maker in MAKERS:
         shutil.copytree(maker, tmp_path / maker.name, dirs_exist_ok=True)
-    monkeypatch.setattr(up_to_date, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
-    up_to_date._newest_maker.cache_clear()
-    before = up_to_date._newest_maker()
+    monkeypatch.setattr(target, "_MAKERS", [tmp_path / maker.name for maker in MAKERS])
+    target._newest_maker.cache_clear()
+    before = target._newest_maker()
     file = next(path for path in (tmp_path / folder).iterdir() if path.is_file())
     os.utime(file, ns=(before + 1, before + 1))
-    up_to_date._newest_maker.cache_clear()
-    assert up_to_date._newest_maker() == before + 1
-    up_to_date._newest_maker.cache_clear()
+    target._newest_maker.cache_clear()
+    assert target._newest_maker() == before + 1
+    target._newest_maker.cache_clear()
 
 
 def written(folder: Path, package: str) -> tuple[int, list[str]]:

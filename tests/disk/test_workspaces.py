@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from idlc.cli.main import main
-from idlc.disk.exclude import exclusion
+from idlc.project.find import exclusion
 from tests.support.files import write
 
 COMMANDS = ("check", "hash", "gen", "docs", "breaking", "fmt")
@@ -20,7 +20,7 @@ COMMANDS = ("check", "hash", "gen", "docs", "breaking", "fmt")
 @pytest.fixture(autouse=True)
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: ())
     (tmp_path / ".git").mkdir()
     return tmp_path
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.disk.output import lock_file, transaction
-from idlc.disk.output.write_plan import plan
+from idlc.project import lock, write
+from idlc.project.lock import load_lock
+from idlc.project.write import plan
 
 OLD = {"_idlc/a.py": "a = 1\n", "msg/__init__.py": "1\n", "msg/_a.py": "1\n", "srv/_s.py": "1\n"}
 NEW = {"_idlc/a.py": "a = 2\n", "msg/__init__.py": "2\n", "msg/_b.py": "2\n", "action/_g.py": "2\n"}
@@ -30,15 +31,15 @@ def tree(folder: Path) -> dict[str, str]:
 
 
 def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False) -> bool:
-    known = lock_file.load(out, "out", report)
+    known = load_lock(out, "out", report)
     content = {path: text.encode() for path, text in files.items()}
-    planned = plan(out, "out", content, transaction.owned(out, known), report, force=force)
+    planned = plan(out, "out", content, write.owned(out, known), report, force=force)
     if planned is None:
         return False
-    record = lock_file.Lock(
+    record = lock.Lock(
         idlc="0", package="p", inputs={}, dependencies={}, types={}, outputs=planned.outputs
     )
-    return transaction.apply(planned, lock_file.encode(record), "out", report)
+    return write.apply(planned, lock.encode(record), "out", report)
 
 
 def generated(out: Path) -> dict[str, str]:
@@ -148,14 +149,14 @@ def test_killed_at_any_point_each_file_is_whole_and_the_next_run_recovers(
     for point in range(1, 100):
         assert put(out, OLD, Report())
         with monkeypatch.context() as patch:
-            patch.setattr("idlc.disk.output.transaction._Transaction.undo", lambda _: [])
+            patch.setattr("idlc.project.write._Transaction.undo", lambda _: [])
             fault = Faulty(patch, operation, {point}, Killed())
             with contextlib.suppress(Killed):
                 put(out, NEW, Report())
         for path, text in tree(out).items():
-            if not path.startswith(transaction.STAGE) and path != "idlc.lock":
+            if not path.startswith(write.STAGE) and path != "idlc.lock":
                 assert text in (OLD.get(path), NEW.get(path))
-        lock_file.decode((out / "idlc.lock").read_bytes())
+        lock.decode((out / "idlc.lock").read_bytes())
         report = Report()
         assert put(out, NEWER, report), codes_of(report)
         assert generated(out) == NEWER
@@ -211,7 +212,7 @@ def test_force_keeps_copies_and_never_overwrites_one(out):
 def test_a_file_that_is_as_it_would_be_written_is_adopted(out):
     (out / "idlc.lock").unlink()
     assert put(out, OLD, Report())
-    assert lock_file.decode((out / "idlc.lock").read_bytes()).outputs.keys() == OLD.keys()
+    assert lock.decode((out / "idlc.lock").read_bytes()).outputs.keys() == OLD.keys()
 
 
 def test_without_a_lock_nothing_is_replaced_or_removed(out):
@@ -230,7 +231,7 @@ def test_the_users_own_init_stays_and_is_not_claimed(tmp_path):
     for _ in range(2):
         assert put(out, {"__init__.py": "", "py.typed": "", **OLD}, Report())
     assert (out / "__init__.py").read_text(encoding="utf-8") == "mine = 1\n"
-    assert "__init__.py" not in lock_file.decode((out / "idlc.lock").read_bytes()).outputs
+    assert "__init__.py" not in lock.decode((out / "idlc.lock").read_bytes()).outputs
 
 
 def test_links_below_the_package_are_not_followed(out, tmp_path):

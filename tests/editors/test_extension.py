@@ -7,10 +7,10 @@ import msgspec
 import pytest
 
 from idlc import __version__
-from idlc.disk.find import KINDS
-from idlc.lsp.world import Settings
+from idlc.editor.world import Settings
 from idlc.model.ir import PRIMITIVES
-from idlc.model.lowering.types import STRINGS
+from idlc.model.lower_types import STRINGS
+from idlc.project.find import KINDS
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "editors" / "vscode"

@@ -12,9 +12,9 @@ import sys
 
 import pytest
 
-from idlc.emit.render import PACKAGE, render_package
+from idlc.generate.python.render import PACKAGE, render_package
 from idlc.model import derive
-from idlc.model.distro import BY_NAME, DEFAULT
+from idlc.model.distros import BY_NAME, DEFAULT
 from tests.support import generated, refresh, values
 from tests.support.paths import GOLDEN
 

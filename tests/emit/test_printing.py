@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from idlc.emit import python_lines
-from idlc.emit.render import render_package
+from idlc.generate.python import lines
+from idlc.generate.python.render import render_package
 from tests.support import generated, values
 
 PARTS = {
@@ -53,7 +53,7 @@ def rendered(monkeypatch):
     """Return a function that renders a model with lines of some width."""
 
     def render(model, width):
-        monkeypatch.setattr(python_lines, "WIDTH", width)
+        monkeypatch.setattr(lines, "WIDTH", width)
         return {file.path: file.text for file in render_package(model) if "/_" in file.path}
 
     return render
@@ -78,9 +78,7 @@ def test_statements_say_the_same_in_lines_of_every_width(rendered):
 def test_one_target_that_does_not_fit_on_a_line_remains_a_tuple():
     for width in range(60, 120):
         name = "x" * (width - len("(,) = read(data)"))
-        found = python_lines.assign(
-            python_lines.tuple_of(name), python_lines.call("read", "data"), 0
-        )
+        found = lines.assign(lines.tuple_of(name), lines.call("read", "data"), 0)
         assert isinstance(ast.parse("\n".join(found)).body[0].targets[0], ast.Tuple), found
 
 

@@ -9,9 +9,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from jinja2 import UndefinedError
 
-from idlc.emit import literals, render
+from idlc.generate.python import lines, render
+from idlc.generate.python import lines as literals
 from idlc.model import ir, link
-from idlc.templating import environment
+from idlc.project.templates import environment
 
 HOSTILE = [
     '"""',
@@ -98,7 +99,7 @@ def test_no_text_changes_what_the_module_does(text, more):
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_a_literal_is_read_back_as_the_text(text):
-    assert ast.literal_eval(literals.text(text)) == text
+    assert ast.literal_eval(lines.text(text)) == text
 
 
 @given(st.lists(TEXT, min_size=1, max_size=4), st.booleans())
@@ -114,7 +115,7 @@ def test_a_docstring_is_read_back_as_its_lines(lines, one_line):
 
 @pytest.mark.parametrize("value", range(256))
 def test_an_octet_is_read_back(value):
-    assert ast.literal_eval(literals.octet(value)) == bytes([value])
+    assert ast.literal_eval(lines.octet(value)) == bytes([value])
 
 
 @pytest.fixture(scope="module")

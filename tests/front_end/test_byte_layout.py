@@ -2,11 +2,11 @@
 
 import re
 
+from idlc.check.compiler import compile_package
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.driver.stages import compile_package
-from idlc.export.byte_layout import Extent, layout
 from idlc.model import catalog, ir
+from idlc.wire.layout import Extent, layout
 from tests.support import reference_cdr
 
 ODD = """\

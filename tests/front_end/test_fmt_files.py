@@ -9,10 +9,10 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.driver.laid_out import laid_out
+from idlc.language.parse import parse, parse_definition
+from idlc.language.tree import Broken, Constant
+from idlc.model.format import laid_out
 from idlc.model.ir import TypeName
-from idlc.syntax.parse import parse, parse_definition
-from idlc.syntax.tree import Broken, Constant
 
 LOOSE = "float64   speed# [m/s]"
 TIDY = "float64 speed  # [m/s]\n"
@@ -121,7 +121,7 @@ def _definitions(text):
 
 
 def test_a_layout_that_would_change_the_meaning_is_never_written(here, monkeypatch, capsys):
-    monkeypatch.setattr("idlc.syntax.format.format_file", lambda _: "int16 a\n")
+    monkeypatch.setattr("idlc.language.format.format_file", lambda _: "int16 a\n")
     (here / "A.msg").write_text("int8 a\n")
     assert main(["fmt"]) == 3
     assert (here / "A.msg").read_text() == "int8 a\n"

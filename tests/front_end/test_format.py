@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.language.format import format_file
+from idlc.language.parse import parse
 from idlc.model import ir
-from idlc.model.lowering.file import lower
-from idlc.model.meaning import meaning
-from idlc.syntax.format import format_file
-from idlc.syntax.parse import parse
+from idlc.model.ir import meaning
+from idlc.model.lower import lower
 from tests.support import rosidl_view
 from tests.support.inventions import Inventor
 from tests.support.paths import VERDICTS

@@ -12,8 +12,8 @@ import sys
 import pytest
 
 from idlc.cli.main import main
-from idlc.diagnostics.code_pages import page
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.explain import page
 from tests.support import golden_text, refresh
 from tests.support.paths import GOLDEN
 
@@ -97,7 +97,7 @@ def tried(tmp_path, monkeypatch, capsys):
         return done.stdout + done.stderr
 
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-    monkeypatch.setattr("idlc.disk.machine.environment.runs_nodes", lambda: True)
+    monkeypatch.setattr("idlc.project.prefixes.runs_nodes", lambda: True)
     return run
 
 

@@ -4,14 +4,14 @@ import re
 
 import pytest
 
-from idlc.checks import registry
+from idlc.check import registry
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.suggest import closest, package_hint
+from idlc.diagnostics.text import closest, package_hint
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 
 
 def errors(text, kind="msg"):

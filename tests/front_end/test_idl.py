@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.export.idl import idl
+from idlc.generate.idl import idl
+from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
-from idlc.model.distro import DISTROS
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse, parse_any
+from idlc.model.distros import DISTROS
+from idlc.model.lower import lower
 from tests.support import idl_view
 
 SHARE = Path(sys.prefix) / "share"

@@ -8,7 +8,7 @@ import json
 import re
 
 from idlc.diagnostics.codes import CODES
-from idlc.export.idl import idl
+from idlc.generate.idl import idl
 from idlc.model import derive, ir
 from idlc.model.describe import individual
 from idlc.model.names import snake_case

@@ -6,14 +6,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from idlc.checks import registry
+from idlc.check import registry
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.model.lowering.literals import Fault, scalar
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
+from idlc.model.lower_types import Fault
+from idlc.model.lower_values import scalar
 
 WORDS = [
     "int32",

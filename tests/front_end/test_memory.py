@@ -2,9 +2,9 @@
 
 import pytest
 
-from idlc.checks.memory import Memory
-from idlc.disk.read import NOTHING_OPEN
-from idlc.driver.workspace import Wishes, Workspace
+from idlc.check.registry import Memory
+from idlc.editor.workspace import Wishes, Workspace
+from idlc.project.files import NOTHING_OPEN
 
 FILES = {
     "A.msg": "B b\n",

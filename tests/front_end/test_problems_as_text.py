@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from idlc.diagnostics import codes
-from idlc.diagnostics.formats import terminal
+from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Label, Report
 from idlc.diagnostics.source import Source, Span
-from idlc.diagnostics.visible import display_width, one_line, visible
+from idlc.diagnostics.text import display_width, one_line, visible
 
 
 def shown(text: str, start: int, end: int, **options) -> list[str]:

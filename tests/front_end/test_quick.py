@@ -9,8 +9,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from idlc.syntax import lalr, quick
-from idlc.syntax.grammar import LINE_ENDS, grammar, terminals
+from idlc.language import grammar, parse
+from idlc.language.grammar import LINE_ENDS, terminals
+from idlc.language.grammar import grammar as grammar_grammar
 from tests.support.paths import VERDICTS
 
 TEXTS = [
@@ -27,12 +28,12 @@ def whole(text):
 
 def assert_same(text):
     text = whole(text)
-    found = quick.lines(text)
-    assert found in (None, lalr.lines(text))
+    found = parse.quick_lines(text)
+    assert found in (None, grammar.lalr_lines(text))
     for line in text.splitlines():
         code = line.partition("#")[0].replace("\t", " ").rstrip()
         if code:
-            assert quick.definition(code) in (None, lalr.definition(code)), code
+            assert parse.quick_definition(code) in (None, grammar.parse_definition_text(code)), code
 
 
 def test_every_recorded_case_is_read_as_lark_reads_it():
@@ -55,14 +56,16 @@ def test_any_text_is_read_as_lark_reads_it_or_left_to_it(text):
 def test_nearly_all_lines_are_ordinary():
     lines = [line for text in TEXTS for line in text.split("\n") if line[:1].isalpha()]
     codes = [code for line in lines if (code := line.partition("#")[0].rstrip())]
-    ordinary = sum(quick.definition(code) is not None for code in codes)
+    ordinary = sum(parse.quick_definition(code) is not None for code in codes)
     assert ordinary > 0.8 * len(codes)
 
 
 def test_terminals_are_those_that_lark_reads():
-    read = {one.name: one.pattern.to_regexp() for one in lalr._lark().terminals}
+    read = {one.name: one.pattern.to_regexp() for one in grammar._lark().terminals}
     # lark spells control characters out
-    plain = {name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar())}
+    plain = {
+        name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar_grammar())
+    }
     plain -= {"CODE", "COMMENT", "NEWLINE", "SEPARATOR"}
     assert len(plain) > 10
     assert {name: terminals()[name] for name in plain} == {name: read[name] for name in plain}

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from idlc.checks import registry
+from idlc.check import registry
 from idlc.cli.main import main
 from idlc.diagnostics import codes
-from idlc.diagnostics.code_pages import page
+from idlc.diagnostics.explain import page
 from idlc.diagnostics.report import Report, Severity
 from tests.support import golden_text
 from tests.support.paths import GOLDEN

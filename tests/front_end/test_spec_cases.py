@@ -5,10 +5,10 @@ import json
 import pytest
 
 from idlc.diagnostics.report import Report, Severity
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 from tests.support import rosidl_view
 from tests.support.paths import SPEC
 

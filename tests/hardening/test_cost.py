@@ -18,10 +18,11 @@ import zstandard
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings import mcap_records
-from idlc.recordings.compression import ANY_GROWTH
-from idlc.recordings.container import RecordingError, open_recording
-from idlc.recordings.messages import Window
+from idlc.recordings.containers import mcap as mcap_records
+from idlc.recordings.containers.compression import ANY_GROWTH
+from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.messages import Window
+from idlc.recordings.containers.source import RecordingError
 from tests.support.mcap_mutations import COMPRESS, MAGIC
 
 FLOAT = "float64 data"

@@ -19,13 +19,14 @@ import pytest
 import idlc
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.disk.scope import Scope
-from idlc.driver.recordings.types import Around, recorded_types
-from idlc.driver.recordings.versions import versions
-from idlc.export.idl import idl
-from idlc.recordings.container import RecordingError, Schema, Topic, open_recording
+from idlc.generate.idl import idl
+from idlc.project.scope import Scope
+from idlc.recordings.containers.container import Schema, Topic, open_recording
+from idlc.recordings.containers.messages import ALWAYS, Ranges
+from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
-from idlc.recordings.messages import ALWAYS, Ranges
+from idlc.recordings.types import Around, recorded_types
+from idlc.recordings.versions import versions
 from tests.support import db3_mutations, definition_mutations, mcap_mutations
 from tests.support import recordings as made
 from tests.support.paths import ROOT

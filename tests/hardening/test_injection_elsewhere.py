@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from idlc.cli import watch
+from idlc.cli import gen
 from tests.cli.test_docs import Page
 from tests.hardening.test_injection import FILE_NAMES, PLACES, colourful
 from tests.support.hostile import PAYLOADS, assert_harmless, assert_untouched, on_a_terminal, run
@@ -117,7 +117,7 @@ def test_names_while_watching(tmp_path, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(watch.time, "sleep", interrupted)
+    monkeypatch.setattr(gen.time, "sleep", interrupted)
     for number, name in enumerate(FILE_NAMES.values()):
         here = tmp_path / str(number)
         (here / name / "msg").mkdir(parents=True)

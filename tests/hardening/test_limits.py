@@ -15,11 +15,11 @@ from pathlib import Path
 
 import pytest
 
-import idlc.disk.packages.inputs
-import idlc.model.lowering.file
-import idlc.model.pool
-from idlc.checks.size import MAX_DEPTH
+import idlc.model.link
+import idlc.model.lower
+import idlc.project.inputs
 from idlc.cli.main import main
+from idlc.wire.layout import MAX_DEPTH
 from tests.support.files import write
 
 #: How much larger input is when there is time, as in `make fuzz`.
@@ -153,10 +153,10 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
         read[str(path)] += 1
         return read_bytes_(path, *rest)
 
-    lower_, read_bytes_ = idlc.model.lowering.file.lower, idlc.disk.read.read_bytes
-    for module in ("idlc.model.lowering.file.lower", "idlc.model.pool.lower"):
+    lower_, read_bytes_ = idlc.model.lower.lower, idlc.project.files.read_bytes
+    for module in ("idlc.model.lower.lower", "idlc.model.link.lower"):
         monkeypatch.setattr(module, lower)
-    monkeypatch.setattr("idlc.disk.read.read_bytes", read_bytes)
+    monkeypatch.setattr("idlc.project.files.read_bytes", read_bytes)
     assert main([command[0], "ws", *command[1:]]) == 0
     versions = 2 if command[0] == "breaking" else 1
     files = [*(f"ws/p{n}/msg/A.msg" for n in range(30)), "ws/q/msg/B.msg"]
@@ -293,7 +293,7 @@ import contextlib, io, json, resource, sys
 resource.setrlimit(resource.RLIMIT_CPU, ({PROCESSOR_SECONDS}, {PROCESSOR_SECONDS}))
 resource.setrlimit(resource.RLIMIT_AS, ({MEMORY}, {MEMORY}))
 from idlc.cli.main import main
-from idlc.checks.size import MAX_DEPTH
+from idlc.wire.layout import MAX_DEPTH
 for words in json.load(sys.stdin):
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):

@@ -5,8 +5,8 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException
 
 from idlc.cli.main import main
-from idlc.lsp.protocol.parts import Position
-from idlc.lsp.protocol.positions import Places
+from idlc.editor.protocol.parts import Position
+from idlc.editor.protocol.positions import Places
 from tests.support.editor import at, between
 
 FILES = {

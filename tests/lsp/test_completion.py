@@ -5,10 +5,10 @@ from lsprotocol import types as lsp
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.lsp.features import suggestions
+from idlc.editor.features import completion
+from idlc.language.parse import parse
 from idlc.model.ir import PRIMITIVES, TypeName
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 from tests.support.editor import at
 
 MANIFEST = """\
@@ -152,7 +152,7 @@ def test_built_in_types_say_how_large_they_are(typing):
 )
 @pytest.mark.parametrize("base", [*PRIMITIVES, "string", "wstring", "string<=2", "demo/Drive"])
 def test_every_value_that_is_offered_is_one(base, array):
-    for value in suggestions.values(f"{base}{array}"):
+    for value in completion.suggested_values(f"{base}{array}"):
         report = Report()
         source = Source("A.msg", f"{base}{array} a {value}\n")
         lower(parse(source), TypeName("demo", "msg", "A"), report)

@@ -10,8 +10,8 @@ from lsprotocol import types as lsp
 
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
-from idlc.lsp.documents import Documents
-from idlc.lsp.protocol.parts import DocumentItem
+from idlc.editor.documents import Documents
+from idlc.editor.protocol.parts import DocumentItem
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(

@@ -7,9 +7,9 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from idlc.lsp.protocol.positions import Places
-from idlc.lsp.publish import diagnostics
-from idlc.lsp.session import Session
+from idlc.editor.protocol.positions import Places
+from idlc.editor.publish import diagnostics
+from idlc.editor.server import Session
 
 #: Pieces of text that are put together and cut up, so that names clash, appear and vanish.
 PIECES = [

@@ -13,13 +13,13 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.diagnostics.source import Source
-from idlc.diagnostics.suggest import without_options
-from idlc.disk.read import is_folder
-from idlc.lsp.protocol import framing, uris
-from idlc.lsp.protocol.capabilities import ENCODINGS
-from idlc.lsp.protocol.parts import Position
-from idlc.lsp.protocol.positions import Places
-from idlc.lsp.server import serve
+from idlc.diagnostics.text import without_options
+from idlc.editor.protocol import framing, uris
+from idlc.editor.protocol.capabilities import ENCODINGS
+from idlc.editor.protocol.parts import Position
+from idlc.editor.protocol.positions import Places
+from idlc.editor.server import serve
+from idlc.project.files import is_folder
 from tests.support import golden_text
 from tests.support.paths import GOLDEN
 

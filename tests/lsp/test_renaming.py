@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.disk.read import Unsaved
-from idlc.driver.workspace import Wishes, Workspace
-from idlc.lsp.protocol.capabilities import ADD_DEPENDENCY
-from idlc.lsp.protocol.errors import RequestError
+from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
+from idlc.editor.protocol.framing import RequestError
+from idlc.editor.workspace import Wishes, Workspace
+from idlc.project.files import Unsaved
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 

@@ -10,8 +10,7 @@ from io import BytesIO
 
 import pytest
 
-from idlc.lsp.methods import METHODS
-from idlc.lsp.server import Server
+from idlc.editor.server import METHODS, Server
 from tests.lsp.test_golden_replay import notification, request
 
 PATIENCE = 30
@@ -249,7 +248,7 @@ def test_it_ends_when_the_client_is_gone_although_the_stream_is_open():
     """Another process holds the stream; the client's number is in `initialize`."""
     with subprocess.Popen([sys.executable, "-c", ""]) as client:
         pass
-    impatient = "import idlc.lsp.server as s; s.PATIENCE = 0.1; from idlc.cli.main import main"
+    impatient = "import idlc.editor.server as s; s.PATIENCE = 0.1; from idlc.cli.main import main"
     with start("-c", f"{impatient}; raise SystemExit(main(['lsp']))") as server:
         server.stdin.write(frame(beginning(processId=client.pid)))
         server.stdin.flush()
@@ -266,10 +265,10 @@ def test_an_interrupt_ends_it_quietly():
         assert b"Traceback" not in server.stderr.read()
 
 
-@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.driver.workspace.look"])
+@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.look"])
 def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
-    from idlc.lsp.publish import diagnostics
-    from idlc.lsp.session import Session
+    from idlc.editor.publish import diagnostics
+    from idlc.editor.server import Session
 
     def fail(*_):
         raise ZeroDivisionError("as the test asked for")

@@ -6,10 +6,10 @@ import subprocess
 import pytest
 from lsprotocol import types as lsp
 
-from idlc.lsp.features import lenses as features
-from idlc.lsp.protocol.parts import DocumentId, OfDocument
-from idlc.lsp.protocol.token_kinds import TYPES
-from idlc.lsp.workbench import Workbench
+from idlc.editor.features import lenses as features
+from idlc.editor.protocol.capabilities import TYPES
+from idlc.editor.protocol.parts import DocumentId, OfDocument
+from idlc.editor.workbench import Workbench
 from tests.support.editor import at, between
 from tests.support.tools import tool
 

@@ -4,7 +4,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import pytest
 
-from idlc.lsp.protocol.uris import from_path, path_text, to_path
+from idlc.editor.protocol.uris import from_path, path_text, to_path
 
 
 @pytest.mark.parametrize(

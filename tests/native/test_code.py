@@ -5,10 +5,10 @@ import re
 import subprocess
 from pathlib import Path
 
+import idlc.native
 import pytest
 
-import idlc.native
-from idlc.native.library import MACHINES as MADE_FOR
+from idlc.generate.native.library import MACHINES as MADE_FOR
 from tests.support.tools import MACHINES, assemble, run, tool
 
 #: Where code lies and what it refers to; within the smallest reach that a machine has.

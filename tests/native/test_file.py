@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from idlc.generate.native.layouts import LAYOUTS
+from idlc.generate.native.library import MACHINES as MADE_FOR
+from idlc.generate.native.library import OWN, libraries
 from idlc.model import derive
-from idlc.native.layouts import LAYOUTS
-from idlc.native.library import MACHINES as MADE_FOR
-from idlc.native.library import OWN, libraries
 from tests.support.generated import model_of
 from tests.support.paths import ROOT
 from tests.support.tools import MACHINES, run, tool

@@ -35,12 +35,12 @@ IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "
 IO_CALLS = {"open", "print", "input"}
 #: What may read files of idlc: grammar, catalogue, templates, runtime, texts of licences.
 READS_ITS_OWN = {
-    "idlc/emit/render.py",
+    "idlc/generate/python/render.py",
     "idlc/model/catalog.py",
-    "idlc/scaffold/new_package.py",
-    "idlc/syntax/grammar.py",
-    "idlc/syntax/idl.py",
-    "idlc/templating.py",
+    "idlc/scaffold/package.py",
+    "idlc/language/grammar.py",
+    "idlc/language/idl.py",
+    "idlc/project/templates.py",
 }
 
 #: What runtime modules may import besides the standard library and each other, and only inside
@@ -279,6 +279,6 @@ def test_checking_a_file_imports_little(tmp_path):
     needless |= {"numpy", "pkgutil", "rich", "shutil", "subprocess", "tempfile", "tomllib"}
     assert needless & found == set()
     own = {name for name in found if name.partition(".")[0] == "idlc"}
-    assert "idlc.checks.package.manifest" in own
+    assert "idlc.check.package.manifest" in own
     assert "idlc.scaffold" not in own
     assert len(own) <= 82, "what a run without problems does not need can wait"

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from idlc.breaking.allow import Allowance
 from idlc.cli.main import main
+from idlc.compare.packages import Allowance
 from idlc.diagnostics.codes import CODES
-from idlc.disk.settings.pyproject import Config
+from idlc.project.settings import Config
 from tests.support import command_line_page, programs, refresh
 from tests.support.paths import DOCS, ROOT
 

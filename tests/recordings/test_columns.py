@@ -206,14 +206,14 @@ def test_without_arrow_it_is_said_how_to_install_it(recording, here):
 
 
 def test_a_terminal_sees_a_bar(recording):
-    from idlc.cli import progress
+    from idlc.cli import output
 
     class Terminal(io.StringIO):
         def isatty(self):
             return True
 
     seen = Terminal()
-    with progress.shown(seen) as tell:
+    with output.shown(seen) as tell:
         tell("/imu", 5, 20)
         tell("/imu\x1b", 20, 20)
     assert "5 of 20  /imu" in seen.getvalue()

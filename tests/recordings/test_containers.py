@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from idlc.recordings.container import RecordingError, open_recording
+from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.source import RecordingError
 from tests.support import recordings as made
 
 MESSAGES = made.messages()
@@ -159,7 +160,7 @@ def test_reading_leaves_nothing_beside_a_database(tmp_path):
 def test_what_is_in_a_file_is_read_with_the_standard_library(tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES)
     code = (
-        "import sys; from idlc.recordings.container import open_recording\n"
+        "import sys; from idlc.recordings.containers.container import open_recording\n"
         f"assert len(open_recording({str(path)!r}).topics) == 3\n"
         "print(*({'numpy', 'zstandard', 'lz4', 'msgspec', 'pyarrow'} & set(sys.modules)))"
     )

@@ -15,7 +15,7 @@ import pytest
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings.container import RecordingError
+from idlc.recordings.containers.source import RecordingError
 
 #: Journals that a writer's death leaves something of, or nothing.
 JOURNALS = ("DELETE", "TRUNCATE", "PERSIST", "WAL")
@@ -175,7 +175,7 @@ def test_a_hot_journal_is_an_error_that_says_what_to_do(how, tmp_path, capsys):
 @pytest.mark.parametrize("journal", ["DELETE", "PERSIST", "TRUNCATE", "MEMORY", "OFF", "WAL"])
 def test_a_writer_at_work(journal, tmp_path, monkeypatch):
     """Another connection has written half of a transaction."""
-    monkeypatch.setattr("idlc.recordings.db3.PATIENCE", 0.01)
+    monkeypatch.setattr("idlc.recordings.containers.db3.PATIENCE", 0.01)
     path = tmp_path / "a.db3"
     with closing(create(path, journal=journal)) as database:
         database.execute("BEGIN")
@@ -191,7 +191,7 @@ def test_a_writer_at_work(journal, tmp_path, monkeypatch):
 
 def test_reading_does_not_hold_a_writer_up(tmp_path, monkeypatch):
     """Between two groups of messages, nothing is locked."""
-    monkeypatch.setattr("idlc.recordings.db3_messages.GROUP", 2000)
+    monkeypatch.setattr("idlc.recordings.containers.messages.DB3_GROUP", 2000)
     path = tmp_path / "a.db3"
     with closing(create(path)) as database, idlc.Recording(path) as recording:
         found = []

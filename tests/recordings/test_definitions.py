@@ -9,18 +9,17 @@ import pytest
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.disk.scope import Scope
-from idlc.driver.recordings.types import Around, recorded_types
-from idlc.driver.recordings.versions import contradictions, versions
-from idlc.export.file_text import file_text
-from idlc.export.idl import idl
-from idlc.export.schemas import mcap
+from idlc.documents.schemas import mcap
+from idlc.generate.idl import file_text, idl
+from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.recordings.container import Schema, Topic
+from idlc.model.lower import lower
+from idlc.project.scope import Scope
+from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import recorded, type_name
-from idlc.syntax.parse import parse, parse_any
+from idlc.recordings.types import Around, recorded_types
+from idlc.recordings.versions import contradictions, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
 

@@ -14,10 +14,11 @@ import pytest
 import zstandard
 
 import idlc
-from idlc.recordings.compression import MOST_IN_A_CHUNK
-from idlc.recordings.container import RecordingError, open_recording
-from idlc.recordings.mcap_records import CHUNK_OP, HEAD, MAGIC
-from idlc.recordings.messages import ALWAYS
+from idlc.recordings.containers.compression import MOST_IN_A_CHUNK
+from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.mcap import CHUNK_OP, HEAD, MAGIC
+from idlc.recordings.containers.messages import ALWAYS
+from idlc.recordings.containers.source import RecordingError
 from tests.support import recordings as made
 
 COUNT = int(os.environ.get("IDLC_FUZZ", "150"))
@@ -134,7 +135,7 @@ def test_a_bomb_does_not_go_off(tmp_path):
     code = (
         "import sys, resource, zstandard, lz4.frame, numpy\n"
         "from tests.recordings.test_hostile_containers import read\n"
-        "from idlc.recordings.container import RecordingError\n"
+        "from idlc.recordings.containers.container import RecordingError\n"
         "before = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         f"most = before + {MOST_IN_A_CHUNK} + (64 << 20)\n"
         "resource.setrlimit(resource.RLIMIT_AS, (most, most))\n"

@@ -7,9 +7,10 @@ from struct import pack, unpack_from
 
 import pytest
 
-from idlc.recordings import mcap_records
-from idlc.recordings.container import RecordingError, open_recording
-from idlc.recordings.messages import Window, joined
+from idlc.recordings.containers import mcap
+from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.messages import Window, joined
+from idlc.recordings.containers.source import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import mcap_mutations
 from tests.support import recordings as made
@@ -185,7 +186,7 @@ def test_what_a_recorder_has_not_written_back_is_read(tmp_path):
 def places(data, op, at=8):
     """Yield where records of a kind begin; those in chunks are not seen."""
     while at + 9 <= len(data):
-        found, size = mcap_records.HEAD.unpack_from(data, at)
+        found, size = mcap.HEAD.unpack_from(data, at)
         if found == op:
             yield at
         at += 9 + size
@@ -195,7 +196,7 @@ def lies():
     """Yield ways in which a file of one channel can lie, and what is then said."""
 
     def index_entry(data, value):
-        at = next(places(data, mcap_records.MESSAGE_INDEX_OP))
+        at = next(places(data, mcap.MESSAGE_INDEX_OP))
         data[at + 9 + 6 + 8 : at + 9 + 6 + 16] = pack("<Q", value)
 
     yield "leaves its chunk", lambda data: index_entry(data, 1 << 40)
@@ -203,13 +204,13 @@ def lies():
     yield "no message of its channel", lambda data: index_entry(data, 1)
 
     def doubled(data):
-        at = next(places(data, mcap_records.MESSAGE_INDEX_OP)) + 9 + 6
+        at = next(places(data, mcap.MESSAGE_INDEX_OP)) + 9 + 6
         data[at + 16 : at + 32] = data[at : at + 16]
 
     yield "overlap", doubled
 
     def message_size(data, value):
-        chunk = next(places(data, mcap_records.CHUNK_OP))
+        chunk = next(places(data, mcap.CHUNK_OP))
         (first,) = unpack_from("<Q", data, next(places(data, 7)) + 9 + 6 + 8)
         at = chunk + 9 + 8 + 8 + 8 + 4 + 4 + 8 + first
         data[at + 1 : at + 9] = pack("<Q", value)
@@ -218,7 +219,7 @@ def lies():
     yield "cut off", lambda data: message_size(data, 3)
 
     def index_record(data, field, value):
-        at = next(places(data, mcap_records.MESSAGE_INDEX_OP)) + field
+        at = next(places(data, mcap.MESSAGE_INDEX_OP)) + field
         data[at : at + len(value)] = value
 
     yield "no index of messages", lambda data: index_record(data, 0, b"\x05")
@@ -227,7 +228,7 @@ def lies():
     yield "cut off", lambda data: index_record(data, 11, pack("<I", 1 << 31))
 
     def chunk_head(data, field, value):
-        at = next(places(data, mcap_records.CHUNK_OP)) + 9 + field
+        at = next(places(data, mcap.CHUNK_OP)) + 9 + field
         data[at : at + len(value)] = value
 
     yield "another size", lambda data: chunk_head(data, 16, pack("<Q", 1 << 20))
@@ -254,7 +255,7 @@ def test_a_lying_file_is_refused(lie, tmp_path):
 def test_a_chunk_that_holds_another_size_is_refused(compression, declared, tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, compression, chunk_size=1 << 20)
     data = bytearray(path.read_bytes())
-    at = next(places(data, mcap_records.CHUNK_OP)) + 9 + 16
+    at = next(places(data, mcap.CHUNK_OP)) + 9 + 16
     (size,) = unpack_from("<Q", data, at)
     data[at : at + 8] = pack("<Q", size + declared)
     path.write_bytes(data)
@@ -266,7 +267,7 @@ def test_a_chunk_that_cannot_be_decompressed_is_refused(tmp_path):
     for compression in ("zstd", "lz4"):
         path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, compression)
         data = bytearray(path.read_bytes())
-        at = next(places(data, mcap_records.CHUNK_OP))
+        at = next(places(data, mcap.CHUNK_OP))
         data[at + 60 : at + 200] = b"x" * 140
         path.write_bytes(data)
         with pytest.raises(RecordingError, match="cannot be decompressed"):
@@ -276,7 +277,7 @@ def test_a_chunk_that_cannot_be_decompressed_is_refused(tmp_path):
 def test_chunks_that_a_summary_names_twice_are_read_once(tmp_path):
     path = made.by_mcap(tmp_path / "a.mcap", MESSAGES, "", chunk_size=SMALL)
     data = bytearray(path.read_bytes())
-    first, second, *_ = places(data, mcap_records.CHUNK_INDEX_OP)
+    first, second, *_ = places(data, mcap.CHUNK_INDEX_OP)
     data[second + 9 : second + 41] = data[first + 9 : first + 41]
     data[-12:-8] = pack("<I", 0)
     path.write_bytes(data)

@@ -17,9 +17,10 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
 import idlc
-from idlc.recordings import source
-from idlc.recordings.container import RecordingError, open_recording
-from idlc.recordings.messages import Window
+from idlc.recordings.containers import source
+from idlc.recordings.containers.container import open_recording
+from idlc.recordings.containers.messages import Window
+from idlc.recordings.containers.source import RecordingError
 from tests.support.mcap_mutations import COMPRESS, MAGIC
 
 COUNT = int(os.environ.get("IDLC_FUZZ", "150"))

@@ -13,7 +13,7 @@ from pyarrow import parquet
 import idlc
 from idlc.cli.main import main
 from idlc.model.ir import DUMMY_FIELD
-from idlc.recordings.errors import RecordingError
+from idlc.recordings.containers.source import RecordingError
 from tests.support import recorded_text
 from tests.support import recordings as made
 

@@ -20,7 +20,7 @@ from rosbags.highlevel import AnyReader
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings.container import RecordingError
+from idlc.recordings.containers.source import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import recordings as made
 

@@ -14,7 +14,7 @@ from mcap.writer import Writer
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings.container import RecordingError
+from idlc.recordings.containers.source import RecordingError
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "tests/recordings/service_events"

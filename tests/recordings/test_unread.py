@@ -7,7 +7,7 @@ import pytest
 
 import idlc
 from idlc.cli.main import main
-from idlc.recordings.errors import RecordingError
+from idlc.recordings.containers.source import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT
 from tests.support import recordings as made
 

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.disk.scope import Scope
-from idlc.driver.query import describe
+from idlc.documents.query import describe
+from idlc.project.scope import Scope
 
 INSTALLED = [
     path

@@ -10,11 +10,11 @@ from rosidl_parser.parser import parse_idl_string
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.export.idl import idl
+from idlc.generate.idl import idl
+from idlc.language.format import format_file
+from idlc.language.parse import parse
 from idlc.model import ir
-from idlc.model.lowering.file import lower
-from idlc.syntax.format import format_file
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 from tests.front_end.test_format import assert_only_the_layout_changes
 
 SHARE = Path(sys.prefix) / "share"

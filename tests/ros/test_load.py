@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from idlc.disk.machine.distribution import distribution
+from idlc.project.prefixes import distribution
 from tests.support.installed import generate
 from tests.support.paths import EVERY_KIND
 

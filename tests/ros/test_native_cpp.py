@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from idlc.native.library import OWN
+from idlc.generate.native.library import OWN
 from tests.support.installed import SHARE, interfaces_in, names_in
 from tests.support.native import built, install, model_of
 from tests.support.paths import EVERY_KIND, EXAMPLE

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from idlc.emit.render import render_package
+from idlc.generate.python.render import render_package
 from tests.support import generated
 from tests.support.paths import ROOT
 

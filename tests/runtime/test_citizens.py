@@ -26,7 +26,7 @@ import rich.console
 import rich.pretty
 
 from idlc.cli import pytest_plugin
-from idlc.emit import pynames
+from idlc.model import python_names
 from tests.support import generated
 
 FILES = {
@@ -708,7 +708,7 @@ def test_subclasses_keep_fields_of_the_names_of_methods(hiding):
 
 def test_the_methods_are_those_that_a_field_can_hide():
     base = get("msg/Plain").__mro__[1]
-    assert {name for name in vars(base) if name[0].islower()} == pynames.METHODS
+    assert {name for name in vars(base) if name[0].islower()} == python_names.METHODS
 
 
 def test_messages_may_be_called_like_words_of_python(hiding):

@@ -7,7 +7,7 @@ from collections import UserList, deque
 
 import pytest
 
-from idlc.model.distro import BY_NAME, DISTROS
+from idlc.model.distros import BY_NAME, DISTROS
 from tests.support import generated
 
 FILES = {

@@ -2,11 +2,10 @@
 
 import pytest
 
-from idlc.scaffold import spec
-from idlc.scaffold.edits import enter_node
-from idlc.scaffold.edits.outcome import Edited, Refused
-from idlc.scaffold.planned import Plan, plan
-from idlc.scaffold.roles.timer import TIMER
+from idlc.project.edits import Edited, Refused
+from idlc.scaffold import new_node, spec
+from idlc.scaffold.roles.topics import TIMER
+from idlc.scaffold.spec import Plan, plan
 from idlc.scaffold.templates import Templates
 
 SETUP = """\
@@ -27,9 +26,9 @@ def heart(*, lifecycle: bool = False) -> Plan:
     return plan(spec.Node("heart", "demo", endpoints, lifecycle=lifecycle), [None], {})
 
 
-def entered(texts, files=FILES, **options) -> enter_node.Entry:
-    entry = enter_node.enter(heart(**options), texts, files, Templates())
-    return enter_node.launch(heart(**options), texts, entry, Templates())
+def entered(texts, files=FILES, **options) -> new_node.Entry:
+    entry = new_node.enter_node(heart(**options), texts, files, Templates())
+    return new_node.enter_launch(heart(**options), texts, entry, Templates())
 
 
 def test_a_package_gets_what_its_nodes_share_once():
@@ -89,4 +88,4 @@ def test_what_cannot_be_edited_is_refused_but_for_the_launch_file():
     ],
 )
 def test_the_launch_file_of_the_package_is_chosen(names, expected):
-    assert expected in enter_node.paths("demo", names)
+    assert expected in new_node.paths("demo", names)

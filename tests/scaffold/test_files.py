@@ -5,9 +5,10 @@ import difflib
 import pytest
 from catkin_pkg.package import parse_package_string
 
-from idlc.scaffold.edits import cmake, data_files, launch_py, package_xml
-from idlc.scaffold.edits.console_script import add_script
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused, Script
+from idlc.project.edits import Edited, Outcome, Refused, Script
+from idlc.scaffold import interface
+from idlc.scaffold.edits import data_files, launch_py, package_xml
+from idlc.scaffold.edits.setup_py import add_console_script
 
 TALKING = launch_py.Started("demo", "talker")
 TALKER = Script("talker", "demo.talker:main")
@@ -194,24 +195,24 @@ SETUP = "from setuptools import setup\nsetup(entry_points={'console_scripts': []
     ],
 )
 def test_scripts_outside_of_setup_py(files, path, new):
-    where, outcome = add_script(files, TALKER)
+    where, outcome = add_console_script(files, TALKER)
     assert where == path
     after = text_of(outcome)
     assert added(files[path], after) == [new]
-    assert add_script({**files, path: after}, TALKER) == (path, outcome)
+    assert add_console_script({**files, path: after}, TALKER) == (path, outcome)
 
 
 def test_a_table_of_scripts_is_made_where_there_is_none():
     text = '[project]\nname = "demo"\nversion = "1"'
-    _, outcome = add_script({"pyproject.toml": text}, TALKER)
+    _, outcome = add_console_script({"pyproject.toml": text}, TALKER)
     assert text_of(outcome).endswith('\n\n[project.scripts]\ntalker = "demo.talker:main"\n')
 
 
 def test_setup_py_counts_where_the_project_leaves_scripts_to_it():
     text = '[project]\nname = "demo"\nversion = "1"\ndynamic = ["scripts"]\n'
-    assert add_script({"pyproject.toml": text, "setup.py": SETUP}, TALKER)[0] == "setup.py"
+    assert add_console_script({"pyproject.toml": text, "setup.py": SETUP}, TALKER)[0] == "setup.py"
     tools = "[tool.idlc]\nout = 'demo'\n"
-    assert add_script({"pyproject.toml": tools, "setup.py": SETUP}, TALKER)[0] == "setup.py"
+    assert add_console_script({"pyproject.toml": tools, "setup.py": SETUP}, TALKER)[0] == "setup.py"
 
 
 @pytest.mark.parametrize(
@@ -225,7 +226,7 @@ def test_setup_py_counts_where_the_project_leaves_scripts_to_it():
     ],
 )
 def test_what_is_refused_outside_of_setup_py(files, path):
-    where, outcome = add_script(files, TALKER)
+    where, outcome = add_console_script(files, TALKER)
     assert where == path
     assert isinstance(outcome, Refused)
     assert "demo.talker:main" in outcome.line
@@ -285,11 +286,11 @@ def test_a_node_is_added_where_nodes_are_added_one_by_one():
     ],
 )
 def test_dependencies_are_added_to_cmake(text, new):
-    outcome = cmake.add_dependencies(text, ["nav_msgs", "std_msgs"])
+    outcome = interface.add_cmake_dependencies(text, ["nav_msgs", "std_msgs"])
     assert outcome == Edited(new or text)
-    assert cmake.add_dependencies(new or text, ["nav_msgs", "std_msgs"]) == outcome
+    assert interface.add_cmake_dependencies(new or text, ["nav_msgs", "std_msgs"]) == outcome
 
 
 @pytest.mark.parametrize("text", ["", "set(others a)", "set(dependencies)\nset(dependencies)"])
 def test_dependencies_for_unusual_cmake_are_refused(text):
-    assert isinstance(cmake.add_dependencies(text, ["nav_msgs"]), Refused)
+    assert isinstance(interface.add_cmake_dependencies(text, ["nav_msgs"]), Refused)

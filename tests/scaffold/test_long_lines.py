@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from idlc.checks.package.long_lines import wrapped
+from idlc.check.package.setup_edits import wrapped
 from idlc.cli.main import main
 
 LONG = ", ".join(f"'name_{n} = demo.module_{n}:main'" for n in range(6))

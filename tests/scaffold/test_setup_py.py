@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from idlc.scaffold.edits.outcome import Edited, Refused, Script
-from idlc.scaffold.edits.setup_py import add_script
+from idlc.project.edits import Edited, Refused, Script
+from idlc.scaffold.edits.setup_py import add_to_setup
 
 TALKER = Script("talker", "demo.talker:main")
 HEAD = "from setuptools import setup\n\npackage_name = 'demo'\n"
@@ -76,12 +76,12 @@ WHOLE = {
 
 def check(text: str) -> None:
     before = entries(text)
-    outcome = add_script(text, TALKER)
+    outcome = add_to_setup(text, TALKER)
     assert isinstance(outcome, Edited), outcome
     after = outcome.text
     assert entries(after) == [*before, TALKER.line]
     assert comments(after) == comments(text)
-    assert add_script(after, TALKER) == outcome
+    assert add_to_setup(after, TALKER) == outcome
     gone = [line for line in text.splitlines() if line not in after.splitlines()]
     assert len(gone) <= 2, "lines that have nothing to do with it were changed"
 
@@ -92,7 +92,7 @@ def check(text: str) -> None:
 def test_every_shape_of_entry_points(setup, points, scripts):
     text = HEAD + setup.replace("{}", points.format(scripts))
     if scripts == LISTS["sum"]:  # the new entry is not the last one then
-        outcome = add_script(text, TALKER)
+        outcome = add_to_setup(text, TALKER)
         assert isinstance(outcome, Edited)
         assert TALKER.line in entries(outcome.text)
         return
@@ -108,7 +108,7 @@ def test_line_ends_stay():
     text = (HEAD + SETUPS["spread"].replace("{}", "{'console_scripts': [\n    ]}")).replace(
         "\n", "\r\n"
     )
-    outcome = add_script(text, TALKER)
+    outcome = add_to_setup(text, TALKER)
     assert isinstance(outcome, Edited)
     assert outcome.text.count("\r\n") == outcome.text.count("\n")
 
@@ -129,7 +129,7 @@ def test_line_ends_stay():
     ],
 )
 def test_what_is_refused_with_the_line_to_add(text, why):
-    outcome = add_script(f"from setuptools import setup\n{text}\n", TALKER)
+    outcome = add_to_setup(f"from setuptools import setup\n{text}\n", TALKER)
     assert isinstance(outcome, Refused)
     assert TALKER.line in outcome.line
     assert re.search(why, outcome.why), outcome.why
@@ -137,7 +137,7 @@ def test_what_is_refused_with_the_line_to_add(text, why):
 
 def test_a_line_that_was_added_by_hand_is_found_anywhere():
     text = HEAD + "EXTRA = ['talker=demo.talker:main']\nsetup(entry_points=points(EXTRA))\n"
-    assert add_script(text, TALKER) == Edited(text)
+    assert add_to_setup(text, TALKER) == Edited(text)
 
 
 indents = st.sampled_from(["    ", "  ", "\t", "        "])
@@ -174,9 +174,9 @@ def setup_files(draw):
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(setup_files())
 def test_no_setup_file_is_ever_corrupted(text):
-    outcome = add_script(text, TALKER)
+    outcome = add_to_setup(text, TALKER)
     assert isinstance(outcome, Edited), outcome
     before, after = (one.replace("install_it", "setup") for one in (text, outcome.text))
     assert entries(after) == [*entries(before), TALKER.line]
     assert comments(after) == comments(before)
-    assert add_script(outcome.text, TALKER) == outcome
+    assert add_to_setup(outcome.text, TALKER) == outcome

@@ -4,10 +4,10 @@ import random
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 from tests.support import reference_cdr
 
 TYPES = (

@@ -27,9 +27,9 @@ import shutil
 import sys
 
 import idlc
-import idlc.emit.render
-import idlc.templating
-from idlc.disk.read import absolute
+import idlc.generate.python.render
+import idlc.project.templates
+from idlc.project.files import absolute
 
 WRITES = {"os.mkdir", "os.rmdir", "os.remove", "os.rename", "os.utime", "os.chmod", "os.truncate"}
 
@@ -90,12 +90,12 @@ def run(folder, order, answer):
         os.setgroups([])
         os.setgid(order["user"])
         os.setuid(order["user"])
-    from idlc.cli.main import main
+    from idlc.cli.main import main as main_main
 
     out = io.StringIO()
     sys.addaudithook(fault.hook)
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
-        status = main(order["words"])
+        status = main_main(order["words"])
     fault.order = {}
     text = json.dumps({"status": status, "points": fault.count, "said": out.getvalue()})
     os.write(answer, text.encode())
@@ -110,7 +110,7 @@ def main():
     names = ("difflib", "encodings.idna", "encodings.unicode_escape", "fcntl", "html", "tempfile")
     for name in (*names, "xml.parsers.expat"):
         importlib.import_module(name)
-    idlc.templating.environment()
+    idlc.project.templates.environment()
     for line in sys.stdin:
         order = json.loads(line)
         read, write = os.pipe()

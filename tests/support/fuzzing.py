@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from idlc.cli.main import main
-from idlc.disk.output.lock_file import FILE
+from idlc.project.lock import FILE
 from tests.support import fuzzing_edits as edits
 from tests.support.fuzzing_recordings import everything, recorded
 from tests.support.paths import ROOT, VERDICTS

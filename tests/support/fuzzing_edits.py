@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from idlc.scaffold.edits import ini, launch_py, package_xml, setup_py
-from idlc.scaffold.edits.outcome import Edited, Outcome, Script
+from idlc.project.edits import Edited, Outcome, Script
+from idlc.scaffold.edits import launch_py, package_xml, setup_py
 
 TALKER = Script("talker", "demo.talker:main")
 
@@ -49,7 +49,7 @@ def python(data: bytes, edit: Callable[[str], Outcome]) -> None:
 
 def setup_file(data: bytes, _: Path) -> None:
     """A setup.py gets a console script."""
-    python(data, lambda text: setup_py.add_script(text, TALKER))
+    python(data, lambda text: setup_py.add_to_setup(text, TALKER))
 
 
 def launch_file(data: bytes, _: Path) -> None:
@@ -59,7 +59,7 @@ def launch_file(data: bytes, _: Path) -> None:
 
 def setup_cfg(data: bytes, _: Path) -> None:
     """A setup.cfg gets a console script: a line or two more, the others as they were."""
-    found = edited(data, lambda text: ini.add_to_cfg(text, TALKER))
+    found = edited(data, lambda text: setup_py.add_to_cfg(text, TALKER))
     if found:
         before, after = (Counter(text.splitlines()) for text in found)
         assert sum((before - after).values()) <= 1

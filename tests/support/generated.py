@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
-from idlc.emit.render import render_package
+from idlc.generate.python.render import render_package
+from idlc.language.parse import parse
 from idlc.model import catalog, derive, ir
-from idlc.model.distro import DEFAULT, Distro
+from idlc.model.distros import DEFAULT, Distro
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 from tests.support.paths import GOLDEN
 
 RECORDED = GOLDEN / "rosidl" / "interfaces"

@@ -31,10 +31,10 @@ _SECTION = re.compile(r"^-- (.+) --\n", re.MULTILINE)
 
 #: What `break` replaces by a function that fails.
 STAGES = {
-    "parse": "idlc.syntax.parse.parse",
+    "parse": "idlc.language.parse.parse",
     "link": "idlc.model.link.link",
-    "check": "idlc.checks.registry.check",
-    "render": "idlc.emit.render.render_package",
+    "check": "idlc.check.registry.check",
+    "render": "idlc.generate.python.render.render_package",
 }
 
 
@@ -73,9 +73,9 @@ def only_rclpy(package: str) -> list[Path]:
 def run(case: Case, folder: Path, capsys, monkeypatch) -> dict[str, str]:
     """Return what each expected section should hold, made independent of idlc's version."""
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("idlc.disk.machine.environment.ament_prefixes", lambda: ())
+    monkeypatch.setattr("idlc.project.prefixes.ament_prefixes", lambda: ())
     monkeypatch.delenv("ROS_DISTRO", raising=False)
-    monkeypatch.setattr("idlc.disk.machine.environment.python_folders", only_rclpy)
+    monkeypatch.setattr("idlc.project.prefixes.python_folders", only_rclpy)
     for path, text in case.files.items():
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -4,11 +4,11 @@ import msgspec
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.language.escapes import through_idl
+from idlc.language.parse import parse_any
 from idlc.model import derive, ir
-from idlc.model.lowering.file import lower
-from idlc.model.meaning import meaning
-from idlc.syntax.escapes import through_idl
-from idlc.syntax.parse import parse_any
+from idlc.model.ir import meaning
+from idlc.model.lower import lower
 
 
 def read(text, name, path=""):

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from idlc.disk.machine.distribution import distribution
-from idlc.native.layouts import LAYOUTS, Layout
+from idlc.generate.native.layouts import LAYOUTS, Layout
+from idlc.project.prefixes import distribution
 
 SHARE = Path(sys.prefix) / "share"
 

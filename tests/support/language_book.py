@@ -17,8 +17,8 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from idlc.checks.registry import advise
-from idlc.checks.select import Selection
+from idlc.check.registry import advise
+from idlc.check.select import Selection
 from idlc.diagnostics.codes import CODES, STYLE
 from idlc.diagnostics.report import Severity
 from tests.support import rosidl_view

@@ -3,12 +3,12 @@
 import sys
 from pathlib import Path
 
+from idlc.check.compiler import models_of
 from idlc.diagnostics.report import Report
-from idlc.disk.find import look
-from idlc.disk.packages.inputs import packages
-from idlc.disk.scope import Scope
-from idlc.driver.stages import models_of
-from idlc.native.library import MACHINES, libraries
+from idlc.generate.native.library import MACHINES, libraries
+from idlc.project.find import look
+from idlc.project.inputs import packages
+from idlc.project.scope import Scope
 from tests.support.installed import installed_layout
 from tests.support.paths import PROGRAMS
 from tests.support.tools import run, tool

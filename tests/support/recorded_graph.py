@@ -2,8 +2,8 @@
 
 from contextlib import contextmanager
 
-from idlc.breaking.graph import Endpoint
-from idlc.disk.machine.graph import Answer
+from idlc.compare.graph import Endpoint
+from idlc.compare.running import Answer
 
 ROLES = {
     "publisher": ("topic", True),
@@ -65,9 +65,9 @@ def take_the_place(monkeypatch, graph):
         yield graph
 
     if graph is None:
-        monkeypatch.setattr("idlc.disk.machine.graph.import_module", _missing)
+        monkeypatch.setattr("idlc.compare.running.import_module", _missing)
     else:
-        monkeypatch.setattr("idlc.disk.machine.graph.joined", joined)
+        monkeypatch.setattr("idlc.compare.running.joined", joined)
 
 
 def _missing(name):

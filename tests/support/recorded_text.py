@@ -14,10 +14,10 @@ from pathlib import Path
 from mcap.writer import Writer
 
 from idlc.diagnostics.report import Report
+from idlc.language.parse import parse
 from idlc.model import catalog, ir
 from idlc.model.link import link
-from idlc.model.lowering.file import lower
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 
 _NEXT = re.compile(r"^--- (MSG|IDL|SRV|ACTION) (\S+)$", re.MULTILINE)
 

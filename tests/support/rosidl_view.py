@@ -4,15 +4,15 @@ A case has `kind`, `pkg`, `name`, `siblings` (path to text), and its text as `te
 `bytes_hex`; `distro` if that is not Jazzy.
 """
 
-from idlc.checks import registry
+from idlc.check import registry
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
+from idlc.language.escapes import through_idl
+from idlc.language.parse import parse
 from idlc.model import catalog, derive, ir
-from idlc.model.distro import BY_NAME
+from idlc.model.distros import BY_NAME
 from idlc.model.link import Model, link
-from idlc.model.lowering.file import lower
-from idlc.syntax.escapes import through_idl
-from idlc.syntax.parse import parse
+from idlc.model.lower import lower
 
 
 class Siblings:

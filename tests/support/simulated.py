@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 from lsprotocol import types as lsp
 from lsprotocol.converters import get_converter
 
-from idlc.lsp.protocol.parts import Position
-from idlc.lsp.protocol.positions import Places
-from idlc.lsp.session import Session
+from idlc.editor.protocol.parts import Position
+from idlc.editor.protocol.positions import Places
+from idlc.editor.server import Session
 
 INTERFACES = (".msg", ".srv", ".action")
 

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 
 import libcst as cst
 
-from idlc.checks.package.installation import wiring
-from idlc.diagnostics.edits import apply
+from idlc.check.package.installation import wiring
+from idlc.diagnostics.report import apply
 from idlc.diagnostics.source import Source
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
+from idlc.project.edits import Edited, Outcome, Refused
 from idlc.scaffold.edits.python_text import appended, constants, parsed, quoted
-from idlc.scaffold.edits.setup_py import setup_calls, strings
+from idlc.scaffold.edits.setup_py import setup_calls, setup_strings
 
 WHERE = "to `data_files` in the call of setup()"
 
@@ -25,7 +25,7 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     module = parsed(text)
     if module is None:
         return Refused("this is not valid Python", line, WHERE)
-    if any("launch" in one for one in strings(module, constants(module))):
+    if any("launch" in one for one in setup_strings(module, constants(module))):
         return Edited(text)
     calls = setup_calls(module)
     given = _given(calls, "data_files")

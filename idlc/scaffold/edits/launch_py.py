@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import libcst as cst
 
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
+from idlc.project.edits import Edited, Outcome, Refused
 from idlc.scaffold.edits.python_text import (
     appended,
     constants,
@@ -15,7 +15,7 @@ from idlc.scaffold.edits.python_text import (
     quoted,
     string,
 )
-from idlc.scaffold.line_breaks import WIDTH
+from idlc.scaffold.layout import WIDTH
 
 WHERE = "to the launch description"
 MODULE = "launch_ros.actions"

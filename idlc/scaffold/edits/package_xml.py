@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
-from idlc.checks.package.package_xml import DEPENDENCIES, RANK, Manifest, NotXmlError, read
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused
+from idlc.project.edits import Edited, Outcome, Refused
+from idlc.project.package_xml import DEPENDENCIES, RANK, Manifest, NotXmlError, read
 
 #: Tags by which a package is there when a node runs.
 AT_RUN_TIME = frozenset({"depend", "exec_depend", "run_depend"})

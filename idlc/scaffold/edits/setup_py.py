@@ -6,29 +6,141 @@ line to add by hand. An entry that is there already changes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeAlias
+import re
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import libcst as cst
 
-from idlc.scaffold.edits import ini
-from idlc.scaffold.edits.outcome import Edited, Outcome, Refused, Script, split, taken
+from idlc.project.edits import Edited, Outcome, Refused, Script, split, taken
 from idlc.scaffold.edits.python_text import appended, assignments, constants, parsed, quoted, string
 
+Edit: TypeAlias = Callable[[str], Outcome]
+
+SECTION = "options.entry_points"
 KEY = "console_scripts"
-WHERE = "to `console_scripts` in the `entry_points` of setup()"
+IN_SETUP_CFG = f"below `{KEY} =` in [{SECTION}]"
+_HEADER = re.compile(r"\s*\[([^\]]*)\]")
+
+
+def _section(lines: list[str], name: str) -> tuple[int, int] | None:
+    """Return the lines of a section, without its header and the empty lines at its end."""
+    headers = [n for n, line in enumerate(lines) if _HEADER.match(line)]
+    for at, number in enumerate(headers):
+        found = _HEADER.match(lines[number])
+        if found and found[1].strip() == name:
+            end = headers[at + 1] if at + 1 < len(headers) else len(lines)
+            while end > number + 1 and not lines[end - 1].strip():
+                end -= 1
+            return number + 1, end
+    return None
+
+
+def add_entry(text: str, section: str, script: Script) -> Outcome:
+    """Return a text with `name = target` in a section of entries, which is made if need be."""
+    lines = text.splitlines(keepends=True)
+    found = _section(lines, section)
+    if found is None:
+        if not lines:
+            return Edited(f"\n[{section}]\n{script.line}\n")
+        margin = _margin(lines)
+        return _inserted(lines, _last(lines), [f"{margin}[{section}]", f"{margin}{script.line}"])
+    start, end = found
+    refused = _present(lines[start:end], script)
+    if refused is not None:
+        return Edited(text) if isinstance(refused, Edited) else refused
+    margin = _margin(lines[start:end] or lines)
+    return _inserted(lines, end, [margin + script.line])
+
+
+def add_line(text: str, script: Script) -> Outcome:
+    """Return a text of entries, one per line, with one more at its end."""
+    lines = text.splitlines(keepends=True)
+    present = _present(lines, script)
+    if present is not None:
+        return Edited(text) if isinstance(present, Edited) else present
+    return _inserted(lines, _last(lines), [_margin(lines) + script.line])
+
+
+def add_to_cfg(text: str, script: Script) -> Outcome:
+    """Return a setup.cfg with a console script in its `[options.entry_points]`."""
+    lines = text.splitlines(keepends=True)
+    found = _section(lines, SECTION)
+    if found is None:
+        gap = "\n" if lines else ""
+        if lines and not lines[-1].endswith("\n"):
+            lines[-1] += "\n"
+        return Edited("".join(lines) + f"{gap}[{SECTION}]\n{KEY} =\n    {script.line}\n")
+    start, end = found
+    key = next((n for n in range(start, end) if re.match(rf"{KEY}\s*[=:]", lines[n])), None)
+    if key is None:
+        return _inserted(lines, end, [f"{KEY} =", f"    {script.line}"])
+    last = key + 1
+    body_end = key + 1
+    while last < end and (lines[last][:1].isspace() or not lines[last].strip()):
+        last += 1
+        if lines[last - 1].strip():
+            body_end = last
+    own = re.sub(rf"^{KEY}\s*[=:]", "", lines[key])
+    body = [own, *lines[key + 1 : body_end]]
+    present = _present(body, script)
+    if present is not None:
+        return Edited(text) if isinstance(present, Edited) else present
+    margin = _margin(lines[key + 1 : body_end]) or "    "
+    return _inserted(lines, body_end, [margin + script.line])
+
+
+def _present(lines: list[str], script: Script) -> Outcome | None:
+    """Return what is so if the command is there: nothing to do, or another target."""
+    for line in lines:
+        name, target = split(line.partition("#")[0])
+        if name == script.name and target:
+            if script.same(line):
+                return Edited("")
+            return taken(script, target, IN_SETUP_CFG)
+    return None
+
+
+def _margin(lines: list[str]) -> str:
+    """Return the white space before the last line that has any text."""
+    for line in reversed(lines):
+        if line.strip():
+            return line[: len(line) - len(line.lstrip())]
+    return ""
+
+
+def _last(lines: list[str]) -> int:
+    """Return where a line goes that is to follow the last one with text."""
+    end = len(lines)
+    while end and not lines[end - 1].strip():
+        end -= 1
+    return end
+
+
+def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
+    """Return the text with new lines before line `at`, with the line ends of the others."""
+    ending = "\r\n" if lines and lines[0].endswith("\r\n") else "\n"
+    before, after = lines[:at], lines[at:]
+    if before and not before[-1].endswith(("\n", "\r")):
+        before[-1] += ending
+    return Edited("".join((*before, *(line + ending for line in new), *after)))
+
+
+ENTRY_POINT_KEY = "console_scripts"
+IN_SETUP = "to `console_scripts` in the `entry_points` of setup()"
 
 #: A node and what is to stand in its place, or why nothing can.
 Change: TypeAlias = tuple[cst.CSTNode, cst.CSTNode] | str
 
 
-def add_script(text: str, script: Script) -> Outcome:
+def add_to_setup(text: str, script: Script) -> Outcome:
     """Return the file with a console script."""
     module = parsed(text)
     if module is None:
         return _refusal(script, "this is not valid Python")
     known = constants(module)
-    found = strings(module, known)
+    found = setup_strings(module, known)
     if any(script.same(one) for one in found):
         return Edited(text)
     calls = setup_calls(module)
@@ -45,7 +157,7 @@ def add_script(text: str, script: Script) -> Outcome:
 def _checked(text: str, script: Script, before: list[str]) -> Outcome:
     """Return the edited text if it is sound: valid, with the entry, nothing lost."""
     module = parsed(text)
-    after = strings(module, constants(module)) if module else []
+    after = setup_strings(module, constants(module)) if module else []
     if not any(script.same(line) for one in after for line in one.splitlines()):
         return _refusal(script, "the entry points are written in a way that idlc does not know")
     lost = set(_lines(before)) - set(_lines(after))
@@ -59,10 +171,10 @@ def _lines(texts: list[str]) -> list[str]:
 
 
 def _refusal(script: Script, why: str) -> Refused:
-    return Refused(why, f"'{script.line}',", WHERE)
+    return Refused(why, f"'{script.line}',", IN_SETUP)
 
 
-def strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
+def setup_strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
     """Return every string of a module that can be read off the source."""
     found: list[str] = []
 
@@ -120,7 +232,7 @@ def _with_argument(call: cst.Call, script: Script, module: cst.Module) -> cst.Ca
     """Return the call with `entry_points=` as a last argument, laid out like the others."""
     literals = [arg.value for arg in call.args]
     text = quoted(script.line, literals).value
-    key = quoted(KEY, literals).value
+    key = quoted(ENTRY_POINT_KEY, literals).value
     space = call.whitespace_before_args
     last = call.args[-1] if call.args else None
     end = last.whitespace_after_arg if last else cst.SimpleWhitespace("")
@@ -172,10 +284,10 @@ def _entry_points(
             return _in_dict(value, script, known, module)
         case cst.Call(func=cst.Name("dict")):
             for arg in value.args:
-                if arg.keyword and arg.keyword.value == KEY:
+                if arg.keyword and arg.keyword.value == ENTRY_POINT_KEY:
                     return _scripts(arg.value, script, known, module)
         case cst.SimpleString():
-            return _in_literal(value, lambda body: ini.add_entry(body, KEY, script))
+            return _in_literal(value, lambda body: add_entry(body, ENTRY_POINT_KEY, script))
     return "the entry points are not written out as a dictionary or a text"
 
 
@@ -183,13 +295,13 @@ def _in_dict(
     value: cst.Dict, script: Script, known: Mapping[str, str], module: cst.Module
 ) -> Change:
     for element in value.elements:
-        if isinstance(element, cst.DictElement) and string(element.key, known) == KEY:
+        if isinstance(element, cst.DictElement) and string(element.key, known) == ENTRY_POINT_KEY:
             return _scripts(element.value, script, known, module)
     if any(isinstance(element, cst.StarredDictElement) for element in value.elements):
         return "the entry points come from elsewhere (`**`)"
     keys = [e.key for e in value.elements if isinstance(e, cst.DictElement)]
     scripts = cst.List([cst.Element(quoted(script.line, keys))])
-    return value, appended(value, cst.DictElement(quoted(KEY, keys), scripts))
+    return value, appended(value, cst.DictElement(quoted(ENTRY_POINT_KEY, keys), scripts))
 
 
 def _scripts(
@@ -205,7 +317,7 @@ def _scripts(
         case cst.List() | cst.Tuple():
             return _in_list(value, script, known)
         case cst.SimpleString() if len(value.quote) == 3:
-            return _in_literal(value, lambda body: ini.add_line(body, script))
+            return _in_literal(value, lambda body: add_line(body, script))
         case cst.SimpleString():
             both = cst.List([cst.Element(value)])
             new = _in_list(both, script, known)
@@ -222,11 +334,11 @@ def _in_list(value: cst.List | cst.Tuple, script: Script, known: Mapping[str, st
     for one in values:
         name, target = split(string(one, known) or "")
         if name == script.name:
-            return taken(script, target, WHERE).why
+            return taken(script, target, IN_SETUP).why
     return value, appended(value, cst.Element(quoted(script.line, values)))
 
 
-def _in_literal(value: cst.SimpleString, edit: ini.Edit) -> Change:
+def _in_literal(value: cst.SimpleString, edit: Edit) -> Change:
     """Find the change to a text of several lines."""
     if len(value.quote) != 3 or "\\" in value.value or "b" in value.prefix.lower():
         return "the entry points are a text with escapes or on one line"
@@ -235,3 +347,90 @@ def _in_literal(value: cst.SimpleString, edit: ini.Edit) -> Change:
     if isinstance(new, Refused):
         return new.why
     return value, value.with_changes(value=value.value[:start] + new.text + value.value[-3:])
+
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+PYPROJECT = "pyproject.toml"
+SETUP_CFG = "setup.cfg"
+SETUP_PY = "setup.py"
+TABLE = "project.scripts"
+
+
+def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, Outcome]:
+    """Return which of a package's files to edit, and how; `files` are those that exist.
+
+    The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
+    """
+    project = _table(files.get(PYPROJECT, ""), "project")
+    if isinstance(project, Refused):
+        return PYPROJECT, project._replace(line=_line(script))
+    dynamic = project.get("dynamic", ())
+    if project and not {"scripts", "entry-points"}.intersection(dynamic):
+        return PYPROJECT, _in_pyproject(files[PYPROJECT], project, script)
+    if SETUP_CFG in files and _declares_scripts(files[SETUP_CFG]):
+        return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
+    if SETUP_PY in files:
+        return SETUP_PY, add_to_setup(files[SETUP_PY], script)
+    if SETUP_CFG in files:
+        return SETUP_CFG, add_to_cfg(files[SETUP_CFG], script)
+    why = "there is no setup.py, and no setup.cfg or pyproject.toml that describes a package"
+    return SETUP_PY, Refused(why, f"'{script.line}',", "to the package's `console_scripts`")
+
+
+def _declares_scripts(text: str) -> bool:
+    return re.search(rf"(?m)^\s*\[\s*{re.escape(SECTION)}\s*\]", text) is not None
+
+
+def _table(text: str, name: str) -> dict[str, Any] | Refused:
+    try:
+        found = tomllib.loads(text).get(name, {})
+    except tomllib.TOMLDecodeError:
+        return Refused("this is not valid TOML", "", f"to [{TABLE}]")
+    return found if isinstance(found, dict) else {}
+
+
+def _line(script: Script) -> str:
+    key = script.name if re.fullmatch(r"[A-Za-z0-9_-]+", script.name) else f'"{script.name}"'
+    return f'{key} = "{script.target}"'
+
+
+def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
+    """Return a pyproject.toml with a line more in `[project.scripts]`, which is made if need be."""
+    where = f"to [{TABLE}]"
+    scripts = project.get("scripts", {})
+    if script.name in scripts:
+        if script.same(f"{script.name} = {scripts[script.name]}"):
+            return Edited(text)
+        refused = taken(script, str(scripts[script.name]), where)
+        return refused._replace(line=_line(script))
+    ending = "\r\n" if "\r\n" in text else "\n"
+    lines = text.splitlines(keepends=True)
+    header = re.compile(r"^\s*\[\s*project\s*\.\s*scripts\s*\]\s*(#.*)?$")
+    at = next((n for n, line in enumerate(lines) if header.match(line)), None)
+    if at is None and "scripts" in project:
+        return Refused(
+            "the scripts are written in a way that idlc does not edit", _line(script), where
+        )
+    if lines and not lines[-1].endswith("\n"):
+        lines[-1] += ending
+    if at is None:
+        new = [*lines, ending, f"[{TABLE}]{ending}", _line(script) + ending]
+    else:
+        end = next((n for n in range(at + 1, len(lines)) if lines[n].lstrip()[:1] == "["), None)
+        end = len(lines) if end is None else end
+        while not lines[end - 1].strip():
+            end -= 1
+        new = [*lines[:end], _line(script) + ending, *lines[end:]]
+    return _checked_scripts("".join(new), project, script, where)
+
+
+def _checked_scripts(text: str, before: dict[str, Any], script: Script, where: str) -> Outcome:
+    """Return the edited text if it says what it said, and the script."""
+    wanted = {**before, "scripts": {**before.get("scripts", {}), script.name: script.target}}
+    if _table(text, "project") == wanted:
+        return Edited(text)
+    return Refused("the scripts are written in a way that idlc does not edit", _line(script), where)

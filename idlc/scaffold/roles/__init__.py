@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from idlc.scaffold.roles.action_client import ACTION_CLIENT
-from idlc.scaffold.roles.action_server import ACTION_SERVER
-from idlc.scaffold.roles.client import CLIENT
-from idlc.scaffold.roles.publisher import PUBLISHER
+from idlc.scaffold.roles.actions import ACTION_CLIENT, ACTION_SERVER
 from idlc.scaffold.roles.role import Role
-from idlc.scaffold.roles.service import SERVICE
-from idlc.scaffold.roles.subscriber import SUBSCRIBER
-from idlc.scaffold.roles.timer import TIMER
+from idlc.scaffold.roles.services import CLIENT, SERVICE
+from idlc.scaffold.roles.topics import PUBLISHER, SUBSCRIBER, TIMER
 
 ROLES: tuple[Role, ...] = (
     PUBLISHER,

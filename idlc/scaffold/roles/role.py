@@ -14,9 +14,42 @@ from typing import NamedTuple, TypedDict
 import msgspec
 
 from idlc.model import ir
-from idlc.scaffold import log_lines, qos
-from idlc.scaffold.line_breaks import call
+from idlc.scaffold import layout
+from idlc.scaffold.layout import call
 from idlc.scaffold.samples import Page
+
+
+class Qos(NamedTuple):
+    """A preset: its name on the command line, and what stands for it in a module.
+
+    `imports` come from rclpy.qos; `constant` is the line that defines `source`, if none does.
+    """
+
+    name: str
+    source: str
+    imports: tuple[str, ...] = ()
+    constant: str = ""
+
+
+DEFAULT_QOS = Qos("default", "10")
+SENSOR_DATA = Qos("sensor_data", "qos_profile_sensor_data", ("qos_profile_sensor_data",))
+LATCHED = Qos(
+    "latched",
+    "LATCHED",
+    ("DurabilityPolicy", "QoSProfile"),
+    "LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)",
+)
+QOS_PRESETS = (DEFAULT_QOS, SENSOR_DATA, LATCHED)
+QOS_NAMES = tuple(preset.name for preset in QOS_PRESETS)
+
+
+def qos_preset(name: str) -> Qos:
+    """Return the preset of a name; raise ValueError if there is none."""
+    for one in QOS_PRESETS:
+        if one.name == name:
+            return one
+    raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
+
 
 #: What a module imports: the names from each module.
 Imports = Mapping[str, tuple[str, ...]]
@@ -95,7 +128,7 @@ class Endpoint(NamedTuple):
     type: str
     topic: str
     period: float | None = None
-    qos: qos.Qos = qos.DEFAULT
+    qos: Qos = DEFAULT_QOS
 
     @property
     def word(self) -> str:
@@ -175,7 +208,7 @@ class Context(NamedTuple):
 
     def log(self, variable: str, message: ir.Message) -> tuple[str, ...]:
         """Return the lines that log a message, its short fields one by one."""
-        return log_lines.lines(_title(self.endpoint, self.word), variable, message)
+        return layout.log_lines(_title(self.endpoint, self.word), variable, message)
 
     def undo(self, step: str, *words: str) -> tuple[str, ...]:
         """Return the lines by which a lifecycle node remembers how to undo the line before."""
@@ -207,7 +240,7 @@ class TestContext(NamedTuple):
 
     def logged(self, variable: str, message: ir.Message) -> str:
         """Return a literal of how the line begins in which the node logs a message."""
-        return repr(log_lines.head(_title(self.endpoint, self.word), variable, message))
+        return repr(layout.log_head(_title(self.endpoint, self.word), variable, message))
 
     @property
     def patience(self) -> float:
@@ -228,3 +261,36 @@ def creation(function: str, words: list[str]) -> str:
 def _title(endpoint: Endpoint, word: str) -> str:
     """Return how text calls an endpoint."""
     return endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word
+
+
+_TOPIC = re.compile(r"(~?/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+def typed(text: str, shape: str = "TYPE:NAME") -> Value:
+    """Return the interface and the name that `TYPE:NAME` means."""
+    type_, colon, topic = text.partition(":")
+    if not colon or not type_ or not topic:
+        raise ValueError(f"`{text}` is not {shape}, such as `std_msgs/String:chatter`")
+    if not _TOPIC.fullmatch(topic) or "__" in topic:
+        raise ValueError(
+            f"`{topic}` cannot be the name of a topic, service or action: use letters, digits "
+            "and single underscores, parts separated by `/`"
+        )
+    return Value(type_, topic)
+
+
+def positive(text: str, what: str, unit: str) -> float:
+    """Return the number that a text is, within reasonable limits."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-6 <= value <= 1e6:
+        raise ValueError(f"{what} must be a number of {unit} above 0, not `{text}`")
+    return value
+
+
+def interval(seconds: float) -> str:
+    """Return a period in seconds as source."""
+    text = repr(round(seconds, 6))
+    return text if abs(float(text) - seconds) < seconds * 1e-9 else f"1.0 / {1.0 / seconds:.6g}"

@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from idlc.disk.machine.distribution import distribution
+from idlc.project.prefixes import distribution
 from tests.support.installed import generate
 from tests.support.paths import EVERY_KIND, GOLDEN, PROGRAMS
 

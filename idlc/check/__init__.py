@@ -1,0 +1,1 @@
+"""Rules: of interface files, and of the packages that they are in."""

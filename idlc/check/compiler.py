@@ -1,0 +1,212 @@
+"""The compiler's passes in order, from texts to a checked model.
+
+The passes are imported where they are used, so that a run with nothing to do costs little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.diagnostics.source import Source
+from idlc.model import derive, ir
+from idlc.project import inputs
+from idlc.project.library import Library
+from idlc.project.scope import Scope
+
+if TYPE_CHECKING:
+    from idlc.check.registry import Memory
+    from idlc.model import link
+    from idlc.model.link import Model, Pool
+
+
+class InternalError(Exception):
+    """Something failed that is idlc's own fault: in which stage, and at what."""
+
+    def __init__(self, stage: str, subject: str) -> None:
+        super().__init__(stage, subject)
+        self.stage = stage
+        self.subject = subject
+
+
+@contextmanager
+def stage(name: str, subject: str) -> Iterator[None]:
+    """Turn whatever goes wrong within into an InternalError that says where it did."""
+    try:
+        yield
+    except InternalError:
+        raise
+    except Exception as error:
+        raise InternalError(name, subject) from error
+
+
+class Compiler:
+    """Compiles the packages of one run; what several of them use is read and lowered once.
+
+    Runs that share memories and a library do only what changed from one to the next: `memory`
+    is of what was lowered, `checked` of what rules found.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        memory: link.Memory | None = None,
+        checked: Memory | None = None,
+    ) -> None:
+        self.library = library
+        self._memory = memory
+        self._checked = checked
+
+    @cached_property
+    def _pool(self) -> Pool:
+        from idlc.model.link import Pool
+
+        return Pool(self.library, self._memory)
+
+    def add(
+        self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
+    ) -> tuple[ir.Interface, ...]:
+        """Return what texts define; from now on, references to their names mean these."""
+        from idlc.language.parse import parse_any
+        from idlc.model.lower import lower
+
+        own = []
+        for name, source in sources:
+            lowered = self._pool.remembered(name, source)
+            if lowered is None:
+                with stage("parse", source.path):
+                    tree = parse_any(source)
+                with stage("lower", source.path):
+                    found = Report()
+                    interface = lower(tree, name, found, self.library.distro)
+                    lowered = self._pool.learn(interface, found)
+            own.append(lowered.interface)
+            report.extend(lowered.problems)
+        return tuple(own)
+
+    def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
+        """Return the linked and checked model of a package; every problem is reported."""
+        from idlc.check.registry import check
+        from idlc.model.link import link as link_packages
+
+        with stage("link", package):
+            model = link_packages(package, own, self.library, report, self._pool)
+        with stage("check", package):
+            check(model, report, self._checked)
+        return model
+
+    def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
+        """Return interfaces and all that they refer to, but for what is nowhere to be found."""
+        found: dict[ir.TypeName, ir.Interface] = {}
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
+            entry = None if name in found else self._pool.get(name)
+            if entry is not None:
+                found[name] = entry.interface
+                waiting += (target for _, target in entry.references)
+        return found
+
+    def all(
+        self, packages: Iterable[inputs.Inputs], report: Report
+    ) -> Iterator[tuple[inputs.Inputs, Model]]:
+        """Yield the model of each package; all of them see each other."""
+        from idlc.model.link import check_packages
+
+        added = [(one, self.add(sources_of(one, report), report)) for one in packages]
+        for given, own in added:
+            yield given, self.model(given.package, own, report)
+        check_packages(self._pool, report)
+
+
+def compile_package(
+    package: str,
+    sources: Iterable[tuple[ir.TypeName, Source]],
+    library: Library,
+    report: Report,
+) -> Model:
+    """Return the linked and checked model of one package; every problem is reported."""
+    compiler = Compiler(library)
+    return compiler.model(package, compiler.add(sources, report), report)
+
+
+def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeName, Source]]:
+    """Yield the texts of a package's files; those that are not text are reported."""
+    for one in given.files:
+        source = one.source(report)
+        if source is not None:
+            yield ir.TypeName(given.package, one.file.kind, one.file.name), source
+
+
+def library_for(
+    packages: Sequence[inputs.Inputs],
+    scope: Scope,
+    report: Report,
+    texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+) -> Library:
+    """Return the library from which packages that are compiled take what they refer to."""
+    own = {given.package: given.folders for given in packages}
+    return Library(
+        scope.include,
+        report,
+        own=own,
+        exclude=scope.exclude,
+        distro=scope.distro,
+        texts=texts,
+        unsaved=scope.unsaved,
+    )
+
+
+def models_of(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> Iterator[tuple[inputs.Inputs, Model]]:
+    """Yield each package with its model; all problems are reported."""
+    yield from Compiler(library_for(packages, scope, report)).all(packages, report)
+
+
+def sound_models(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> list[tuple[Model, list[str]]]:
+    """Return each package's model and the names of what its files define, derived ones included.
+
+    Interfaces with errors, and those that hold them, are left out, which is noted.
+    """
+    models = list(models_of(packages, scope, report))
+    found, left_out = [], []
+    for (given, _), sound in zip(models, without_errors(models, report), strict=True):
+        mine = sound.only(given.names).own
+        found.append((sound, [name for one in mine for name in derived_names(one)]))
+        left_out += sorted(given.names - {one.name for one in mine})
+    if left_out:
+        names = first_few((f"`{name}`" for name in left_out), 5)
+        report.notes.append(f"left out, because of errors: {names}")
+    return found
+
+
+def without_errors(
+    models: Iterable[tuple[inputs.Inputs, Model]],
+    report: Report,
+    also: Mapping[str, str] = MappingProxyType({}),
+) -> Iterator[Model]:
+    """Yield models without the interfaces that a report has errors of, and those that hold them.
+
+    An error in a file counts for the file that `also` has for it, too.
+    """
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    broken = {one.where[0] for one in errors}
+    broken |= {also[path] for path in broken & also.keys()}
+    is_all = any(one.code == codes.INVALID_PACKAGE_NAME.id for one in errors)
+    for _, model in models:
+        sound = model.sound(broken) if errors else model
+        yield sound.only(()) if is_all or model.package in broken else sound
+
+
+def derived_names(interface: ir.Interface) -> list[str]:
+    """Return the names of an interface and of all structures derived from it, sorted."""
+    parts = (*derive.messages(interface), *derive.pseudo_structures(interface))
+    return sorted({str(part.name) for part in parts})

@@ -1,0 +1,1 @@
+"""Rules on what surrounds interfaces: package.xml, setup.py, CMakeLists.txt."""

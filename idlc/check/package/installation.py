@@ -1,0 +1,385 @@
+"""Rules on setup.py and its neighbours: what colcon builds can be found and run afterwards."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Report, enumerated, first_few
+from idlc.diagnostics.source import Source, Span
+from idlc.model.link import Model
+from idlc.project.package_xml import Facts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from idlc.check.package.python_packages import Layout
+    from idlc.check.package.setup_py import DataFiles, Setup
+
+_INDEX = "share/ament_index/resource_index"
+#: What keeps interfaces and their classes from being installed.
+CODES = (
+    codes.INTERFACES_NOT_INSTALLED,
+    codes.NO_LIBRARY_INSTALLED,
+    codes.CLASSES_NOT_INSTALLED,
+)
+
+
+@lru_cache(maxsize=16)
+def _read(source: Source) -> Setup:
+    from idlc.check.package.setup_py import Setup  # what has no setup.py needs no ast
+
+    return Setup(source)
+
+
+def _built_by_setup(facts: Facts) -> Setup | None:
+    """Return what setup.py says, if it builds the package."""
+    is_python = facts.setup_py is not None and facts.build_type == "ament_python"
+    return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
+
+
+def wiring(
+    setup: Source,
+    package: str,
+    keys: Mapping[str, str],
+    folders: Mapping[str, bool],
+    others: tuple[Source | None, Source | None] | None = None,
+) -> Report:
+    """Return what keeps a setup.py from installing interfaces and their classes.
+
+    `keys` are the interfaces as `kind/Name.kind` with their files, `folders` those of the package
+    by dotted name, and whether each has an `__init__.py`. `others` are setup.cfg and
+    pyproject.toml; without these, only what setup() is given is judged.
+    """
+    from idlc.check.package.python_packages import layout
+    from idlc.check.package.setup_edits import unusable_entry
+
+    report = Report()
+    read = _read(setup)
+    report.extend(_missing_interfaces(read, package, keys))
+    report.extend(unusable_entry(read, package))
+    view = layout(read, *(others or (None, None)), folders)
+    if view and (others or "packages" in read.arguments):
+        report.extend(_missing_packages(read, view, package, keys, folders))
+    return report
+
+
+def _layout(facts: Facts, setup: Setup) -> Layout | None:
+    from idlc.check.package.python_packages import layout
+
+    return layout(setup, facts.setup_cfg, facts.pyproject, facts.folders)
+
+
+def installed(facts: Facts, model: Model, report: Report) -> None:
+    """setup.py installs interfaces, their classes, and what C++ tools load."""
+    setup = _built_by_setup(facts)
+    if setup is not None and model.own:
+        names = sorted(f"{one.name.kind}/{one.name.name}.{one.name.kind}" for one in model.own)
+        keys = {name: facts.files.get(name, name) for name in names}
+        others = (facts.setup_cfg, facts.pyproject)
+        report.extend(wiring(setup.source, facts.name, keys, facts.folders, others))
+    elif setup is not None and (view := _layout(facts, setup)):
+        report.extend(_absent_folders(setup, view, facts.name, (), facts.folders))
+
+
+def _missing_interfaces(
+    setup: Setup, package: str, keys: Mapping[str, str]
+) -> Iterator[Diagnostic]:
+    """Yield the problem with interface files that `ros2 interface show` will not find."""
+    entries = setup.data_files
+    if entries is None:
+        return
+    share = f"share/{package}"
+    missing = [kind for kind in _kinds(keys) if _lacks(entries, f"{share}/{kind}", keys, kind)]
+    index = _lacks(entries, f"{_INDEX}/rosidl_interfaces", ())
+    if not missing and not index:
+        return
+    what = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
+    what += ["the index entry of the interfaces"] if index else []
+    patterns = sorted({_pattern(key, file) for key, file in keys.items()})
+    lines = [
+        f"('{share}/{kind}', glob('{one}'))"
+        for kind in missing
+        for one in patterns
+        if one.endswith(f".{kind}")
+    ]
+    if index:
+        lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
+    problem = codes.INTERFACES_NOT_INSTALLED.at(
+        setup.place("data_files"),
+        f"{enumerated(what)} {'are' if missing else 'is'} not among the `data_files`",
+    )
+    yield _with_data_files(problem, setup, lines, uses_glob=True)
+
+
+def _pattern(key: str, file: str) -> str:
+    """Return the pattern for all interface files of a kind in the folder of one."""
+    folder, kind = file.rpartition("/")[0], key.split("/")[0]
+    if not re.fullmatch(r"[\w./ -]+", folder):  # it becomes part of a program
+        folder = kind
+    return f"{folder}/*.{kind}"
+
+
+def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
+    """Return whether entries are known not to install files into a folder of the prefix."""
+    there = [one for one in entries if one.folder is None or one.folder.rstrip("/") == folder]
+    patterns = [pattern for one in there for pattern in _files(one)]
+    wanted = [key.rpartition("/")[2] for key in keys if key.startswith(f"{kind}/")] or [""]
+    names = [pattern.rpartition("/")[2] for pattern in patterns]
+    # a file is looked for by name only, where patterns for all of its kind are usual
+    return not all(any(not one or fnmatchcase(one, name) for name in names) for one in wanted)
+
+
+def _files(entry: DataFiles) -> tuple[str, ...]:
+    return ("*",) if entry.files is None else entry.files  # what cannot be seen may be anything
+
+
+def _with_data_files(
+    problem: Diagnostic, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
+) -> Diagnostic:
+    """Return a problem with the hint and the edits that add entries to `data_files`."""
+    from idlc.check.package.setup_edits import appended, argument, imported
+
+    glob, imports = imported(setup, "glob", "glob") if uses_glob else ("glob", ())
+    new = [line.replace("glob(", f"{glob}(") for line in lines]
+    listed = setup.list_of("data_files")
+    edits: tuple[Edit, ...] = ()
+    if listed is not None:
+        edits = appended(setup.source, listed, new)
+    elif "data_files" not in setup.arguments and uses_glob:  # one problem adds the argument
+        edits = argument(setup, f"data_files=[{', '.join(new)}]")
+    text = enumerated([f"`{line}`" for line in new])
+    also = ", with `from glob import glob`" if imports else ""
+    hint = f"add {text}{also}" + ("; --fix does" if edits else "")
+    return msgspec.structs.replace(problem, hint=hint, edits=(*imports, *edits) if edits else ())
+
+
+def _missing_packages(
+    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
+) -> Iterator[Diagnostic]:
+    """Yield the problem with generated packages that setuptools leaves out."""
+    if view.installed is None or any(one.startswith(f"{package}.") for one in view.roots):
+        return
+    support = f"{package}._idlc"
+    wanted = [package, *(f"{package}.{kind}" for kind in _kinds(keys)), support]
+    wanted += sorted(name for name in view.packages(folders) if name.startswith(f"{support}."))
+    missing = [one for one in wanted if not view.installed.covers(one, view.folder(one))]
+    if not missing:
+        yield from _absent_folders(setup, view, package, keys, folders)
+        return
+    listed = enumerated([f"`{name}`" for name in missing])
+    what = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
+    if view.installed.is_nothing:
+        what = "nothing names the `packages`, and setuptools does not choose among several folders"
+    problem = codes.CLASSES_NOT_INSTALLED.at(
+        view.installed.place, f"{what}: the classes of the interfaces are not installed"
+    )
+    yield _with_packages(problem, setup, view, package, folders)
+
+
+def _absent_folders(
+    setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
+) -> Iterator[Diagnostic]:
+    """Yield the problem with packages that are listed and have no folder."""
+    from idlc.check.package.setup_py import span_of
+
+    if not setup.whole:
+        return
+    support = f"{package}._idlc"
+    kinds = _kinds(keys)
+    made = {f"{package}.{kind}" for kind in kinds} | ({package} if kinds else set())
+    there = view.packages(folders)
+    for item in setup.items(setup.arguments.get("packages")):
+        name = setup.text(item.node) if item.is_element else None
+        if not name or name in made or name.replace("/", ".") in there:
+            continue
+        if kinds and support not in there and f"{name}.".startswith(f"{support}."):
+            continue  # the build makes it
+        problem = codes.CLASSES_NOT_INSTALLED.at(
+            span_of(setup.source, item.node),
+            f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`",
+        )
+        yield _with_packages(problem, setup, view, package, folders)
+
+
+def _with_packages(
+    problem: Diagnostic, setup: Setup, view: Layout, package: str, folders: Mapping[str, bool]
+) -> Diagnostic:
+    """Return a problem with the edits after which `packages` is worked out by setuptools."""
+    from idlc.check.package.setup_edits import appended, argument, imported, quote_of
+    from idlc.check.package.setup_py import range_of
+
+    root = view.roots.get("", "")
+    where = f"'{root}', " if root not in ("", ".") else ""
+    if problem.span and problem.span.source is not setup.source:
+        return msgspec.structs.replace(problem, hint=_elsewhere(problem.span, view, root))
+    find, imports = imported(setup, "setuptools", "find_packages")
+    call = f"{find}({where}exclude=['test'])"
+    hint = f"write `packages={call}`"
+    listed = setup.list_of("packages")
+    target = setup.value(setup.arguments.get("packages"))
+    items = setup.items(setup.arguments.get("packages"))
+    names = [setup.text(item.node) for item in items if item.is_element]
+    there = view.packages(folders)
+    tops = {name for name, has_init in there.items() if has_init and "." not in name}
+    known = len(names) == len(items) and all(
+        name and name.partition(".")[0] == package for name in names
+    )
+    edits: tuple[Edit, ...] = ()
+    if "packages" not in setup.arguments:
+        edits = argument(setup, f"packages={call}")
+    elif view.roots.keys() <= {""} and target is not None:
+        if (known or listed is None) and tops <= {package, "test"}:
+            start, end = range_of(setup.source, target)
+            text = call.replace("'", quote_of(setup.source, target))
+            edits = (Edit(Span(setup.source, start, end), text),)
+        elif listed is not None:
+            own = f"*{find}({where}include=['{package}', '{package}.*'])"
+            edits = appended(setup.source, listed, [own])
+            hint = f"add `{own}` to `packages`"
+    also = ", with `from setuptools import find_packages`" if imports else ""
+    return msgspec.structs.replace(
+        problem,
+        hint=hint + also + ("; --fix does" if edits else ""),
+        edits=(*imports, *edits) if edits else (),
+    )
+
+
+def _elsewhere(place: Span, view: Layout, root: str) -> str:
+    """Return how setup.cfg or pyproject.toml names the packages that setuptools is to find."""
+    if view.installed and view.installed.finders:
+        return "make its `where`, `include` and `exclude` match these packages"
+    if place.source.path.endswith(".toml"):
+        where = f'["{root or "."}"]'
+        return f"write `packages.find = {{ where = {where} }}` in [tool.setuptools]"
+    also = f", and `where = {root}` in [options.packages.find]" if root else ""
+    return f"write `packages = find:`{also}"
+
+
+def _kinds(keys: Iterable[str]) -> list[str]:
+    return sorted({key.split("/")[0] for key in keys})
+
+
+def resource_marker(facts: Facts, _: Model, report: Report) -> None:
+    """The package's marker is there and installed, without which `ros2 run` does not find it."""
+    setup = _built_by_setup(facts)
+    if setup is None:
+        return
+    if not facts.marker:
+        report.add(
+            codes.NO_RESOURCE_MARKER.at(
+                facts.place,
+                f"`resource/{facts.name}` is missing, the file by which ROS 2 finds the package",
+                hint=f"create it: `mkdir -p resource && touch resource/{facts.name}`",
+            )
+        )
+    elif setup.data_files is not None and _lacks(setup.data_files, f"{_INDEX}/packages", ()):
+        problem = codes.NO_RESOURCE_MARKER.at(
+            setup.place("data_files"), f"`resource/{facts.name}` is not among the `data_files`"
+        )
+        line = f"('{_INDEX}/packages', ['resource/{facts.name}'])"
+        report.add(_with_data_files(problem, setup, [line]))
+
+
+def entry_points(facts: Facts, _: Model, report: Report) -> None:
+    """Each console script names a function that is there."""
+    if facts.setup_py is None:
+        return
+    from idlc.check.package.setup_py import span_of
+
+    setup = _read(facts.setup_py)
+    view = _layout(facts, setup)
+    elsewhere = view is None or bool(view.roots) or "py_modules" in setup.arguments
+    for text, node in setup.scripts:
+        problem = _problem(text, facts, elsewhere=elsewhere)
+        if problem:
+            place = span_of(facts.setup_py, node)
+            report.add(codes.BAD_ENTRY_POINT.at(place, problem[0], hint=problem[1]))
+
+
+def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
+    """Return what is wrong with an entry point, and a hint.
+
+    `elsewhere` is whether modules may lie where they are not looked for.
+    """
+    from idlc.check.package.setup_py import defines
+
+    script, equals, target = text.partition("=")
+    module, colon, function = (part.strip() for part in target.partition(":"))
+    if not equals or not colon or not function:
+        what = f"`{text}` is not an entry point"
+        return what, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
+    if elsewhere:
+        return None
+    if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
+        return (
+            f"there is no Python package `{module.partition('.')[0]}` here",
+            f"it is `{facts.name}` by the package.xml",
+        )
+    source = facts.modules.get(module) or facts.modules.get(f"{module}.__init__")
+    if source is None:
+        return f"there is no module `{module}`", "name the file that holds the function"
+    if not defines(source, function.partition(".")[0]):
+        return f"`{source.path}` has no `{function}`", f"define it: `def {function}() -> None:`"
+    return None
+
+
+def names(facts: Facts, _: Model, report: Report) -> None:
+    """setup.py and setup.cfg call the package what package.xml calls it."""
+    setup = _read(facts.setup_py) if facts.setup_py else None
+    found = setup.text(setup.arguments.get("name")) if setup else None
+    if setup and found is not None and found.replace("-", "_") != facts.name:
+        report.add(
+            codes.NAME_MISMATCH.at(
+                setup.place("name"),
+                f"setup.py calls the package `{found}`, package.xml `{facts.name}`",
+                hint="give both the same name",
+            )
+        )
+    if facts.setup_cfg is None:
+        return
+    for line, start in zip(facts.setup_cfg.lines, facts.setup_cfg.line_starts, strict=False):
+        key, equals, value = line.partition("=")
+        folder = value.strip()
+        script = key.strip().replace("-", "_") in ("script_dir", "install_scripts")
+        if equals and script and "/lib/" in folder and not folder.endswith(f"/lib/{facts.name}"):
+            at = start + line.index(folder)
+            report.add(
+                codes.NAME_MISMATCH.at(
+                    Span(facts.setup_cfg, at, at + len(folder)),
+                    f"`ros2 run` looks for scripts in `lib/{facts.name}`",
+                    hint=f"write `$base/lib/{facts.name}`",
+                )
+            )
+
+
+def current_output(facts: Facts, _: Model, report: Report) -> None:
+    """Code that idlc generated here is made of the interfaces as they are now."""
+    for output in facts.outputs:
+        if output.package != facts.name or not facts.whole:
+            continue
+        changed = [
+            f"`{name}` {_changed(output.inputs.get(name), facts.inputs.get(name))}"
+            for name in sorted(output.inputs.keys() | facts.inputs.keys())
+            if output.inputs.get(name) != facts.inputs.get(name)
+        ]
+        if changed:
+            folder = facts.manifest.path.rpartition("/")[0] or "."
+            words = ("gen", folder, "-o", output.path.rpartition("/")[0])
+            report.add(
+                codes.STALE_GENERATED_CODE.of(
+                    output.path,
+                    f"the generated code is out of date: {first_few(changed, 3)}",
+                    hint=f"run `idlc {shlex.join(words)}`",
+                )
+            )
+
+
+def _changed(before: str | None, now: str | None) -> str:
+    return "was added" if before is None else "was removed" if now is None else "changed"

@@ -1,0 +1,201 @@
+"""Rules on package.xml: what the interfaces and nodes of a package need is declared in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import msgspec
+
+from idlc.check.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Label, Report
+from idlc.diagnostics.source import Span
+from idlc.diagnostics.text import closest_package
+from idlc.model import catalog, ir
+from idlc.model.link import Model
+from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
+
+_NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
+#: What rosidl adds by itself.
+_IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
+_GROUP = "rosidl_interface_packages"
+#: The packages that generate interfaces, and those that generated code needs, usual first.
+_GENERATORS = ("rosidl_default_generators", "rosidl_core_generators")
+_RUNTIME = ("rosidl_default_runtime", "rosidl_core_runtime", *_GENERATORS)
+
+
+def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
+    """Packages whose messages are used are declared."""
+    seen = _may_use(facts)
+    for package, span in used_packages(model).items():
+        if package not in seen:
+            found = codes.MISSING_DEPENDENCY.at(
+                span,
+                f"`{facts.manifest.path}` does not declare `{package}`",
+                hint=f"add `<depend>{package}</depend>`",
+            )
+            report.add(_or_meant(found, facts, model, package))
+
+
+def used_packages(model: Model) -> dict[str, Span]:
+    """Return the known packages whose messages are used, and where each is used first."""
+    known = _known(model)
+    found: dict[str, Span] = {}
+    for message in sections(model):
+        for field, target in message.holders:
+            if field.type_span is not None and target.package in known:
+                found.setdefault(target.package, field.type_span)
+    return found
+
+
+def _known(model: Model) -> set[str]:
+    """Return the packages of which interfaces are known."""
+    return {name.package for name in model.interfaces} | {*catalog.packages(model.distro)}
+
+
+def _or_meant(found: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
+    """Return a problem with the edit that declares a package, or with the misspelt declaration."""
+    known = _known(model) | facts.known
+    for name, statement in facts.declared(*_NEEDED).items():
+        if name not in known and closest_package(name, [package]):
+            line = f"<{statement.tag}>{package}</{statement.tag}>"
+            hint = f"write `{line}` in place of `{name}`, which is not known here"
+            label = Label(statement.span, "misspelt?")
+            return msgspec.structs.replace(found, hint=hint, labels=(label,))
+    return _with_lines(found, facts, [f"<depend>{package}</depend>"])
+
+
+def _may_use(facts: Facts) -> set[str]:
+    """Return the packages whose messages a package may use: its own, and those that it declares."""
+    # what CMake does not install is there for the package's own tests
+    declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
+    return {facts.name, *declared}
+
+
+def dependency(facts: Facts, package: str) -> Edit | None:
+    """Return the edit that declares a package; `None` if it is declared, or cannot be."""
+    if package in _may_use(facts):
+        return None
+    return _addition(facts, f"<depend>{package}</depend>")
+
+
+def declaration(facts: Facts, package: str) -> Span | None:
+    """Return where a package is declared, `None` if it is not."""
+    found = facts.declared(*_NEEDED, "test_depend").get(package)
+    return found.span if found else None
+
+
+def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
+    """A package of interfaces alone declares no interfaces that it does not use."""
+    if facts.modules or facts.native or not facts.whole:
+        return
+    used = {name.package for name in model.interfaces} | _IMPLICIT
+    for package, statement in facts.declared("depend", "build_depend").items():
+        if package not in used and catalog.is_standard(package) and not _has_gaps(model):
+            report.add(
+                codes.UNUSED_DEPENDENCY.at(
+                    statement.span,
+                    f"no interface of this package uses `{package}`",
+                    hint="remove the line",
+                )
+            )
+
+
+def _has_gaps(model: Model) -> bool:
+    """Return whether some field is of a type that is not known, and may be of any package."""
+    elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
+    return any(
+        element.target not in model.interfaces
+        if isinstance(element, ir.Ref)
+        else isinstance(element, ir.Unknown)
+        for element in elements
+    )
+
+
+def interface_group(facts: Facts, model: Model, report: Report) -> None:
+    """A package whose interfaces CMake generates is a member of the group of such packages."""
+    if not (facts.generates and model.own):
+        return
+    if _GROUP not in facts.declared("member_of_group"):
+        line = f"<member_of_group>{_GROUP}</member_of_group>"
+        found = codes.NOT_IN_INTERFACE_GROUP.at(
+            facts.place,
+            "CMake stops at a package with interfaces that is in no interface group",
+            hint=f"add `{line}`",
+        )
+        report.add(_with_lines(found, facts, [line]))
+
+
+def generators(facts: Facts, model: Model, report: Report) -> None:
+    """A package whose interfaces CMake generates declares the generators and their runtime."""
+    if not (facts.generates and model.own):
+        return
+    missing = [
+        (packages[0], f"<{tag}>{packages[0]}</{tag}>")
+        for packages, tag, others in (
+            (_GENERATORS, "buildtool_depend", ("buildtool_depend", "build_depend", "depend")),
+            (_RUNTIME, "exec_depend", ("exec_depend", "depend")),
+        )
+        if facts.declared(*others).keys().isdisjoint(packages)
+    ]
+    if missing:
+        needed = " and ".join(f"`{package}`" for package, _ in missing)
+        lines = " and ".join(f"`{line}`" for _, line in missing)
+        found = codes.NO_INTERFACE_GENERATORS.at(
+            facts.place, f"a package with interfaces needs {needed}", hint=f"add {lines}"
+        )
+        report.add(_with_lines(found, facts, [line for _, line in missing]))
+
+
+def declared_imports(facts: Facts, model: Model, report: Report) -> None:
+    """ROS packages that the nodes import are declared."""
+    if not facts.modules:
+        return
+    from idlc.check.package.setup_py import imported_modules, span_of
+
+    declared = {facts.name, *facts.declared(*_NEEDED, "test_depend")}
+    used = used_packages(model)
+    for source in facts.modules.values():
+        for module, node in imported_modules(source):
+            package = module.partition(".")[0]
+            if package in facts.known and package not in declared:
+                declared.add(package)
+                tag = "depend" if package in used else "exec_depend"
+                line = f"<{tag}>{package}</{tag}>"
+                found = codes.UNDECLARED_IMPORT.at(
+                    span_of(source, node),
+                    f"`{facts.manifest.path}` does not declare `{package}`",
+                    hint=f"add `{line}`",
+                )
+                report.add(_with_lines(found, facts, [line]))
+
+
+def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
+    """Return a problem with the edits that add lines to package.xml, each after its like."""
+    edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
+    return msgspec.structs.replace(found, edits=edits)
+
+
+def _addition(facts: Facts, line: str) -> Edit | None:
+    """Return the edit that adds a line, where the schema's order has it."""
+    text = facts.manifest.text
+    rank = RANK[line[1 : line.index(">")]]
+    ranked = [one for one in facts.statements if one.tag in RANK]
+    before = [one for one in ranked if RANK[one.tag] <= rank]
+    same = [one for one in before if RANK[one.tag] == rank]
+    after = next((one for one in ranked if RANK[one.tag] > rank), None)
+    first = not same and after and not any(one.tag in DEPENDENCIES for one in before)
+    place = after if first or not before else (same or before)[-1]
+    if place is None:
+        return None
+    start = place.span.start
+    indent = text[text.rfind("\n", 0, start) + 1 : start]
+    pattern = rf"</{place.tag}\s*>([ \t]*<!--[^\n]*-->(?=[ \t]*\r?\n))?"
+    end = re.compile(pattern).search(text, start)
+    if indent.strip() or end is None:
+        return None
+    line_end = "\r\n" if "\r\n" in text else "\n"
+    if place is after:
+        return Edit(Span(facts.manifest, start, start), f"{line}{line_end}{indent}")
+    return Edit(Span(facts.manifest, end.end(), end.end()), f"{line_end}{indent}{line}")

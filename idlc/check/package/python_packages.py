@@ -1,0 +1,281 @@
+"""Which Python packages setuptools installs, and from which folders, as far as files show.
+
+setup.py says so, or setup.cfg, or pyproject.toml; where none does, setuptools looks itself.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from posixpath import normpath
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from idlc.check.package.setup_py import name_of_call
+from idlc.diagnostics.source import Source, Span
+
+if TYPE_CHECKING:
+    import ast
+
+    from idlc.check.package.setup_py import Setup
+
+_FINDERS = ("find_packages", "find_namespace_packages")
+#: Characters of the longest setup.cfg or pyproject.toml that is read.
+_MOST = 100_000
+_MOST_ROOTS = 20
+#: Dots in a line of pyproject.toml: reading a key takes time by the square of its parts.
+_MOST_DOTS = 200
+#: What may have other code choose the packages.
+_HOOKS = frozenset({"distclass", "pbr", "py_modules", "setup_requires"})
+#: Folders that setuptools does not take for packages where it looks itself.
+_NOT_FOUND = frozenset(
+    "ci bin debian doc docs documentation manpages news newsfragments changelog test tests "
+    "unit_test unit_tests example examples scripts tools util utils python build benchmark "
+    "benchmarks exercise exercises htmlcov".split()
+)
+_HEADER = re.compile(r"\[([^\]\r\n]*)\]")
+
+
+class Finder(NamedTuple):
+    """A search for packages below a folder, by patterns of their names."""
+
+    where: str = "."
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+
+    def finds(self, name: str) -> bool:
+        """Return whether a package of this name is found if its folder is there."""
+        is_included = any(fnmatchcase(name, pattern) for pattern in self.include or ("*",))
+        return is_included and not any(fnmatchcase(name, pattern) for pattern in self.exclude)
+
+
+class Installed(NamedTuple):
+    """The packages that are named and looked for, and the place that says so.
+
+    `is_nothing` is whether no place does: setuptools would find several, and installs none.
+    """
+
+    place: Span
+    names: tuple[str, ...] = ()
+    finders: tuple[Finder, ...] = ()
+    is_nothing: bool = False
+
+    def covers(self, name: str, folder: str) -> bool:
+        """Return whether a package in a folder is installed."""
+        path = name.replace(".", "/")
+        return name in self.names or any(
+            normpath(f"{one.where}/{path}") == folder and one.finds(name) for one in self.finders
+        )
+
+
+class Said(NamedTuple):
+    """What one file says: packages and `package_dir`, each `None` if it says nothing on it.
+
+    A file that cannot be understood wholly has neither: then nothing is `Said` of it.
+    """
+
+    packages: Installed | None = None
+    roots: Mapping[str, str] | None = None
+
+
+class Layout(NamedTuple):
+    """Where setuptools takes packages from, and what it installs, `None` if that is not known."""
+
+    roots: Mapping[str, str]
+    installed: Installed | None
+
+    def folder(self, package: str) -> str:
+        """Return the folder of a package, relative to setup.py."""
+        names = package.split(".")
+        for end in range(len(names), -1, -1):
+            root = self.roots.get(".".join(names[:end]))
+            if root is not None or not end:
+                return normpath("/".join((root or ".", *names[end:])))
+        raise AssertionError
+
+    def packages(self, folders: Mapping[str, bool]) -> dict[str, bool]:
+        """Return folders by the names of the packages that they are for setuptools."""
+        if not self.roots:
+            return dict(folders)
+        found = {} if "" in self.roots else dict(folders)
+        for package, root in self.roots.items():
+            at = normpath(root).replace("/", ".")
+            for name, has_init in folders.items():
+                if f"{name}.".startswith(f"{at}."):
+                    inner = name[len(at) + 1 :]
+                    found[".".join(filter(None, (package, inner)))] = has_init
+        found.pop("", None)
+        return found
+
+
+def layout(
+    setup: Setup, cfg: Source | None, pyproject: Source | None, folders: Mapping[str, bool]
+) -> Layout | None:
+    """Return how setuptools sees a package; `None` if it cannot be seen where packages lie.
+
+    `folders` are those that there are, by dotted name.
+    """
+    files = (_of_setup(setup), _of_cfg(cfg), _of_toml(pyproject))
+    said = [one for one in files if one]
+    if len(said) < len(files) or setup.call is None:
+        return None
+    roots = next((one.roots for one in said if one.roots is not None), None)
+    if not all(map(_is_within, (roots or {}).values())) or len(roots or ()) > _MOST_ROOTS:
+        return None
+    given = [one.packages for one in said if one.packages]
+    if "packages" in setup.arguments:  # older setuptools do not read pyproject.toml
+        return Layout(roots or {}, None if said[2].packages else said[0].packages)
+    if not setup.whole or _HOOKS & setup.arguments.keys():
+        return Layout(roots or {}, None)
+    if given:
+        wheres = [one.where for one in given[0].finders if _is_within(one.where)]
+        roots = roots or ({"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {})
+        return Layout(roots, given[0] if len(given) == 1 else None)
+    place = setup.place("packages")
+    if "src" in folders:
+        return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
+    tops = {name for name in folders if "." not in name} - _NOT_FOUND
+    return Layout(
+        roots or {},
+        Installed(place, is_nothing=True) if len(tops) > 1 and not roots else None,
+    )
+
+
+def _is_within(root: str) -> bool:
+    """Return whether a folder is within the package's."""
+    return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and ".." not in root.split("/")
+
+
+def _of_setup(setup: Setup) -> Said | None:
+    roots = None
+    if "package_dir" in setup.arguments:
+        pairs = setup.pairs(setup.arguments["package_dir"])
+        roots = _texts({key: setup.text(value) for key, value in (pairs or {}).items()})
+        if pairs is None or roots is None:
+            return None
+    if "packages" not in setup.arguments:
+        return Said(roots=roots)
+    names, finders = [], []
+    for part in setup.items(setup.arguments["packages"]):
+        text = setup.text(part.node) if part.is_element else None
+        finder = None if text else _finder(setup, part.node)
+        if text:
+            names.append(text)
+        elif finder:
+            finders.append(finder)
+        else:
+            return Said(roots=roots)
+    place = setup.place("packages")
+    return Said(Installed(place, tuple(names), tuple(finders)), roots)
+
+
+def _finder(setup: Setup, node: ast.expr) -> Finder | None:
+    """Return what a call of find_packages looks for; `None` if that cannot be seen."""
+    import ast
+
+    call = setup.value(node)
+    if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
+        return None
+    given = dict(zip(("where", "exclude", "include"), call.args, strict=False))
+    given |= {one.arg: one.value for one in call.keywords if one.arg}
+    where = setup.text(given["where"]) if "where" in given else "."
+    chosen = []
+    for name in ("include", "exclude"):
+        items = setup.items(given.get(name))
+        texts = [setup.text(item.node) for item in items]
+        if None in texts or not all(item.is_element for item in items):
+            return None
+        chosen.append(tuple(text for text in texts if text is not None))
+    return None if where is None else Finder(where, *chosen)
+
+
+def _of_cfg(source: Source | None) -> Said | None:
+    if source and len(source.text) > _MOST:
+        return None
+    options = dict(_options(source)) if source else {}
+    packages, place = options.get(("options", "packages"), ([], None))
+    lines = options.get(("options", "package_dir"), ([], None))[0]
+    pairs = [line.partition("=") for line in lines]
+    roots = {key.strip(): root.strip() for key, equals, root in pairs if equals}
+    found = None
+    if place and packages in (["find:"], ["find_namespace:"]):
+        wanted = (
+            options.get(("options.packages.find", key), ([], None))[0]
+            for key in ("where", "include", "exclude")
+        )
+        where, include, exclude = wanted
+        if len(where) > 1:
+            return None
+        finder = Finder("".join(where) or ".", tuple(include), tuple(exclude))
+        found = Installed(place, (), (finder,))
+    elif place:
+        found = Installed(place, tuple(packages))
+    return Said(found, roots or None)
+
+
+def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str], Span]]]:
+    """Yield the options of a setup.cfg by section and name: a value's parts, and its place."""
+    section = ""
+    key = None
+    values: list[str] = []
+    at = 0
+    for line, start in zip((*source.lines, "[]"), (*source.line_starts, 0), strict=False):
+        text = line.strip()
+        if not text or text[0] in "#;":
+            continue
+        if line[0].isspace() and key:
+            values.append(text)
+            continue
+        if key:
+            parts = values if len(values) > 1 else values[0].split(",")
+            words = [word for part in parts if (word := part.strip())]
+            yield (section, key), (words, Span(source, at, at + len(key)))
+            key = None
+        if header := _HEADER.match(text):
+            section = header[1].strip()
+        elif found := re.match(r"([\w.-]+)[ \t]*[=:]", text):
+            key, at = found[1].replace("-", "_").lower(), start
+            values = [text[found.end() :].strip()]
+
+
+def _of_toml(source: Source | None) -> Said | None:
+    if source is None or "setuptools" not in source.text:
+        return Said()
+    if len(source.text) > _MOST or any(one.count(".") > _MOST_DOTS for one in source.lines):
+        return None
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        table = tomllib.loads(source.text).get("tool", {}).get("setuptools", {})
+        roots = _texts(table.get("package-dir", {}))
+        packages = table.get("packages")
+        finder = packages.get("find", {}) if isinstance(packages, dict) else {}
+        where = _all_texts(finder.get("where", ["."]))
+        include, exclude = (_all_texts(finder.get(key, [])) for key in ("include", "exclude"))
+        names = _all_texts([] if isinstance(packages, dict) else packages or [])
+    except (ValueError, RecursionError, AttributeError, TypeError):
+        return None
+    if roots is None or len(where) != 1:
+        return None
+    if packages is None:
+        return Said(None, roots or None)
+    at = re.search(r"\bpackages\b", source.text)
+    place = Span(source, *(at.span() if at else (0, 0)))
+    finders = (Finder(where[0], include, exclude),) if isinstance(packages, dict) else ()
+    return Said(Installed(place, names, finders), roots or None)
+
+
+def _texts(given: Mapping[str, Any]) -> dict[str, str] | None:
+    """Return the texts of a table, `None` if something in it is none."""
+    found = {key: value for key, value in given.items() if isinstance(value, str)}
+    return found if len(found) == len(given) else None
+
+
+def _all_texts(given: Iterable[Any]) -> tuple[str, ...]:
+    found = tuple(given)
+    if isinstance(given, str) or not all(isinstance(one, str) for one in found):
+        raise TypeError
+    return found

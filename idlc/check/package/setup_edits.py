@@ -1,0 +1,278 @@
+"""Edits of a setup.py: elements for a list, an argument for setup(), an import.
+
+Everything added looks like what stands beside it: quotes, indentation, line ends.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import tokenize
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
+from textwrap import indent
+from typing import TypeGuard
+
+import msgspec
+
+from idlc.check.package.setup_py import Setup, name_of_call, parsed, range_of, span_of, start_of
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit
+from idlc.diagnostics.source import Source, Span
+
+STEP = "    "
+#: The widest line that the linters of ROS 2 accept.
+WIDTH = 99
+
+
+def insertion(source: Source, at: int, text: str) -> Edit:
+    """Return the edit that inserts a text, with the line ends of the file."""
+    return Edit(Span(source, at, at), text.replace("\n", line_end(source)))
+
+
+def line_end(source: Source) -> str:
+    """Return the line end of a file."""
+    found = re.search(r"\r\n?|\n", source.text)
+    return found[0] if found else "\n"
+
+
+def indent_of(source: Source, at: int) -> str:
+    """Return the whitespace before the first word of a line."""
+    start = max(source.text.rfind("\n", 0, at), source.text.rfind("\r", 0, at)) + 1
+    found = re.compile(r"[ \t]*").match(source.text, start)
+    return found[0] if found else ""
+
+
+def quote_of(source: Source, node: ast.AST) -> str:
+    """Return the quote of the first literal in an expression."""
+    start, end = range_of(source, node)
+    found = re.search("['\"]", source.text[start:end])
+    return found[0] if found else "'"
+
+
+def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[Edit, ...]:
+    """Return the edits that give a list more elements, written with single quotes."""
+    begin, end = range_of(source, node)
+    quote = quote_of(source, node)
+    new = [element.replace("'", quote) for element in elements]
+    last = range_of(source, node.elts[-1])[1] if node.elts else begin + 1
+    after, comma = _behind(source.text[last : end - 1])
+    last += after
+    bracket = indent_of(source, end - 1)
+    tail = re.search(r"(?:\r\n?|\n)[ \t]*\Z", source.text[last : end - 1])
+    if tail is None:
+        before, behind = (" ", ",") if comma else (", ", "") if node.elts else ("", ", ")
+        return (insertion(source, last, before + ", ".join(new) + behind),)
+    ends = [start_of(source, element) for element in (node.elts[:1] + node.elts[-1:])]
+    margins = [indent_of(source, at) for at in ends if _begins_line(source, at)]
+    margin = margins[-1] if margins else bracket + STEP
+    lines = "".join(f"\n{_broken(margin, element)}," for element in new)
+    edits = () if comma or not node.elts else (insertion(source, last, ","),)
+    return (*edits, insertion(source, last + tail.start(), lines))
+
+
+def _broken(margin: str, element: str) -> str:
+    """Return an element on a line of its own, on two if it is long."""
+    line = margin + element
+    return line if len(line) < WIDTH else line.replace(", ", f",\n{margin}{STEP}", 1)
+
+
+def _begins_line(source: Source, at: int) -> bool:
+    return source.text[:at].endswith(("\n" + indent_of(source, at), "\r" + indent_of(source, at)))
+
+
+def _behind(text: str) -> tuple[int, bool]:
+    """Return how much of what stands behind an element belongs to it, and whether a comma does."""
+    lines = re.findall(r"[^\r\n]*(?:\r\n?|\n)|[^\r\n]+", f"({text}")
+    starts = [length - 1 for length in accumulate(map(len, lines), initial=0)]
+    length = 0
+    try:
+        for token in tokenize.generate_tokens(iter([*lines, ""]).__next__):
+            at = starts[min(token.end[0], len(starts)) - 1] + token.end[1]
+            if token.string == ",":
+                return at, True
+            if token.string == ")":
+                length = at
+    except (tokenize.TokenError, SyntaxError):
+        pass  # it ends within the bracket
+    return length, False
+
+
+def argument(setup: Setup, text: str) -> tuple[Edit, ...]:
+    """Return the edit that gives setup() one argument more, laid out like its first one."""
+    call, source = setup.call, setup.source
+    if call is None or call.args or not call.keywords:
+        return ()
+    at = start_of(source, call.keywords[0])
+    spread = call.keywords[0].lineno > call.lineno
+    between = "\n" + indent_of(source, at) if spread else " "
+    return (insertion(source, at, f"{text},{between}"),)
+
+
+def imported(setup: Setup, module: str, name: str) -> tuple[str, tuple[Edit, ...]]:
+    """Return how a file calls a function of a module, and the edit that imports it if need be."""
+    imports = [node for node in setup.nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
+    for node in imports:
+        for alias in node.names:
+            if isinstance(node, ast.ImportFrom):
+                if node.module == module and alias.name in (name, "*"):
+                    return alias.asname or name, ()
+            elif alias.name == module:
+                return f"{alias.asname or module}.{name}", ()
+    source = setup.source
+    for node in imports:
+        if isinstance(node, ast.ImportFrom) and node.module == module and node.col_offset == 0:
+            at = start_of(source, node.names[0])
+            return name, (insertion(source, at, f"{name}, "),)
+    body = setup.tree.body
+    first = next((node for node in body if node in imports), body[0])
+    if isinstance(first, ast.ImportFrom) and first.module == "__future__":
+        first = body[body.index(first) + 1]
+    gap = "\n" if getattr(first, "module", "") == "setuptools" else ""
+    line = f"from {module} import {name}\n{gap}"
+    return name, (insertion(source, start_of(source, first), line),)
+
+
+#: How many lists are tried; each costs as much as reading the file.
+_TRIES = 40
+_LINE_END = re.compile(r"\r\n?|\n")
+
+
+def wrapped(old: str, new: str) -> str:
+    """Return an edited file whose lines are not too wide, as far as lists can be wrapped.
+
+    Lines that `old` has stay as they are.
+    """
+    before = frozenset(_LINE_END.split(old))
+    refused: set[str] = set()
+    for _ in range(_TRIES):
+        lines = enumerate(_LINE_END.split(new), 1)
+        wide = {at for at, line in lines if len(line) > WIDTH and line not in before}
+        tree = parsed(new) if wide else None
+        nodes = ast.walk(tree) if tree else ()
+        text = next((one for node in nodes if (one := _spread(new, node, wide, refused))), None)
+        if tree is None or text is None:
+            break
+        # parentheses around items are not in the tree, nor is what may follow a generator
+        if _same(tree, parsed(text)):
+            new = text
+        else:
+            refused.add(text)
+    return new
+
+
+def _same(before: ast.Module, after: ast.Module | None) -> bool:
+    try:
+        return after is not None and ast.dump(before) == ast.dump(after)
+    except RecursionError:
+        return False
+
+
+def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str | None:
+    """Return the text with one item of a node to a line, if it is on a line that is too wide."""
+    if not isinstance(node, (ast.List, ast.Tuple, ast.Dict, ast.Call)):
+        return None
+    if node.lineno not in wide or node.lineno != node.end_lineno:
+        return None
+    source = Source("", text)
+    start, end = range_of(source, node)
+    if isinstance(node, ast.Call):
+        start = text.find("(", range_of(source, node.func)[1])
+
+    def code(item: ast.AST) -> str:
+        return text[slice(*range_of(source, item))]
+
+    if isinstance(node, ast.Dict):
+        pairs = zip(node.keys, node.values, strict=True)
+        items = [(f"{code(key)}: " if key else "**") + code(value) for key, value in pairs]
+    elif isinstance(node, ast.Call):
+        given: list[ast.expr | ast.keyword] = [*node.args, *node.keywords]
+        items = [code(one) for one in sorted(given, key=lambda one: one.col_offset)]
+    else:
+        items = [code(one) for one in node.elts]
+    margin, line = indent_of(source, start), line_end(source)
+    body = "".join(f"{margin}{STEP}{item},{line}" for item in items)
+    found = f"{text[: start + 1]}{line}{body}{margin}{text[end - 1 :]}"
+    return found if items and found not in refused else None
+
+
+COMPILE = "compile_interfaces"
+RESULT = "compiled"
+_BLOCK = f"""\
+try:
+    from idlc.build import {COMPILE}
+except ImportError:
+    {RESULT} = {{{{}}}}  # what was compiled last is installed, without libraries for C++ tools
+else:
+    {RESULT} = {COMPILE}({{name}})
+
+"""
+
+
+def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
+    """Yield the problem with a setup.py that enters a package without installing libraries."""
+    index = [one for one in setup.data_files or () if "/packages" in (one.folder or "")]
+    if not index or installs(setup):
+        return
+    edits = edits_for(setup)
+    problem = codes.NO_LIBRARY_INSTALLED.at(
+        span_of(setup.source, index[0].node),
+        f"`ros2 bag record` will stop at `{package}`: setup.py registers it with ROS 2, but "
+        "installs no library for its types",
+        hint=f"pass `**{COMPILE}('{package}')` of `idlc.build` to setup()"
+        + ("; --fix does" if edits else ""),
+    )
+    yield msgspec.structs.replace(problem, edits=edits)
+
+
+def installs(setup: Setup) -> bool:
+    """Return whether a setup.py uses what compiling the interfaces returns."""
+    dropped = {id(one.value) for one in setup.nodes if _is_plain(one)}
+    return any(_is_compile(one) and id(one) not in dropped for one in setup.nodes)
+
+
+def edits_for(setup: Setup) -> tuple[Edit, ...]:
+    """Return the edits after which a setup.py installs libraries; none if it is too unusual."""
+    names = {one.id for one in setup.nodes if isinstance(one, ast.Name)}
+    if setup.call is None or RESULT in names or installs(setup):
+        return ()
+    taken = {one.arg for one in setup.call.keywords} & {"distclass", None}
+    given = () if taken else argument(setup, f"**{RESULT}")
+    compiling = _compiling(setup) if given else ()
+    return (*compiling, *given) if compiling else ()
+
+
+def _compiling(setup: Setup) -> tuple[Edit, ...]:
+    """Return the edits that keep what compiling returns, or that compile in the first place."""
+    source = setup.source
+    plain = [one for one in setup.nodes if _is_plain(one)]
+    if not plain:
+        name = setup.arguments.get("name")
+        first = setup.first_use("packages", "data_files")
+        if first is None or not isinstance(name, (ast.Name, ast.Constant)):
+            return ()
+        at = start_of(source, first)
+        margin = indent_of(source, at)
+        if first.col_offset != len(margin):
+            return ()  # behind a semicolon
+        at -= len(margin)
+        blank = not at or re.search(r"(\r\n?|\n)[ \t]*(\r\n?|\n)\Z", source.text[:at])
+        block = _BLOCK.format(name=ast.unparse(name))
+        return (insertion(source, at, ("" if blank else "\n") + indent(block, margin)),)
+    found = [one for one in setup.nodes if isinstance(one, ast.Try) and plain[0] in one.orelse]
+    if len(plain) != 1 or len(found) != 1 or len(found[0].handlers) != 1:
+        return ()
+    (otherwise,) = found[0].handlers
+    if len(otherwise.body) != 1 or not isinstance(otherwise.body[0], ast.Pass):
+        return ()
+    nothing = Edit(Span(source, *range_of(source, otherwise.body[0])), f"{RESULT} = {{}}")
+    return nothing, insertion(source, start_of(source, plain[0]), f"{RESULT} = ")
+
+
+def _is_compile(node: ast.AST) -> bool:
+    return name_of_call(node) == COMPILE
+
+
+def _is_plain(node: ast.AST) -> TypeGuard[ast.Expr]:
+    """Return whether a statement only calls the function, and drops what it returns."""
+    return isinstance(node, ast.Expr) and _is_compile(node.value)

@@ -1,0 +1,460 @@
+"""What a setup.py gives to setup(), as far as its syntax shows; nothing is imported or run.
+
+A value is known only if all of it is: literals, names that are assigned once, sums, f-strings
+and plain `%s` and `{}`. Lists may grow by `append`, `extend` and `+=`. Nothing else is guessed.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Iterator
+from functools import cached_property, lru_cache
+from typing import NamedTuple, TypeGuard
+
+from idlc.diagnostics.source import Source, Span
+
+BOM = "\ufeff"
+
+
+@lru_cache(maxsize=256)
+def parsed(text: str) -> ast.Module | None:
+    """Return the syntax of a file; `None` if it is not Python."""
+    try:
+        return ast.parse(text.removeprefix(BOM))
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return None
+
+
+@lru_cache(maxsize=16)
+def _lines(text: str) -> tuple[list[int], list[bytes]]:
+    """Return where the lines of Python begin, and these lines; ast counts bytes."""
+    starts = [0, *(found.end() for found in re.finditer(r"\r\n?|\n", text))]
+    ends = [*starts[1:], len(text)]
+    lines = [
+        text[start:end].encode("utf-8", "replace") for start, end in zip(starts, ends, strict=True)
+    ]
+    return starts, lines
+
+
+def range_of(source: Source, node: ast.AST) -> tuple[int, int]:
+    """Return where a node begins and ends, in characters."""
+    starts, lines = _lines(source.text)
+
+    def offset(line: int, column: int) -> int:
+        at = min(line, len(starts)) - 1
+        mark = len(BOM) if at == 0 and source.text.startswith(BOM) else 0
+        if lines[at].isascii():
+            return starts[at] + column
+        before = lines[at][: column + mark * len(BOM.encode())].decode("utf-8", "ignore")
+        return starts[at] + len(before)
+
+    line, column = getattr(node, "lineno", 1), getattr(node, "col_offset", 0)
+    end_line, end = getattr(node, "end_lineno", None), getattr(node, "end_col_offset", None)
+    return offset(line, column), offset(end_line or line, end or column)
+
+
+def start_of(source: Source, node: ast.AST) -> int:
+    """Return where a node begins."""
+    return range_of(source, node)[0]
+
+
+def span_of(source: Source, node: ast.AST) -> Span:
+    """Return where a node begins, to the end of it or of its line."""
+    start, end = range_of(source, node)
+    first = re.match(r"[^\r\n]*", source.text[start:end])
+    return Span(source, start, start + max(first.end() if first else 0, 1))
+
+
+def imported_modules(source: Source) -> Iterator[tuple[str, ast.AST]]:
+    """Yield the module of each absolute import, with its place."""
+    tree = parsed(source.text)
+    for node in ast.walk(tree) if tree else ():
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, alias
+        elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+            yield node.module, node
+
+
+def defines(source: Source, name: str) -> bool:
+    """Return whether a file gives a meaning to a name at its top level."""
+    tree = parsed(source.text)
+    if tree is None:
+        return True
+    for node in tree.body:
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+            names = [node.name]
+        elif isinstance(node, (ast.Import, ast.ImportFrom)):
+            names = [alias.asname or alias.name for alias in node.names]
+        elif isinstance(node, (ast.If, ast.Try, ast.With)):
+            return True
+        else:
+            names = [one.id for one in ast.walk(node) if isinstance(one, ast.Name)]
+        if name in names or "*" in names:
+            return True
+    return False
+
+
+#: No text or list of a setup.py is longer than this; sums of names could double at each line.
+_MOST = 2000
+#: How deep sums and names are followed.
+_DEPTH = 50
+_GROWING = frozenset({"append", "extend", "insert"})
+
+
+class Item(NamedTuple):
+    """A part of a list: an element, or an expression for any number of elements."""
+
+    node: ast.expr
+    is_element: bool
+
+
+class DataFiles(NamedTuple):
+    """An entry of data_files: its folder in the prefix, and the files or patterns of them.
+
+    What cannot be seen is `None`.
+    """
+
+    node: ast.expr
+    folder: str | None
+    files: tuple[str, ...] | None
+
+
+class Setup:
+    """The call of setup() in a file and the values of its arguments.
+
+    `arguments` are empty without exactly one such call; `whole` is whether there are no others.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.tree = parsed(source.text) or ast.Module([], [])
+        self.nodes = list(ast.walk(self.tree))
+        calls = [node for node in self.nodes if isinstance(node, ast.Call) and _is_setup(node)]
+        self.call = calls[0] if len(calls) == 1 else None
+        self.arguments: dict[str, ast.expr] = {}
+        self.whole = self.call is not None and not self.call.args
+        for keyword in self.call.keywords if self.call else ():
+            if keyword.arg:
+                self.arguments[keyword.arg] = keyword.value
+            elif not self._is_compiled(keyword.value):
+                self._spread(keyword.value)
+        self._texts: dict[str, str | None] = {}
+        self._lists: dict[str, list[Item]] = {}
+
+    def _is_compiled(self, node: ast.expr) -> bool:
+        """Return whether arguments come from `compile_interfaces`, directly or by a variable."""
+        values = self._bound.get(node.id, []) if isinstance(node, ast.Name) else [node]
+        return any(name_of_call(value) == "compile_interfaces" for value in values)
+
+    def _spread(self, node: ast.expr) -> None:
+        """Take the arguments of a dictionary that is written out."""
+        items = self.pairs(node)
+        if items is None:
+            self.whole = False
+        self.arguments |= items or {}
+
+    @cached_property
+    def _parents(self) -> dict[int, ast.AST]:
+        return {id(child): node for node in self.nodes for child in ast.iter_child_nodes(node)}
+
+    @cached_property
+    def _bound(self) -> dict[str, list[ast.expr | None]]:
+        """The values that each name is given; `None` for one that is not an assignment."""
+        bound: dict[str, list[ast.expr | None]] = {}
+        plain: dict[int, ast.expr] = {}
+        added: set[int] = set()
+        for node in self.nodes:
+            if isinstance(node, ast.AnnAssign) and node.value:
+                plain[id(node.target)] = node.value
+            elif isinstance(node, ast.Assign):
+                plain |= {id(target): node.value for target in node.targets}
+            elif isinstance(node, ast.AugAssign):
+                added.add(id(node.target))
+            elif _stores(node) and id(node) not in added:
+                bound.setdefault(node.id, []).append(plain.get(id(node)))
+            for name in _names_bound(node):
+                bound.setdefault(name, []).append(None)
+        return bound
+
+    @cached_property
+    def _grown(self) -> dict[str, list[Item]]:
+        """What is added to the lists of names after their assignment."""
+        grown: dict[str, list[Item]] = {}
+        for node in self.nodes:
+            if isinstance(node, ast.Call) and (name := _grows(node)):
+                is_element = getattr(node.func, "attr", "") != "extend"
+                grown.setdefault(name, []).extend(Item(arg, is_element) for arg in node.args[-1:])
+            elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+                grown.setdefault(node.target.id, []).append(Item(node.value, False))
+        return grown
+
+    @cached_property
+    def _shared(self) -> set[str]:
+        """The names of lists and dictionaries that other code may change."""
+        return {
+            node.id
+            for node in self.nodes
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
+            if not self._is_harmless(node)
+        }
+
+    def _is_harmless(self, node: ast.Name) -> bool:
+        """Return whether a use of a name only reads it, or adds to it in a known way."""
+        parent = self._parents.get(id(node))
+        if isinstance(parent, ast.Attribute):
+            call = self._parents.get(id(parent))
+            return isinstance(call, ast.Call) and _grows(call) == node.id
+        if isinstance(parent, ast.Call):
+            return name_of_call(parent) in ("glob", "join", "len", "sorted", "find_packages")
+        kinds = (
+            ast.keyword,
+            ast.BinOp,
+            ast.Starred,
+            ast.FormattedValue,
+            ast.Compare,
+            ast.AugAssign,
+        )
+        return isinstance(parent, (*kinds, ast.List, ast.Tuple, ast.Dict, ast.For))
+
+    def value(self, node: ast.expr | None) -> ast.expr | None:
+        """Return the expression that a name stands for if it is assigned once; others as is."""
+        for _ in range(_DEPTH):
+            if not isinstance(node, ast.Name):
+                return node
+            values = self._bound.get(node.id, [])
+            node = values[0] if len(values) == 1 else None
+        return None
+
+    def text(self, node: ast.expr | None, depth: int = 0) -> str | None:
+        """Return the text that an expression is, `None` if that cannot be seen."""
+        if depth > _DEPTH:
+            return None
+        found: str | None = None
+        if isinstance(node, ast.Name):
+            if node.id not in self._texts:
+                self._texts[node.id] = None  # for one that is defined by itself
+                known = node.id not in self._grown and self.value(node)
+                self._texts[node.id] = self.text(known, depth + 1) if known else None
+            return self._texts[node.id]
+        if isinstance(node, ast.Constant):
+            found = node.value if isinstance(node.value, str) else None
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+            found = self._joined("", (node.left, node.right), depth)
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
+            found = self._filled("%s", node.left, values, depth)
+        elif isinstance(node, ast.JoinedStr):
+            found = self._joined("", node.values, depth)
+        elif isinstance(node, ast.FormattedValue):
+            plain = node.conversion == -1 and node.format_spec is None
+            found = self.text(node.value, depth + 1) if plain else None
+        elif isinstance(node, ast.Call) and not node.keywords:
+            function = node.func
+            if name_of_call(node) == "join" and _is_of_paths(function):
+                found = self._joined("/", node.args, depth)
+            elif isinstance(function, ast.Attribute) and function.attr == "format":
+                found = self._filled("{}", function.value, node.args, depth)
+        return found if found is not None and len(found) <= _MOST else None
+
+    def _joined(self, between: str, nodes: Iterable[ast.expr], depth: int) -> str | None:
+        texts = [self.text(node, depth + 1) for node in nodes]
+        return None if None in texts else between.join(text for text in texts if text is not None)
+
+    def _filled(
+        self, mark: str, node: ast.expr, values: Iterable[ast.expr], depth: int
+    ) -> str | None:
+        """Return a text with values at its marks, `%s` or `{}`, if it has no other ones."""
+        parts = (self.text(node, depth + 1) or mark[0]).split(mark)
+        texts = [self.text(value, depth + 1) for value in values]
+        if None in texts or len(texts) != len(parts) - 1 or mark[0] in "".join(parts):
+            return None
+        pairs = zip(texts, parts[1:], strict=True)
+        return parts[0] + "".join((text or "") + part for text, part in pairs)
+
+    def items(self, node: ast.expr | None, depth: int = 0) -> list[Item]:
+        """Return the parts of a list; those that cannot be taken apart are no elements."""
+        if node is None:
+            return []
+        if isinstance(node, ast.Name) and depth <= _DEPTH:
+            if node.id not in self._lists:
+                self._lists[node.id] = [Item(node, False)]
+                self._lists[node.id] = self._named_items(node, depth + 1)
+            return self._lists[node.id]
+        found: list[Item] = []
+        if isinstance(node, (ast.List, ast.Tuple)) and depth <= _DEPTH:
+            for element in node.elts:
+                if isinstance(element, ast.Starred):
+                    found += self.items(element.value, depth + 1)
+                else:
+                    found.append(Item(element, True))
+                if len(found) > _MOST:
+                    break
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) and depth <= _DEPTH:
+            found = self.items(node.left, depth + 1) + self.items(node.right, depth + 1)
+        else:
+            found = [Item(node, False)]
+        return found if len(found) <= _MOST else [Item(node, False)]
+
+    def _named_items(self, node: ast.Name, depth: int) -> list[Item]:
+        value = self.value(node)
+        if value is None or node.id in self._shared:
+            return [Item(node, False)]
+        found = list(self.items(value, depth))
+        for item in self._grown.get(node.id, ()):
+            found += [item] if item.is_element else self.items(item.node, depth)
+            if len(found) > _MOST:
+                break
+        return found if len(found) <= _MOST else [Item(node, False)]
+
+    def pairs(self, node: ast.expr | None) -> dict[str, ast.expr] | None:
+        """Return the values of a dictionary by key, `None` unless all of it can be seen."""
+        shared = isinstance(node, ast.Name) and node.id in self._shared
+        value = self.value(node)
+        if isinstance(value, ast.Call) and name_of_call(value) == "dict" and not value.args:
+            found = {one.arg: one.value for one in value.keywords}
+        elif isinstance(value, ast.Dict):
+            keys = [self.text(key) for key in value.keys]
+            found = dict(zip(keys, value.values, strict=True))
+        else:
+            return None
+        named = {key: one for key, one in found.items() if key is not None}
+        return None if shared or len(named) < len(found) else named
+
+    def list_of(self, argument: str) -> ast.List | None:
+        """Return the list to which an argument's elements can be added."""
+        node = self.arguments.get(argument)
+        if isinstance(node, ast.Name) and node.id in self._shared:
+            return None
+        value = self.value(node)
+        while isinstance(value, ast.BinOp) and isinstance(value.op, ast.Add):
+            value = self.value(value.left)
+        return value if isinstance(value, ast.List) else None
+
+    def place(self, argument: str) -> Span:
+        """Return where an argument of setup() is, or the call."""
+        node: ast.AST | None = self.arguments.get(argument, self.call)
+        listed = self.list_of(argument)
+        if listed is not None and listed.elts:
+            node = listed.elts[0]
+        return span_of(self.source, node) if node else Span(self.source, 0, 0)
+
+    def first_use(self, *arguments: str) -> ast.stmt | None:
+        """Return the statement of the block with setup() that begins to work out arguments.
+
+        It stands after the value of `name`; `None` where setup() is not a statement of its own.
+        """
+        statement = self._parents.get(id(self.call))
+        block = getattr(self._parents.get(id(statement)), "body", [])
+        if not isinstance(statement, ast.Expr) or statement not in block:
+            return None
+        names = {node.id for one in arguments for node in self._names_in(one)}
+        own = {node.id for node in self._names_in("name")}
+        for one in reversed(block[: block.index(statement)]):
+            stored = {node.id for node in ast.walk(one) if isinstance(node, ast.Name)}
+            bound = any(isinstance(one, kind) for kind in (ast.Assign, ast.AnnAssign))
+            if bound and stored & own and not stored & (names - own):
+                break
+            if stored & (names - own):
+                statement = one
+        return statement
+
+    def _names_in(self, argument: str) -> Iterator[ast.Name]:
+        node = self.arguments.get(argument)
+        for one in ast.walk(node) if node else ():
+            if isinstance(one, ast.Name) and one.id in self._bound:
+                yield one
+
+    @cached_property
+    def data_files(self) -> tuple[DataFiles, ...] | None:
+        """The entries of data_files; `None` if it cannot be seen which there are."""
+        if "data_files" not in self.arguments:
+            # setup.cfg or pyproject.toml may say what setup() does not
+            return () if self.whole and "packages" in self.arguments else None
+        items = self.items(self.arguments["data_files"])
+        if not all(item.is_element for item in items):
+            return None
+        return tuple(self._entry(item.node) for item in items)
+
+    def _entry(self, node: ast.expr) -> DataFiles:
+        value = self.value(node)
+        if isinstance(value, (ast.Tuple, ast.List)) and len(value.elts) == 2:
+            folder = self.text(value.elts[0])
+            return DataFiles(value.elts[0], folder, self._files(value.elts[1]))
+        return DataFiles(node, "" if self.text(node) is not None else None, None)
+
+    def _files(self, node: ast.expr) -> tuple[str, ...] | None:
+        """Return the files and patterns in a list of data_files; `None` if some cannot be seen."""
+        found: list[str] = []
+        for item in self.items(node):
+            call = self.value(item.node)
+            if not item.is_element and isinstance(call, ast.Call) and call.args:
+                if name_of_call(call) in ("sorted", "list"):
+                    inner = self._files(call.args[0])
+                elif name_of_call(call) in ("glob", "iglob"):
+                    pattern = self.text(call.args[0])
+                    inner = None if pattern is None else (pattern,)
+                else:
+                    inner = None
+            else:
+                text = self.text(item.node) if item.is_element else None
+                inner = None if text is None else (text,)
+            if inner is None:
+                return None
+            found += inner
+        return tuple(found)
+
+    @property
+    def scripts(self) -> Iterator[tuple[str, ast.expr]]:
+        """The console scripts that can be seen, with their expressions."""
+        groups = self.pairs(self.arguments.get("entry_points")) or {}
+        for item in self.items(groups.get("console_scripts")):
+            text = self.text(item.node) if item.is_element else None
+            if text is not None:
+                yield text, item.node
+
+
+def name_of_call(node: ast.AST | None) -> str:
+    """Return the last part of the name of a called function; empty for what is not a call."""
+    function = node.func if isinstance(node, ast.Call) else None
+    return function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
+
+
+def _is_setup(node: ast.Call) -> bool:
+    return name_of_call(node) == "setup"
+
+
+def _is_of_paths(function: ast.expr) -> bool:
+    """Return whether a `join` is that of os.path, and not that of a text."""
+    of = getattr(function, "value", None)
+    return isinstance(function, ast.Name) or "path" in (
+        getattr(of, "id", ""),
+        getattr(of, "attr", ""),
+    )
+
+
+def _stores(node: ast.AST) -> TypeGuard[ast.Name]:
+    return isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)
+
+
+def _grows(node: ast.Call) -> str:
+    """Return the name of the list to which a call adds; empty if it does something else."""
+    function = node.func
+    if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+        return function.value.id if function.attr in _GROWING else ""
+    return ""
+
+
+def _names_bound(node: ast.AST) -> Iterator[str]:
+    """Yield the names that a definition, an import or a parameter gives a meaning."""
+    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+        yield node.name
+    elif isinstance(node, ast.alias):
+        yield node.asname or node.name.partition(".")[0]
+    elif isinstance(node, ast.arg):
+        yield node.arg
+    elif isinstance(node, (ast.Global, ast.Nonlocal)):
+        yield from node.names
+    elif isinstance(node, ast.ExceptHandler) and node.name:
+        yield node.name

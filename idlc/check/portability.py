@@ -1,0 +1,239 @@
+"""What ROS 2 accepts and then treats differently here and there."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+
+import msgspec
+
+from idlc.check.sections import sections
+from idlc.check.style import REMARK, is_unit
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Report, first_few
+from idlc.diagnostics.source import Span
+from idlc.language.escapes import plain_meaning
+from idlc.model import catalog, ir, lower_types
+from idlc.model.comments import brackets
+from idlc.model.link import Model
+from idlc.model.lower_values import BACKSLASH_HINT, FLOAT32_MAX
+
+
+def constants_and_defaults(model: Model, report: Report) -> None:
+    """Values reach every language as they are written."""
+    for message in sections(model):
+        for constant in message.constants:
+            if constant.value_span is not None:
+                report.extend(_problems(constant.value, constant.type, constant.value_span))
+        for field in message.fields:
+            if field.default is not None and field.default_span is not None:
+                report.extend(_problems(field.default.value, field.type, field.default_span))
+
+
+def _problems(value: ir.Value, type_: ir.FieldType, span: Span) -> list[Diagnostic]:
+    element = ir.element_of(type_)
+    if isinstance(value, tuple):
+        if not value and isinstance(element, ir.Primitive) and element.name not in ("bool", "byte"):
+            return [_breaks_python(span, "an empty default of a numeric sequence")]
+        return _broken_text(value, span)
+    if isinstance(value, str):
+        return [*_broken_text((value,), span), *_mangled_text(value, span), *_odd_text(span)]
+    if isinstance(value, float):
+        return _number(value, element, span)
+    return []
+
+
+def _number(value: float, element: ir.Element, span: Span) -> list[Diagnostic]:
+    if not math.isfinite(value):
+        message = f"`{span.text}` is not finite; what rosidl generates for it does not compile"
+        hint = "use a large finite number, or set the value in code"
+        return [codes.NON_FINITE_VALUE.at(span, message, hint=hint)]
+    if element == ir.Primitive("float32") and abs(value) > FLOAT32_MAX:
+        message = f"`{span.text}` is beyond what a float32 holds"
+        return [codes.FLOAT32_RANGE.at(span, message, hint="use float64")]
+    return []
+
+
+def _broken_text(values: tuple[ir.Scalar, ...], span: Span) -> list[Diagnostic]:
+    if any(isinstance(text, str) and set(text) & set("\n\r\0") for text in values):
+        return [_breaks_python(span, "a line break or NUL in a value")]
+    return []
+
+
+def _mangled_text(value: str, span: Span) -> list[Diagnostic]:
+    text = span.text
+    if len(text) > 1 and text[0] == text[-1] and text[0] in "\"'":
+        text = text[1:-1]
+    if "\\" not in text or value == plain_meaning(text):
+        return []
+    message = f"ROS 2 interprets the backslashes more than once and reads {value!r}"
+    return [codes.MANGLED_TEXT.at(span, message, hint=BACKSLASH_HINT)]
+
+
+def _odd_text(span: Span) -> list[Diagnostic]:
+    """Find what looks like quotes or a comment and is part of the text."""
+    text = span.text
+    one_sided = text[:1] in ('"', "'") and (len(text) == 1 or text[-1] != text[0])
+    if lower_types.has_comment(text) and (one_sided or lower_types.is_comment(text)):
+        message = "what looks like a comment is part of the text"
+        return [codes.ODD_TEXT.at(span, message, hint=lower_types.COMMENT_HINT)]
+    if one_sided and text[0] not in _rest_of_line(span):  # or a `#` is to blame, see IDL109
+        message = f"the text is not closed by {text[0]}, which therefore is part of it"
+        return [codes.ODD_TEXT.at(span, message, hint="close the quotes, or leave them out")]
+    return []
+
+
+def _rest_of_line(span: Span) -> str:
+    line, column = span.source.position(span.end)
+    return span.source.line_text(line)[column - 1 :]
+
+
+def _breaks_python(span: Span, what: str) -> Diagnostic:
+    message = f"{what} breaks the Python code that rosidl generates"
+    return codes.BREAKS_ROSIDL_PYTHON.at(span, message, hint="remove it, and set the value in code")
+
+
+#: Pairs of brackets that a message names.
+SHOWN = 5
+#: What ROS 2 says to use instead of what it removed.
+_INSTEAD = {
+    "actionlib_msgs": "actions are defined in .action files, and ROS 2 makes messages for them",
+    "geometry_msgs/msg/Pose2D": "use `geometry_msgs/Pose`, or fields `x`, `y` and `theta`",
+}
+
+
+def wide_strings(model: Model, report: Report) -> None:
+    """`wstring` is not used: its encoding differs between middlewares and platforms."""
+    for message in sections(model):
+        for field in message.fields:
+            if _is_string(field.type, wide=True) and field.type_span:
+                report.add(
+                    codes.WIDE_STRING.at(
+                        field.type_span,
+                        "middlewares and platforms disagree on how a wstring is sent",
+                        hint="use `string`, which is UTF-8",
+                    )
+                )
+
+
+def _is_string(type_: ir.FieldType, *, wide: bool) -> bool:
+    element = ir.element_of(type_)
+    return isinstance(element, ir.String) and element.wide == wide
+
+
+def chars(model: Model, report: Report) -> None:
+    """`char` is not used: it is a uint8 that looks like a text."""
+    for message in sections(model):
+        spans = [field.type_span for field in message.fields if _is_char(field.type)]
+        spans += [_constant_type(one) for one in message.constants if _is_char(one.type)]
+        for span in spans:
+            if span is not None:
+                found = codes.CHAR_TYPE.at(
+                    span,
+                    "`char` is an unsigned number of one byte in ROS 2, not a character",
+                    hint="write `uint8`; bytes, hash and code stay the same",
+                )
+                report.add(msgspec.structs.replace(found, edits=(_as_uint8(span),)))
+
+
+def _as_uint8(span: Span) -> Edit:
+    """Return the edit of a `char`, which leaves the name in its column if there is room."""
+    source = span.source
+    wide = re.compile(r"char(\S*) ( +)").match(source.text, span.start)
+    if wide is None:
+        return Edit(span, "uint8")
+    return Edit(Span(source, span.start, wide.end()), f"uint8{wide[1]}{wide[2]}")
+
+
+def _is_char(type_: ir.FieldType) -> bool:
+    return ir.element_of(type_) == ir.Primitive("char")
+
+
+def _constant_type(constant: ir.Constant) -> Span | None:
+    """Return where a constant's type stands: at the beginning of its line."""
+    span = constant.name_span
+    if span is None:
+        return None
+    line, _ = span.source.position(span.start)
+    start = span.source.line_starts[line - 1]
+    return Span(span.source, start, start + len("char"))
+
+
+def nested_bounds(model: Model, report: Report) -> None:
+    """Bounded texts are not elements of arrays: no middleware looks at their length there."""
+    for message in sections(model):
+        for field in message.fields:
+            element = ir.element_of(field.type)
+            bound = element.bound if isinstance(element, ir.String) else None
+            if bound is not None and element is not field.type and field.type_span:
+                report.add(
+                    codes.UNENFORCED_BOUND.at(
+                        field.type_span,
+                        f"no middleware enforces that each text has at most {bound} characters",
+                        hint="check the length in code; the bound still is part of the type hash",
+                    )
+                )
+
+
+def several_units(model: Model, report: Report) -> None:
+    """A comment has one unit: of several pairs of brackets, ROS 2 takes none as the unit."""
+    for message in sections(model):
+        for field in message.fields:
+            text = "\n".join(field.comment)
+            found = [inside for _, inside in brackets(text)]
+            meant = sum(map(is_unit, found))
+            # a remark such as [0..1] beside the unit leaves it clear to readers
+            unclear = meant > 1 or (meant and REMARK.search(text))
+            if len(found) > 1 and unclear and field.unit is None and field.name_span:
+                report.add(
+                    codes.SEVERAL_UNITS.at(
+                        field.name_span,
+                        f"`{field.name}` has no unit for ROS 2, because its comment has several "
+                        f"pairs of brackets: {first_few((f'[{one}]' for one in found), SHOWN)}",
+                        hint="write the remark with round ones, as in `ignore(IDL405)`"
+                        if REMARK.search(text)
+                        else "put one unit in brackets, and what else there is in words",
+                    )
+                )
+
+
+def removed_types(model: Model, report: Report) -> None:
+    """What is used stays: a later distribution has no such type."""
+    for target, span in _used(model):
+        gone = catalog.removed(target, model.distro)
+        if gone is not None:
+            report.add(
+                codes.REMOVED_STANDARD_TYPE.at(
+                    span,
+                    f"ROS 2 {gone.title} removed `{target}`",
+                    hint=_INSTEAD.get(str(target)) or _INSTEAD.get(target.package),
+                )
+            )
+
+
+def changed_types(model: Model, report: Report) -> None:
+    """What is used stays what it is: in a later distribution it has other fields."""
+    for target, span in _used(model):
+        other = catalog.changed(target, model.distro)
+        if other is not None:
+            report.add(
+                codes.CHANGED_STANDARD_TYPE.at(
+                    span,
+                    f"`{target}` is another message since ROS 2 {other.title}",
+                    hint="nodes of older and newer distributions cannot exchange it; "
+                    f"`idlc breaking --distro {other.name} --against distro:{model.distro.name}` "
+                    "shows what changed",
+                )
+            )
+
+
+def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span]]:
+    """Yield the messages of other packages that fields hold, and where they are named."""
+    for message in sections(model):
+        for field in message.fields:
+            element, span = ir.element_of(field.type), field.type_span
+            if span is None or not isinstance(element, ir.Ref):
+                continue
+            if element.target.package != model.package:
+                yield element.target, span

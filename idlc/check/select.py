@@ -1,0 +1,217 @@
+"""Which warnings a team wants to see: by category, code or path. Errors are always seen."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+from msgspec import Meta
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Edit, Severity
+from idlc.diagnostics.source import Source, Span
+from idlc.language import tree
+from idlc.language.parse import parse
+from idlc.project.settings import Table, Texts, command_table, read_value
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
+    from idlc.project.settings import Config
+
+
+def is_selector(word: str) -> bool:
+    """Return whether a word means any code: `all`, a category, an id, its start or a slug."""
+    return any(_means(word, code) for code in codes.CODES.values())
+
+
+def _means(word: str, code: codes.Code) -> bool:
+    named = codes.find(word)
+    if named is not None:
+        return named is code
+    beginning = word.upper()
+    begins = beginning.startswith("IDL") and code.id.startswith(beginning)
+    return begins or word in ("all", code.category)
+
+
+class Selection(msgspec.Struct, frozen=True):
+    """What is wanted; `select` replaces what is on by default, `ignore` takes away from it.
+
+    `per_path` are pairs of a path, in which `*` and `?` stand for any text, and what to ignore
+    there.
+    """
+
+    select: tuple[str, ...] | None = None
+    ignore: tuple[str, ...] = ()
+    per_path: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def with_lists(self, select: str | None, ignore: str | None) -> Selection:
+        """Return what lists of rules with commas change of it: typed ones come after a file's."""
+        chosen = tuple(select.split(",")) if select else self.select
+        ignored = (*self.ignore, *(ignore.split(",") if ignore else ()))
+        return Selection(chosen, ignored, self.per_path)
+
+    def has(self, code: codes.Code) -> bool:
+        """Return whether a code is switched on."""
+        if self.select is None:
+            chosen = code.default
+        else:
+            chosen = any(_means(word, code) for word in self.select)
+        return chosen and not any(_means(word, code) for word in self.ignore)
+
+    def wants(self, found: Diagnostic) -> bool:
+        """Return whether a problem is to be shown."""
+        code = codes.CODES[found.code]
+        if found.severity is Severity.ERROR or code is codes.IGNORE_WITHOUT_REASON:
+            return True
+        path = found.where[0]
+        return self.has(code) and not any(
+            any(_means(word, code) for word in ignored)
+            for pattern, ignored in self.per_path
+            if fnmatchcase(path, pattern) or fnmatchcase(path, f"*/{pattern}")
+        )
+
+
+# the lengths are bounded, or a long comment without an end would take for ever
+REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
+
+
+class Remark(msgspec.Struct, frozen=True):
+    """One code that a remark names; `lines` are those that it is about, `None` for the file."""
+
+    code: str
+    reason: str
+    span: Span
+    lines: frozenset[int] | None
+    edit: Edit | None
+
+    def silences(self, found: Diagnostic) -> bool:
+        """Return whether a problem is what the remark is about."""
+        if found.code != self.code or found.severity is Severity.ERROR or not self.reason:
+            return False
+        if found.span is None:
+            return self.lines is None and found.path == self.span.source.path
+        if found.span.source.path != self.span.source.path:
+            return False
+        line, _ = found.span.source.position(found.span.start)
+        return self.lines is None or line in self.lines
+
+
+def without_ignored(found: Iterable[Diagnostic], sources: Iterable[Source]) -> Iterator[Diagnostic]:
+    """Yield the problems that no remark silences, then what is wrong with remarks."""
+    remarks = [remark for source in sources for remark in _remarks(source)]
+    used: set[int] = set()
+    for one in found:
+        silent = {at for at, remark in enumerate(remarks) if remark.silences(one)}
+        used |= silent
+        if not silent:
+            yield one
+    for at, remark in enumerate(remarks):
+        if not remark.reason:
+            yield codes.IGNORE_WITHOUT_REASON.at(
+                remark.span,
+                f"this does not say why `{remark.code}` is ignored",
+                hint=f"write the reason after it: `ignore[{remark.code}] REASON`",
+            )
+        elif at not in used:
+            yield _unused(remark)
+
+
+def _unused(remark: Remark) -> Diagnostic:
+    known = codes.CODES.get(remark.code)
+    if known is None:
+        message = f"there is no code `{remark.code}`"
+    elif known.severity is Severity.ERROR:
+        message = f"`{remark.code}` is an error, which cannot be ignored"
+    else:
+        message = f"there is no `{remark.code}` here to ignore"
+    found = codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark")
+    return msgspec.structs.replace(found, edits=(remark.edit,)) if remark.edit else found
+
+
+def switched_off(found: Diagnostic, selection: Selection) -> bool:
+    """Return whether an unused remark is about a rule that was not asked."""
+    if found.code != codes.UNUSED_IGNORE.id or found.span is None:
+        return False
+    known = codes.find(found.span.text)
+    if known is None or known.severity is Severity.ERROR:
+        return False
+    return not selection.has(known)
+
+
+def _remarks(source: Source) -> Iterator[Remark]:
+    if "idlc:" not in source.text:
+        return
+    file = parse(source)
+    for number, section in enumerate(file.sections):
+        in_head = number == 0
+        waiting: list[Remark] = []
+        for line in section.lines:
+            in_head = in_head and bool(line.comment) and not line.code
+            here, _ = source.position(line.start)
+            found = list(_in_line(source, line, here, in_head))
+            if not line.definition and not in_head:
+                waiting += found
+            else:
+                yield from found
+            if line.definition:
+                lines = frozenset({here})
+                yield from (msgspec.structs.replace(one, lines=lines) for one in waiting)
+                waiting = []
+        yield from waiting
+
+
+def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Iterator[Remark]:
+    match = re.search(REMARK, line.comment)
+    if match is None:
+        return
+    start = line.start + len(line.code)
+    listed = re.finditer(r"[^\s,]+", match.group(1))
+    names = [(word.group(), start + match.start(1) + word.start()) for word in listed]
+    edit = _removal(source, line, match) if len(names) == 1 else None
+    for name, at in names:
+        span = Span(source, at, at + len(name))
+        lines = None if in_head else frozenset({number})
+        known = codes.find(name)
+        code = known.id if known else name
+        yield Remark(code, match.group(2).strip(), span, lines, edit)
+
+
+def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:
+    """Return the edit that removes a comment that is nothing but the remark."""
+    if line.comment[: match.start()].strip("# \t"):
+        return None
+    code = len(line.code.rstrip())
+    end = line.start + len(line.code) + len(line.comment)
+    if not code:
+        end += len(line.newline)
+    return Edit(Span(source, line.start + code, min(end, len(source.text))), "")
+
+
+class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):
+    """`[tool.idlc.check]`; without `select`, what is on by default is meant."""
+
+    select: Annotated[tuple[str, ...] | None, Meta(title="a list of strings")] = None
+    ignore: Texts = ()
+    per_path: Table = {}
+
+
+def selection(config: Config, report: Report) -> Selection:
+    """Return which warnings `[tool.idlc.check]` asks for."""
+    table, place = command_table(config, "check", CheckSettings, report)
+    if place is None:
+        return Selection()
+    paths = place._replace(table=f"{place.table}.per-path", shown=f"[{place.table}.per-path]")
+    per_path = {
+        path: read_value(words, Texts, path, paths, report) or ()
+        for path, words in table.per_path.items()
+    }
+    lists = [(place, "select", table.select or ()), (place, "ignore", table.ignore)]
+    for where, key, words in (*lists, *((paths, *one) for one in per_path.items())):
+        for word in words:
+            if not is_selector(word):
+                message = f"`{key}` in {where.shown} has `{word}`, which means no rule"
+                where.wrong(key, message, report)
+    return Selection(table.select, table.ignore, tuple(per_path.items()))

@@ -1,0 +1,297 @@
+"""Advice on names, comments and units; nothing of it changes what a file means."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from itertools import islice
+
+from idlc.check.sections import sections
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Span
+from idlc.model import derive, ir
+from idlc.model.comments import brackets
+from idlc.model.link import Model
+
+# the lengths are bounded, or a long comment without an end would take for ever
+REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")
+
+#: Words of a field's name that ask for a unit, and the unit.
+QUANTITIES = {
+    "acceleration": "m/s^2",
+    "altitude": "m",
+    "angle": "rad",
+    "current": "A",
+    "depth": "m",
+    "distance": "m",
+    "duration": "s",
+    "energy": "J",
+    "force": "N",
+    "frequency": "Hz",
+    "height": "m",
+    "humidity": "%",
+    "length": "m",
+    "mass": "kg",
+    "pitch": "rad",
+    "power": "W",
+    "pressure": "Pa",
+    "radius": "m",
+    "roll": "rad",
+    "speed": "m/s",
+    "temperature": "degC",
+    "timeout": "s",
+    "torque": "N m",
+    "velocity": "m/s",
+    "voltage": "V",
+    "weight": "kg",
+    "width": "m",
+    "yaw": "rad",
+}
+
+#: Units that are not those of REP 103, and those that are.
+_USUAL = {
+    "bar": "Pa",
+    "cm": "m",
+    "deg": "rad",
+    "degree": "rad",
+    "degrees": "rad",
+    "deg/s": "rad/s",
+    "feet": "m",
+    "foot": "m",
+    "ft": "m",
+    "g": "kg",
+    "gram": "kg",
+    "grams": "kg",
+    "h": "s",
+    "hour": "s",
+    "hours": "s",
+    "inch": "m",
+    "inches": "m",
+    "km": "m",
+    "km/h": "m/s",
+    "kmh": "m/s",
+    "knots": "m/s",
+    "kph": "m/s",
+    "mbar": "Pa",
+    "mile": "m",
+    "miles": "m",
+    "millimeter": "m",
+    "millimeters": "m",
+    "min": "s",
+    "minutes": "s",
+    "mm": "m",
+    "mm/s": "m/s",
+    "mph": "m/s",
+    "ms": "s",
+    "msec": "s",
+    "ns": "s",
+    "psi": "Pa",
+    "rpm": "rad/s",
+    "us": "s",
+    "°": "rad",
+    "°/s": "rad/s",
+    "µs": "s",
+}
+
+
+#: Words of names of places on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
+_ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
+
+
+def expects_unit(name: str) -> str | None:
+    """Return the unit that a field of this name should have, `None` if it is no quantity."""
+    words = name.split("_")
+    if words[-1] in (
+        "covariance",
+        "ratio",
+        "factor",
+        "scale",
+        "percentage",
+        "index",
+        "count",
+        "id",
+        "gain",
+    ):
+        return None
+    found = next((QUANTITIES[word] for word in reversed(words) if word in QUANTITIES), None)
+    if found == "m/s" and "angular" in words:
+        return "rad/s"
+    return "rad/s^2" if found == "m/s^2" and "angular" in words else found
+
+
+def unit_of(field: ir.Field) -> str | None:
+    """Return a field's unit as its writer meant it.
+
+    The brackets of `# idlc: ignore[IDL405]` hide it from ROS 2, or are taken for it.
+    """
+    if field.unit is not None and not field.unit.startswith("IDL"):
+        return field.unit
+    pairs = brackets(REMARK.sub("", "\n".join(field.comment)))
+    found = [inside for _, inside in islice(pairs, 2)]
+    return found[0] if len(found) == 1 else None
+
+
+def is_known_by(name: str, unit: str) -> bool:
+    """Return whether a field's name says its unit, or is of what has that unit in ROS as well."""
+    words = name.split("_")
+    if unit in words or re.sub(r"\W", "_", unit) in name:
+        return True
+    return usual_unit(unit) == "rad" and not _ON_EARTH.isdisjoint(words)
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit that one meets, of REP 103 or not."""
+    known = {*QUANTITIES.values(), *_USUAL, *_USUAL.values(), "rad/s^2", "m^2", "m^3", "T", "lx"}
+    return text in known
+
+
+def usual_unit(unit: str) -> str | None:
+    """Return the unit of REP 103 for one that is not of it, `None` for any other text."""
+    text = re.sub(r"\s+", "", unit)
+    return _USUAL.get(text) or _USUAL.get(text.lower() if len(text) > 2 else text)
+
+
+HEADER = ir.Ref(ir.TypeName("std_msgs", "msg", "Header"))
+TIME = ir.Ref(ir.TypeName("builtin_interfaces", "msg", "Time"))
+_SUFFIXES = {
+    "msg": ("Msg", "Message", "Msgs"),
+    "srv": ("Srv", "Service"),
+    "action": ("Action",),
+}
+
+
+def stamped(model: Model, report: Report) -> None:
+    """A message called …Stamped begins with its stamp: `std_msgs/Header header`, or a time."""
+    for interface in model.own:
+        if not isinstance(interface, ir.Message) or not interface.name.name.endswith("Stamped"):
+            continue
+        first = interface.fields[0] if interface.fields else None
+        if first is None or not _is_stamp(first, model):
+            report.add(
+                codes.STAMPED_WITHOUT_HEADER.at(
+                    _top(interface, first),
+                    f"`{interface.name.name}` does not begin with a time stamp",
+                    hint="make `std_msgs/Header header` the first field, where tf and message "
+                    "filters look for it, or `builtin_interfaces/Time stamp`",
+                )
+            )
+
+
+def _is_stamp(field: ir.Field, model: Model) -> bool:
+    """Return whether a field is a stamp, or of a type that is an error anyway."""
+    if isinstance(field.type, ir.Ref) and field.type.target not in model.interfaces:
+        return True
+    is_header = field.type == HEADER and field.name == "header"
+    return is_header or field.type in (TIME, ir.Unknown())
+
+
+def _top(interface: ir.Interface, first: ir.Field | None = None) -> Span:
+    if first is not None and first.type_span is not None:
+        return first.type_span
+    assert interface.source is not None
+    return Span(interface.source, 0, 0)
+
+
+def documented_interfaces(model: Model, report: Report) -> None:
+    """Every file begins with a comment that says what it is for."""
+    for interface in model.own:
+        if interface.source and not any(part.comment for part in derive.sections(interface)):
+            what = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
+            report.add(
+                codes.UNDOCUMENTED_INTERFACE.at(
+                    _top(interface),
+                    f"nothing says what {what} `{interface.name.name}` is for",
+                    hint="begin the file with a comment and an empty line",
+                )
+            )
+
+
+def documented_fields(model: Model, report: Report) -> None:
+    """Every field has a comment or a unit, or stands in a message whose comment is all there is."""
+    for message in sections(model):
+        for field in message.fields:
+            if not field.comment and not unit_of(field) and field.name_span:
+                report.add(
+                    codes.UNDOCUMENTED_FIELD.at(
+                        field.name_span,
+                        f"nothing says what `{field.name}` means",
+                        hint="write a comment above or beside it",
+                    )
+                )
+
+
+def _quantities(model: Model) -> Iterable[ir.Field]:
+    """Return the fields that hold floating-point numbers."""
+    floats = (ir.Primitive("float32"), ir.Primitive("float64"))
+    for message in sections(model):
+        yield from (field for field in message.fields if ir.element_of(field.type) in floats)
+
+
+def missing_units(model: Model, report: Report) -> None:
+    """A number that is a physical quantity by its name says its unit."""
+    for field in _quantities(model):
+        unit = expects_unit(field.name)
+        if unit and not unit_of(field) and field.name_span and not _says(field.comment, unit):
+            report.add(
+                codes.MISSING_UNIT.at(
+                    field.name_span,
+                    f"`{field.name}` has no unit",
+                    hint=f"write it in brackets, as in `# [{unit}]`",
+                )
+            )
+
+
+def _says(comment: Iterable[str], unit: str) -> bool:
+    """Return whether a comment names a unit without the brackets."""
+    return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
+
+
+def unusual_units(model: Model, report: Report) -> None:
+    """Units are those of REP 103: metres, radians, seconds."""
+    for field in _quantities(model):
+        unit = unit_of(field)
+        usual = usual_unit(unit) if unit else None
+        if unit and usual and field.name_span and not is_known_by(field.name, unit):
+            report.add(
+                codes.UNUSUAL_UNIT.at(
+                    field.name_span,
+                    f"`{field.name}` is in [{unit}]",
+                    hint=f"ROS uses [{usual}] (REP 103)",
+                )
+            )
+
+
+def constant_prefixes(model: Model, report: Report) -> None:
+    """Constants that are values of one thing share the first word of their names."""
+    for message in sections(model):
+        firsts = Counter(constant.name.partition("_")[0] for constant in message.constants)
+        names = {word.upper() for field in message.fields for word in field.name.split("_")}
+        whole = [constant for constant in message.constants if isinstance(constant.value, int)]
+        for constant in whole:
+            first = constant.name.partition("_")[0]
+            alone = firsts[first] == 1 and len(whole) > 1 and first not in names
+            if alone and constant.name_span:
+                report.add(
+                    codes.CONSTANT_WITHOUT_PREFIX.at(
+                        constant.name_span,
+                        f"`{constant.name}` does not say what it is a value of",
+                        hint=f"begin it with the name of its field, as in `MODE_{constant.name}`",
+                    )
+                )
+
+
+def suffixes(model: Model, report: Report) -> None:
+    """The name of a file does not repeat what its extension says."""
+    for interface in model.own:
+        name, kind = interface.name.name, interface.name.kind
+        suffix = next((one for one in _SUFFIXES[kind] if name.endswith(one) and name != one), None)
+        if suffix and interface.source:
+            report.add(
+                codes.REDUNDANT_SUFFIX.of(
+                    interface.source.path,
+                    f"`{name}.{kind}` says twice that it is a .{kind} file",
+                    hint=f"call it `{name.removesuffix(suffix)}.{kind}`, unless it is in use",
+                )
+            )

@@ -1,1 +1,0 @@
-"""Checks: rules over a linked model and the package around it, all listed in `registry`."""

@@ -1,0 +1,73 @@
+"""`idlc check`."""
+
+from __future__ import annotations
+
+import click
+
+from idlc.cli import completion, options
+
+EPILOG = """\
+Example:
+
+\b
+  mkdir -p demo/msg
+  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
+  idlc check demo
+"""
+
+
+@click.command("check", epilog=EPILOG)
+@click.argument("paths", metavar="[PATH]...", nargs=-1, type=click.Path())
+@click.option(
+    "--select",
+    metavar="RULE,...",
+    shell_complete=completion.rules,
+    help="Only these: categories, codes, their names, `all`.",
+)
+@click.option("--ignore", metavar="RULE,...", shell_complete=completion.rules, help="Not these.")
+@click.option("--fix", is_flag=True, help="Fix what can be fixed without harm.")
+@click.option("--strict", is_flag=True, help="Fail on warnings as well.")
+@click.option("--statistics", is_flag=True, help="Show only how often each rule was broken.")
+@click.option(
+    "--prefix",
+    metavar="DIR",
+    type=click.Path(),
+    help="Look at what is installed in a folder instead: whether C++ tools can load it.",
+)
+@options.package
+@options.include
+@options.exclude
+@options.distros
+@options.report_style
+def command(
+    paths: tuple[str, ...],
+    select: str | None,
+    ignore: str | None,
+    fix: bool,
+    strict: bool,
+    statistics: bool,
+    prefix: str | None,
+    package: str | None,
+    include: tuple[str, ...],
+    exclude: tuple[str, ...],
+    distro: str | None,
+    style: str,
+) -> int:
+    """Report every problem of interface files and of the packages around them.
+
+    PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
+    or .action file; without it, `paths` in pyproject.toml, or the working folder.
+
+    For several distributions, each problem is told once, with those for which it holds.
+
+    Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
+    """
+    from idlc.cli.direct import Wishes, check_paths
+
+    options.check_rules(select, ignore)
+    if prefix is not None and (paths or fix):
+        raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
+    wishes = Wishes(
+        select, ignore, fix, strict, package, include, exclude, style, statistics, prefix, distro
+    )
+    return check_paths(paths, wishes)

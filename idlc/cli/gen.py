@@ -1,0 +1,222 @@
+"""`idlc gen`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from idlc.cli import completion, options, output, reports
+from idlc.diagnostics.formats import DOCUMENTS
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.terminal import counted, summary
+from idlc.diagnostics.text import one_line
+from idlc.generate.gen import GenOptions, gen
+from idlc.generate.package import Generated
+from idlc.project.find import Stamp, snapshot, stamps
+from idlc.recordings.find import files
+
+
+def refuse(report: Report, style: str) -> None:
+    """Show problems that leave nothing to be done."""
+    if style == "text":
+        output.show(report, style, sys.stderr)
+    else:
+        _document(report, style)
+
+
+def once(wanted: GenOptions, style: str) -> int:
+    """Run once, show what happened and return the exit status."""
+    report = Report()
+    packages = gen(wanted, report)
+    if style == "text":
+        _tell(report, packages, wanted.check)
+    else:
+        _document(report, style, packages, check=wanted.check)
+    return output.status(report)
+
+
+def _document(
+    report: Report, style: str, packages: Sequence[Generated] = (), *, check: bool = False
+) -> None:
+    """Write what happened in a format for programs."""
+    if style != "json":
+        from idlc.check.run import Checked  # with its rules, which a run does without
+
+        folders = tuple(package.out for package in packages)
+        reports.write(report, style, Checked(folders), sys.stdout, command="gen")
+        return
+    output.show(report, style, sys.stdout)
+    for package in packages:
+        output.fact(sys.stdout, "package", **package._asdict(), check=check)
+    output.fact(sys.stdout, "summary", **output.counts(report))
+
+
+def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    if report.had_errors:
+        outcome = "" if check else "; nothing was written"
+        sys.stderr.write(f"{summary(report)}{outcome}\n")
+    else:
+        for package in packages:
+            sys.stdout.write(_line(package, check))
+
+
+def _line(package: Generated, check: bool) -> str:
+    """Return the line about a package: what it is, and what was done if only a part was written."""
+    done = []
+    if check:
+        done.append("up to date")
+    elif not package.written and not package.removed:
+        done.append("unchanged")
+    elif package.written < package.files or package.removed:
+        done += [f"{package.written} written"] if package.written else []
+        done += [f"{package.removed} removed"] if package.removed else []
+    note = f" ({', '.join(done)})" if done else ""
+    needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
+    return (
+        f"{package.package}: {counted(package.interfaces, 'interface')} → "
+        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}{needs}\n"
+    )
+
+
+INTERVAL = 0.25
+
+
+def run_again(wanted: GenOptions, style: str) -> int:
+    """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
+    try:
+        seen = _snapshot(wanted)
+        once(wanted, style)
+        sys.stderr.write(f"watching {one_line(', '.join(wanted.paths))}; Ctrl-C ends\n")
+        while True:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            time.sleep(INTERVAL)
+            now = _snapshot(wanted)
+            if now == seen:
+                continue
+            while (later := _after(wanted)) != now:
+                now = later
+            seen = now
+            once(wanted, style)
+    except KeyboardInterrupt:
+        sys.stderr.write("\n")
+        return 0
+
+
+def _after(wanted: GenOptions) -> dict[str, Stamp]:
+    """Return a snapshot from a moment later, so that a burst of changes counts as one."""
+    time.sleep(INTERVAL)
+    return _snapshot(wanted)
+
+
+def _snapshot(wanted: GenOptions) -> dict[str, Stamp]:
+    return snapshot(wanted.paths, wanted.scope.include) | stamps(files(wanted.paths))
+
+
+EPILOG = """\
+Example:
+
+\b
+  mkdir -p demo/msg
+  echo 'float64 speed 0.5  # [m/s]' > demo/msg/Drive.msg
+  idlc gen demo -o out/demo
+
+All options can be kept in pyproject.toml:
+
+\b
+  [tool.idlc]
+  paths = ["demo"]
+  out = "out/demo"
+"""
+
+
+@click.command("gen", epilog=EPILOG)
+@click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
+@click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
+@click.option(
+    "--ament",
+    metavar="PREFIX",
+    type=click.Path(),
+    default="",
+    help="Install into a prefix, complete for ROS 2 and its C++ tools.",
+)
+@click.option(
+    "--topic",
+    "topics",
+    metavar="NAME",
+    multiple=True,
+    shell_complete=completion.topics,
+    help="Of recordings, only the types of this topic. May be repeated.",
+)
+@options.package
+@options.include
+@options.exclude
+@options.distro
+@click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
+@click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
+@click.option(
+    "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
+)
+@click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
+@options.report_style
+def command(style: str, watch: bool, **given: Any) -> int:
+    """Compile interface files into a Python package.
+
+    PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
+    packages, or the name of a package or type that is installed or built in: std_msgs/msg/Header.
+    REC is a recording, an .mcap or .db3 file or the folder of a bag: all that its topics need.
+
+    OUT is the package for one package. Several are written to OUT/NAME each. With PREFIX, which any
+    number of packages can share, there is nothing to build: `source PREFIX/setup.bash`. In a
+    package with a setup.py, PATH and OUT default to the package and the folder that setup.py takes
+    it from.
+    """
+    from idlc.generate.gen import in_package, with_settings
+    from idlc.project.scope import scope
+    from idlc.project.settings import load_settings
+
+    report = Report()
+    settings = load_settings(report)
+    if report.had_errors:
+        refuse(report, style)
+        return output.status(report)
+    package = given["package"]
+    words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
+    again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
+    asked = GenOptions(**given, scope=scope(settings, *words), again=again)
+    wanted = in_package(with_settings(asked, settings))
+    if not wanted.paths or not (wanted.out or wanted.ament):
+        missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
+        raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
+    _refuse_in_vain(wanted.paths, package, wanted.topics)
+    if wanted.check and (watch or wanted.force):
+        raise click.UsageError(
+            "--check writes nothing, so it goes with neither --watch nor --force"
+        )
+    if watch and style in DOCUMENTS:
+        raise click.UsageError("--watch goes with --format text and json only")
+    if watch:
+        return run_again(wanted, style)
+    return once(wanted, style)
+
+
+def _refuse_in_vain(paths: Sequence[str], package: str | None, topics: Sequence[str]) -> None:
+    """Refuse options that mean nothing for what was given."""
+    from idlc.project.find import is_path
+    from idlc.recordings.find import divided
+
+    recordings, others = divided(paths) if package or topics else ((), ())
+    if topics and not recordings:
+        raise click.UsageError("--topic is for recordings, and none was given")
+    if package and not any(map(is_path, others)):
+        what = "what was recorded" if recordings else "what is installed"
+        raise click.UsageError(
+            f"--package is for files, and none was given; {what} keeps the name that messages have"
+        )

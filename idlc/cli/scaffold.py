@@ -1,0 +1,105 @@
+"""`idlc scaffold`: the group of its commands."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+from idlc.cli import options
+from idlc.cli.app import LazyGroup
+
+EPILOG = """\
+Example:
+
+\b
+  idlc scaffold package my_robot
+  cd my_robot
+  idlc scaffold interface msg Command 'string verb' 'float32 speed  # [m/s]'
+  idlc scaffold node commander --publisher Command:command@2
+  idlc gen
+"""
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+#: Each command with its line in the overview.
+COMMANDS = {
+    "package": "Write a new package.",
+    "interface": "Write a .msg, .srv or .action file.",
+    "node": "Write a node with its test, and enter it in its package.",
+    "templates": "List the templates of nodes and packages, or copy one to change it.",
+}
+
+
+#: What people type for them, too.
+MEANT = {
+    **dict.fromkeys(("pkg", "project", "workspace"), "package"),
+    **dict.fromkeys(("msg", "srv", "action", "message", "service", "type"), "interface"),
+    **dict.fromkeys(("publisher", "subscriber", "client", "server"), "node"),
+    "template": "templates",
+}
+
+
+@click.group(
+    "scaffold",
+    cls=LazyGroup,
+    overview=COMMANDS,
+    modules="idlc.cli.scaffold_",
+    meant=MEANT,
+    epilog=EPILOG,
+)
+def command() -> None:
+    """Write packages, interfaces and nodes, and enter them where they belong.
+
+    Running a command twice changes nothing the second time.
+    """
+
+
+def writing(function: Command) -> Command:
+    """Add the options of a command that writes files, perhaps by templates."""
+    dry = click.option("--dry-run", is_flag=True, help="Write nothing; show the difference.")
+    force = click.option(
+        "--force", is_flag=True, help="Replace existing files that differ, keeping copies."
+    )
+    templates = click.option(
+        "--templates",
+        metavar="DIR",
+        type=click.Path(file_okay=False),
+        help="Use the templates of this folder instead of those of the same names.",
+    )
+    return dry(force(templates(function)))
+
+
+def common(function: Command) -> Command:
+    """Add the options of a command that writes files and knows interfaces."""
+    return options.include(writing(function))
+
+
+def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
+    """Show what a command did and return the exit status; `hints` are the commands after it."""
+    from idlc.cli import output
+    from idlc.cli.output import program
+    from idlc.diagnostics.terminal import summary
+
+    output.show(report, "text", sys.stderr)
+    if result is None:
+        sys.stderr.write(f"{summary(report)}; nothing was written\n")
+        return output.status(report)
+    if result.diff:
+        sys.stdout.writelines(result.diff)
+        return output.status(report)
+    folder = "" if result.folder in ("", ".") else f"{result.folder}/"
+    for done in result.done:
+        if done.what != "unchanged":
+            sys.stdout.write(f"{done.what} {folder}{done.path}\n")
+    if all(done.what == "unchanged" for done in result.done):
+        sys.stdout.write("nothing to do: everything is there\n")
+    sys.stdout.writelines(f"note: {note}\n" for note in result.notes)
+    if any(done.what != "unchanged" for done in result.done):
+        if result.following:
+            hints = (shlex.join([*program().split(), *result.following]), *hints)
+        sys.stdout.writelines(f"next: {hint}\n" for hint in hints)
+    return output.status(report)

@@ -1,0 +1,60 @@
+"""`idlc scaffold interface`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from idlc.cli.scaffold import common, finish
+
+EPILOG = """\
+Example, within a package:
+
+\b
+  idlc scaffold interface msg RobotCommand \\
+      'string command_type' 'float32 linear_velocity_x  # [m/s]'
+  idlc scaffold interface srv AddTwoInts 'int64 a' 'int64 b' --- 'int64 sum'
+"""
+
+
+@click.command("interface", epilog=EPILOG, context_settings={"ignore_unknown_options": True})
+@click.argument("kind", type=click.Choice(["msg", "srv", "action"]))
+@click.argument("name", metavar="NAME")
+@click.argument("fields", metavar="FIELD...", nargs=-1, type=click.UNPROCESSED)
+@click.option("--comment", default="", help="What the interface is for.")
+@common
+def command(
+    kind: str,
+    name: str,
+    fields: tuple[str, ...],
+    comment: str,
+    include: tuple[str, ...],
+    **given: Any,
+) -> int:
+    """Write an interface of the package that the working folder belongs to.
+
+    FIELD is a line of the file, such as 'float32 speed 0.5  # [m/s]'; the parts of services and
+    actions are separated by ---.
+    """
+    from idlc.diagnostics.report import Report
+    from idlc.model.ir import KINDS
+    from idlc.scaffold.changes import Settings
+    from idlc.scaffold.interface import (
+        check_fields,
+        check_interface_name,
+        interface,
+        interface_text,
+    )
+
+    report = Report()
+    try:
+        check_interface_name(name)
+        check_fields(fields)
+        interface_text(kind, fields, comment)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    settings = Settings(include=include, **given)
+    known = KINDS[KINDS.index(kind)]
+    result = interface(known, name, fields, comment, settings, report)
+    return finish(result, report)

@@ -1,0 +1,212 @@
+"""`idlc scaffold node`."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from idlc.cli import completion
+from idlc.cli.scaffold import common, finish
+from idlc.model import ir
+from idlc.scaffold import spec
+from idlc.scaffold.roles import ROLES
+from idlc.scaffold.roles.role import DEFAULT_QOS, QOS_NAMES, Endpoint, Role
+
+DONE = "done"
+PARAMETER = "parameter"
+#: For each kind of interface: the question for the type, and that for the name.
+_QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
+    "msg": ("Message type, such as std_msgs/String", "Topic"),
+    "srv": ("Service type, such as std_srvs/SetBool", "Service name"),
+    "action": ("Action type, such as Countdown", "Action name"),
+}
+
+Answer = TypeVar("Answer")
+#: Raises ValueError for an interface that there is not.
+CheckType = Callable[[Role, str], None]
+
+
+def ask(name: str, check_type: CheckType) -> spec.Node:
+    """Return the node that the answers describe; every wrong answer is asked for again at once."""
+    click.echo(f"What should {name} do?")
+    roles = {role.answer: role for role in ROLES}
+    choices = click.Choice([*roles, PARAMETER, DONE])
+    endpoints: list[Endpoint] = []
+    parameters: list[spec.Parameter] = []
+    while (chosen := click.prompt(f"Add ({DONE} to finish)", type=choices, default=DONE)) != DONE:
+        if chosen == PARAMETER:
+            parameters.append(_answer("Parameter as NAME:TYPE=DEFAULT", spec.parameter))
+        else:
+            endpoints.append(_endpoint(roles[chosen], check_type))
+    lifecycle = click.confirm("Make it a lifecycle node?", default=False, prompt_suffix=" ")
+    return spec.Node(name, "", spec.in_order(endpoints), tuple(parameters), lifecycle)
+
+
+def _answer(
+    question: str, understand: Callable[[str], Answer], default: str | None = None
+) -> Answer:
+    """Ask until the answer can be understood; return what it means."""
+
+    def process(text: str) -> Answer:
+        try:
+            return understand(text)
+        except ValueError as error:
+            raise click.BadParameter(str(error)) from error
+
+    answer: Answer = click.prompt(question, default=default, value_proc=process)
+    return answer
+
+
+def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
+    """Ask for what the value of the role's option says."""
+
+    def known(text: str) -> str:
+        check_type(role, text)
+        return text
+
+    def checked(value: str) -> str:
+        spec.endpoint(role, value)
+        return value
+
+    value = ""
+    if role.kind:
+        type_question, name_question = _QUESTIONS[role.kind]
+        type_ = _answer(type_question, known)
+        value = _answer(name_question, lambda name: checked(f"{type_}:{name}"))
+    question = role.question
+    if question and not (question.separator and question.separator in value):
+        head = f"{value}{question.separator}"
+        value = _answer(question.text, lambda answer: checked(f"{head}{answer}"), question.default)
+    if role.kind != "msg":
+        return spec.endpoint(role, value)
+    preset = click.prompt(
+        "Quality of service", type=click.Choice(QOS_NAMES), default=DEFAULT_QOS.name
+    )
+    return spec.endpoint(role, value, preset)
+
+
+EPILOG = """\
+TYPE is an interface of your own package (RobotCommand) or any other (std_msgs/String). An
+endpoint can be followed by its --qos. Without options, on a terminal, you are asked.
+
+Example, within a package:
+
+\b
+  idlc scaffold node talker --publisher std_msgs/String:chatter@2 --qos latched
+  idlc scaffold node listener --subscriber std_msgs/String:chatter --param verbose:bool=true
+"""
+
+
+def interactive() -> bool:
+    """Return whether there is somebody to ask."""
+    return sys.stdin.isatty() and sys.stdout.isatty()
+
+
+class NodeCommand(click.Command):
+    """A command whose --qos belongs to the endpoint before it."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Note to which endpoint each quality of service belongs, then go on as usual."""
+        if not ctx.resilient_parsing:
+            _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+            ctx.meta[_OWNERS] = _owners([one.name or "" for one in order], ctx)
+        return super().parse_args(ctx, args)
+
+
+#: Where the endpoints that have a --qos are kept: for each, its role and its place in that.
+_OWNERS = "idlc.qos"
+
+
+def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
+    """Return which endpoint each --qos comes after; `order` names the options as given."""
+    names = {role.name for role in ROLES if role.kind}
+    counts: Counter[str] = Counter()
+    last: tuple[str, int] | None = None
+    owners = []
+    for name in order:
+        if name in names:
+            last = (name, counts[name])
+            counts[name] += 1
+        elif name == "qos":
+            if last is None:
+                raise click.UsageError("--qos comes after the endpoint that it is for", ctx)
+            owners.append(last)
+    return owners
+
+
+def _role_options(function: Any) -> Any:
+    for role in reversed(ROLES):
+        function = click.option(
+            role.option,
+            role.name,
+            metavar=role.metavar,
+            multiple=True,
+            shell_complete=completion.endpoint if role.kind else None,
+            help=role.help,
+        )(function)
+    return function
+
+
+@click.command("node", cls=NodeCommand, epilog=EPILOG)
+@click.argument("name", metavar="NAME")
+@_role_options
+@click.option(
+    "--param", "parameters", metavar="NAME:TYPE=DEFAULT", multiple=True, help="Declare a parameter."
+)
+@click.option(
+    "--qos",
+    "qos",
+    metavar="|".join(QOS_NAMES),
+    multiple=True,
+    shell_complete=lambda _, __, word: [one for one in QOS_NAMES if one.startswith(word)],
+    help="The quality of service of the endpoint before it.",
+)
+@click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
+@click.option("--launch/--no-launch", default=True, help="Enter it in the launch file, or not.")
+@common
+def command(name: str, **given: Any) -> int:
+    """Write a node of the package that the working folder belongs to.
+
+    Writes the module and its test, and adds the command to setup.py, the packages that it needs
+    to package.xml and the node to the launch file, unless it does one thing and ends.
+    """
+    from idlc.diagnostics.report import Report
+    from idlc.scaffold import changes, new_node
+    from idlc.scaffold.changes import Settings
+
+    shared = ("dry_run", "force", "include", "templates", "launch")
+    settings = Settings(**{key: given[key] for key in shared})
+    asked = any(given[role.name] for role in ROLES) or given["parameters"] or given["lifecycle"]
+    try:
+        spec.check_name(name)
+        if not asked and interactive():
+            wanted = ask(name, lambda role, type_: changes.check(role, type_, settings))
+        else:
+            owners = click.get_current_context().meta[_OWNERS]
+            wanted = _wanted(name, given, dict(zip(owners, given["qos"], strict=True)))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    report = Report()
+    result = new_node.node(wanted, settings, report)
+    folder = "" if result is None or result.folder == "." else f"{result.folder}/"
+    python = Path(sys.executable).name
+    install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
+    test = f"{python} -m pytest {folder}test/test_{name}.py"
+    return finish(result, report, (*install, test))
+
+
+def _wanted(name: str, given: dict[str, Any], presets: dict[tuple[str, int], str]) -> spec.Node:
+    """Return the node that the command line describes."""
+    endpoints = (
+        spec.endpoint(role, value, presets.get((role.name, n)))
+        for role in ROLES
+        for n, value in enumerate(given[role.name])
+    )
+    parameters = tuple(map(spec.parameter, given["parameters"]))
+    return spec.Node(name, "", tuple(endpoints), parameters, given["lifecycle"])

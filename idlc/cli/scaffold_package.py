@@ -1,0 +1,91 @@
+"""`idlc scaffold package`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from idlc.cli.scaffold import common, finish
+
+EPILOG = """\
+Examples:
+
+\b
+  idlc scaffold package my_robot --maintainer 'Ada' --email ada@example.com
+  idlc scaffold package --interfaces my_msgs Drive srv/Ask
+"""
+BUILD_TYPES = ("ament_python", "ament_cmake")
+LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
+
+
+@click.command("package", epilog=EPILOG)
+@click.argument("name", metavar="NAME")
+@click.argument("starters", metavar="[INTERFACE]...", nargs=-1)
+@click.option("--description", default="", help="What the package is for, in a sentence.")
+@click.option("--maintainer", help="Who answers for it; git's user.name if not given.")
+@click.option("--email", help="The maintainer's address; git's user.email if not given.")
+@click.option("--license", "licence", type=click.Choice(LICENSES))
+@click.option(
+    "--interfaces",
+    "--interfaces-only",
+    "interfaces_only",
+    is_flag=True,
+    help="Only interfaces, which CMake builds for nodes in any language, and pip for Python. "
+    "INTERFACE names those to begin with, such as `Drive` or `srv/Ask`.",
+)
+@click.option(
+    "--build-type",
+    type=click.Choice(BUILD_TYPES),
+    help="ament_python is for nodes in Python and their interfaces; ament_cmake compiles "
+    "interfaces for C++ as well, and goes with --interfaces.",
+)
+@click.option("-C", "--folder", metavar="DIR", default=".", help="Where to make it.")
+@common
+def command(
+    name: str,
+    starters: tuple[str, ...],
+    interfaces_only: bool,
+    build_type: str | None,
+    folder: str,
+    **given: Any,
+) -> int:
+    """Write a package that builds with colcon and installs with pip.
+
+    Interfaces in its msg/, srv/ and action/ folders are compiled whenever it is built.
+    """
+    from idlc.cli.output import program
+    from idlc.diagnostics.report import Report
+    from idlc.project.git import setting
+    from idlc.scaffold.changes import Settings
+    from idlc.scaffold.interface import starter
+    from idlc.scaffold.package import Package, check_package_name, package
+
+    if build_type == "ament_cmake" and not interfaces_only:
+        raise click.UsageError("--build-type ament_cmake goes with --interfaces")
+    if interfaces_only and build_type == "ament_python":
+        raise click.UsageError(
+            "--interfaces is for ament_cmake; ament_python packages can have interfaces, too"
+        )
+    if starters and not interfaces_only:
+        raise click.UsageError("interfaces to begin with go with --interfaces")
+    try:
+        check_package_name(name)
+        examples = dict(map(starter, (starters or ("Example",)) if interfaces_only else ()))
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
+    report = Report()
+    wanted = Package(
+        name,
+        given["description"] or f"The package {name}.",
+        given["maintainer"] or setting("user.name") or "Your Name",
+        given["email"] or setting("user.email") or "you@example.com",
+        given["licence"] or LICENSES[0],
+        BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
+    )
+    shared = {key: given[key] for key in ("dry_run", "force", "include", "templates")}
+    chosen = {"license" if key == "licence" else key for key, value in given.items() if value}
+    chosen |= {"starters"} if starters else set()
+    result = package(wanted, folder, Settings(**shared), report, examples, chosen)
+    inside = name if folder in ("", ".") else f"{folder}/{name}"
+    return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

@@ -1,0 +1,121 @@
+"""`idlc show`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import click
+
+from idlc.cli import completion, options, output
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import display_width, one_line
+from idlc.project.scope import Scope
+from idlc.recordings.show import TopicFacts, definitions, topics
+
+#: Characters of a hash that people compare.
+SHORT = len("RIHS01_") + 8
+HEAD = ("topic", "type", "messages", "hash", "here")
+
+
+def show_recording(
+    path: str, wanted: Sequence[str], style: str, scope: Scope, report: Report
+) -> int:
+    """Show the topics of a recording, or the definitions of wanted ones; return the exit status."""
+    if wanted:
+        output.texts(definitions(path, wanted, style, scope, report), style, sys.stdout)
+    elif style not in ("text", "json"):
+        raise click.UsageError(f"--format {style} shows types: name a topic")
+    else:
+        found = topics(path, scope, report)
+        if style == "json":
+            for one in found:
+                output.fact(sys.stdout, "topic", **one._asdict())
+        else:
+            sys.stdout.writelines(_table(found))
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    return output.status(report)
+
+
+def _table(found: Sequence[TopicFacts]) -> list[str]:
+    rows = [HEAD, *map(_row, found)] if found else []
+    widths = [max(map(display_width, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(_padded, row, widths, range(len(row)))).rstrip() + "\n" for row in rows]
+
+
+def _row(one: TopicFacts) -> tuple[str, ...]:
+    count = "?" if one.messages is None else str(one.messages)
+    hash_ = one_line(one.hash or "-")
+    here = one.here if one.definition else f"{one.here}; no definition in the recording"
+    name = one_line(one.name)
+    # lines that begin with other characters may be commands to a CI system
+    name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
+    return name, one_line(one.type_name), count, hash_[:SHORT], here
+
+
+def _padded(text: str, width: int, column: int) -> str:
+    space = " " * (width - display_width(text))
+    return space + text if HEAD[column] == "messages" else text + space
+
+
+FORMATS = ("text", "json", "ros2idl", "jsonschema", "mcap")
+
+EPILOG = """\
+Example:
+
+\b
+  idlc show geometry_msgs/msg/PoseStamped
+"""
+
+
+@click.command("show", epilog=EPILOG)
+@click.argument(
+    "wanted",
+    metavar="TYPE|PATH|REC",
+    type=click.Path(),
+    shell_complete=completion.types_and_paths,
+)
+@click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
+@click.option(
+    "--format",
+    "style",
+    type=click.Choice(FORMATS),
+    default="text",
+    show_default=True,
+    help="For people, or for other tools: facts as JSON, IDL, a JSON Schema, an MCAP schema.",
+)
+@options.package
+@options.include
+@options.distro
+def command(
+    wanted: str,
+    topics: tuple[str, ...],
+    style: str,
+    package: str | None,
+    include: tuple[str, ...],
+    distro: str | None,
+) -> int:
+    """Show an interface with the messages in it and all comments.
+
+    REC is a recording, an .mcap or .db3 file or the folder of a bag: of that, its topics with their
+    types, counts and type hashes are shown, and whether the types known here are the same; or, with
+    TOPIC, the definitions of their types.
+    """
+    from idlc.documents.show import show
+    from idlc.project.scope import scope
+    from idlc.project.settings import load_settings
+    from idlc.recordings.find import is_recording
+
+    report = Report()
+    settings = load_settings(report)
+    where = scope(settings, package, include, distro=distro)
+    if is_recording(wanted) and not report.had_errors:
+        return show_recording(wanted, topics, style, where, report)
+    if topics:
+        raise click.UsageError(f"`{wanted}` is no recording, so it has no topics")
+    texts = [] if report.had_errors else show(wanted, style, where, report)
+    output.texts(texts, style, sys.stdout)
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    return output.status(report)

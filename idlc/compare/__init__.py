@@ -1,0 +1,1 @@
+"""Changes between two versions of interfaces, and what they break."""

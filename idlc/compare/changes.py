@@ -1,0 +1,217 @@
+"""Which elements of two versions are the same: kept, renamed, moved, removed or added."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+
+from idlc.diagnostics.codes import Code
+from idlc.diagnostics.report import Diagnostic, Label
+from idlc.diagnostics.source import Span
+from idlc.model import ir
+from idlc.model.describe import individual
+
+Level: TypeAlias = Literal["wire", "hash", "source", "behaviour"]
+
+#: What a change can break, the worst first: bytes written before are read wrongly or not at all;
+#: RIHS01 differs, so a middleware may not deliver messages between the two versions; Python or C++
+#: code that used it fails; the same code does something else.
+LEVELS: tuple[Level, ...] = ("wire", "hash", "source", "behaviour")
+
+
+class Change(NamedTuple):
+    """A difference that breaks something, with its place in the new version and in the old.
+
+    `subject` is what changed, such as `pkg/msg/Name.field`; `cause` is the other type whose change
+    it follows from. A change without a `span` has the `path` of its file; `place` is where that
+    would be, if it is not there.
+    `detail` is text of several lines.
+    """
+
+    code: Code
+    subject: str
+    message: str
+    levels: frozenset[Level]
+    span: Span | None = None
+    old: Span | None = None
+    path: str = ""
+    hint: str | None = None
+    cause: str = ""
+    detail: str = ""
+    place: str = ""
+
+    def without(self, level: Level) -> Change:
+        """Return the change with a level that turned out not to be true."""
+        return self._replace(levels=self.levels - {level})
+
+    @property
+    def diagnostic(self) -> Diagnostic:
+        """The change as a problem to show."""
+        label = (Label(self.old, "this is what it was"),) if self.old and self.span else ()
+        return Diagnostic(
+            code=self.code.id,
+            severity=self.code.severity,
+            message=self.message,
+            span=self.span,
+            path=self.path,
+            labels=label,
+            hint=self.hint,
+            detail=self.detail,
+            place=self.place,
+            levels=tuple(level for level in LEVELS if level in self.levels),
+        )
+
+
+class Named(Protocol):
+    """Something that is known by its name."""
+
+    @property
+    def name(self) -> str:
+        """The name."""
+
+
+T = TypeVar("T", bound=Named)
+
+
+@dataclass(frozen=True)
+class Pairing(Generic[T]):
+    """`kept` pairs have one name, `renamed` ones two; `moved` are names of kept elements."""
+
+    kept: list[tuple[T, T]]
+    renamed: list[tuple[T, T]]
+    moved: frozenset[str]
+    removed: list[T]
+    added: list[T]
+
+
+def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -> Pairing[T]:
+    """Return what became of the elements of `old`, whose names must differ, in those of `new`.
+
+    An element that disappeared counts as renamed if one of the same content appeared in its
+    place.
+    """
+    places = {element.name: place for place, element in enumerate(new)}
+    common = [element for element in old if element.name in places]
+    order = [places[element.name] for element in common]
+    steady = {order[at] for at in _longest_increasing(order)}
+    kept = [(element, new[places[element.name]]) for element in common]
+    moved = frozenset(element.name for element in common if places[element.name] not in steady)
+    renamed = list(_renamed(old, new, moved, content))
+    gone = {id(one) for one, _ in renamed}
+    come = {id(one) for _, one in renamed}
+    names = {element.name for element in common}
+    return Pairing(
+        kept,
+        renamed,
+        moved,
+        [one for one in old if one.name not in names and id(one) not in gone],
+        [one for one in new if one.name not in names and id(one) not in come],
+    )
+
+
+def _longest_increasing(numbers: Sequence[int]) -> list[int]:
+    """Return the positions of a longest increasing subsequence."""
+    tails: list[int] = []
+    ends: list[int] = []
+    before: list[int | None] = []
+    for at, number in enumerate(numbers):
+        place = bisect_left(tails, number)
+        before.append(ends[place - 1] if place else None)
+        tails[place : place + 1] = [number]
+        ends[place : place + 1] = [at]
+    found: list[int] = []
+    step = ends[-1] if ends else None
+    while step is not None:
+        found.append(step)
+        step = before[step]
+    return found[::-1]
+
+
+def _renamed(
+    old: Sequence[T], new: Sequence[T], moved: frozenset[str], content: Callable[[T], Hashable]
+) -> Iterator[tuple[T, T]]:
+    """Yield the pairs of like elements in each gap between those that kept name and order."""
+    for gone, come in _gaps(old, new, moved):
+        candidates: dict[Hashable, deque[int]] = {}
+        for at, other in enumerate(come):
+            candidates.setdefault(content(other), deque()).append(at)
+        first = 0
+        for one in gone:
+            like = candidates.get(content(one), deque())
+            while like and like[0] < first:
+                like.popleft()
+            if like:
+                first = like[0] + 1
+                yield one, come[like[0]]
+
+
+def _gaps(
+    old: Sequence[T], new: Sequence[T], moved: frozenset[str]
+) -> Iterator[tuple[list[T], list[T]]]:
+    common = {element.name for element in old} & {element.name for element in new}
+    return zip(_split(old, common, moved), _split(new, common, moved), strict=True)
+
+
+def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> Iterator[list[T]]:
+    """Yield the runs of names without a counterpart between the steady ones."""
+    gap: list[T] = []
+    for element in elements:
+        if element.name not in common:
+            gap.append(element)
+        elif element.name not in moved:
+            yield gap
+            gap = []
+    yield gap
+
+
+def described(field: ir.Field) -> object:
+    """Return what the type hash sees of a field's type."""
+    message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
+    return individual(message)["fields"][0]["type"]
+
+
+def without_bounds(type_: ir.FieldType) -> ir.FieldType:
+    """Return a type that is equal for types which differ in sizes and bounds only."""
+    match type_:
+        case ir.String():
+            return ir.String(type_.wide)
+        case ir.Sequence():
+            return ir.Sequence(_element_without_bounds(type_.element))
+        case ir.Array():
+            return ir.Array(_element_without_bounds(type_.element), 1)
+        case _:
+            return type_
+
+
+def _element_without_bounds(element: ir.Element) -> ir.Element:
+    return ir.String(element.wide) if isinstance(element, ir.String) else element
+
+
+def container(type_: ir.FieldType) -> tuple[str, int | None]:
+    """Return what C++ has a type of its own for: sizes and bounds of arrays, not of strings."""
+    match type_:
+        case ir.Sequence():
+            return "sequence", type_.bound
+        case ir.Array():
+            return "array", type_.size
+        case _:
+            return "", None
+
+
+def native(type_: ir.FieldType) -> object:
+    """Return a value that is equal for types that are one type in C++ and in Python."""
+    element = ir.element_of(type_)
+    if element == ir.Primitive("char"):
+        element = ir.Primitive("uint8")
+    return container(type_), _element_without_bounds(element)
+
+
+def tighter(old: ir.FieldType, new: ir.FieldType) -> bool:
+    """Return whether text that was allowed is too long now."""
+    before, after = ir.element_of(old), ir.element_of(new)
+    if not isinstance(before, ir.String) or not isinstance(after, ir.String):
+        return False
+    return after.bound is not None and (before.bound is None or after.bound < before.bound)

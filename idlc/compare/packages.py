@@ -1,0 +1,333 @@
+"""Two versions of a package → everything that changed between them."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+from idlc.compare.changes import LEVELS, Change
+from idlc.compare.fields import Sides, added, constant_changes, field_changes
+from idlc.diagnostics import codes
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import edit_distance
+from idlc.model import derive, ir
+from idlc.model.ir import meaning
+from idlc.model.link import Model
+from idlc.project.settings import Place, Tables, Text, command_table, read_table
+
+if TYPE_CHECKING:
+    from idlc.project.settings import Config
+
+#: Interfaces of equal content among which a renamed one is looked for.
+CANDIDATES = 50
+
+
+class Comparison(NamedTuple):
+    """What breaks something, and what was added and breaks nothing.
+
+    `differs` is whether anything at all is different, comments included, in what could be
+    compared; `left_out` could not be.
+    """
+
+    changes: tuple[Change, ...]
+    additions: tuple[str, ...] = ()
+    differs: bool = False
+    left_out: tuple[str, ...] = ()
+
+    def placed(self, prefix: str) -> Comparison:
+        """Return it with what was removed in the files whose names follow a prefix."""
+        changes = (
+            one if one.span else one._replace(place=one.path.removeprefix(prefix))
+            for one in self.changes
+        )
+        return self._replace(changes=tuple(changes))
+
+
+def together(comparisons: Iterable[Comparison]) -> Comparison:
+    """Return the comparisons of several packages as one."""
+    found = list(comparisons)
+    return Comparison(
+        tuple(change for one in found for change in one.changes),
+        tuple(name for one in found for name in one.additions),
+        any(one.differs for one in found),
+    )
+
+
+def compare(before: Model, after: Model) -> Comparison:
+    """Return what changed in a package's own interfaces; both models must be free of errors."""
+    old = {interface.name: interface for interface in before.own}
+    new = {interface.name: interface for interface in after.own}
+    gone = [interface for name, interface in old.items() if name not in new]
+    come = [interface for name, interface in new.items() if name not in old]
+    renamed = dict(_renamed(gone, come))
+    changes = [_removed(one) for one in gone if one.name not in renamed]
+    changes += [called(one, renamed[one.name]) for one in gone if one.name in renamed]
+    found = {new.name for new in renamed.values()}
+    additions = [_added(one) for one in come if one.name not in found]
+    differs = bool(gone or come)
+    for name in sorted(old.keys() & new.keys()):
+        differs = differs or _differ(old[name], new[name])
+        for sides in _sides(old[name], new[name], before, after):
+            changes += [*field_changes(sides), *constant_changes(sides)]
+            additions += added(sides)
+    return Comparison(tuple(changes), tuple(additions), differs or bool(changes))
+
+
+def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
+    for one, other in zip(derive.sections(old), derive.sections(new), strict=True):
+        yield Sides(one, other, before, after)
+
+
+def removed_package(before: Model) -> Comparison:
+    """Return the changes when a package is no longer there."""
+    return Comparison(tuple(map(_removed, before.own)), (), bool(before.own))
+
+
+def added_package(after: Model) -> Comparison:
+    """Return what a package adds that was not there before."""
+    return Comparison((), tuple(map(_added, after.own)), bool(after.own))
+
+
+def _differ(old: ir.Interface, new: ir.Interface) -> bool:
+    """Return whether two versions of an interface are not the same, line ends apart."""
+    texts = [one.source.text.splitlines() if one.source else None for one in (old, new)]
+    return texts[0] != texts[1] or meaning(old) != meaning(new)
+
+
+def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
+    """Return what changed since type hashes were recorded; nothing else is known of before."""
+    changes = []
+    sources = {str(own.name): own.source for own in after.own}
+    for name in sorted(recorded):
+        kind = name.split("/")[1]
+        if kind != "msg" and any(own in recorded for own in _shorter(name)):
+            continue  # follows from the interface that it is derived from
+        if name not in sources:
+            levels = frozenset(LEVELS[:3])
+            message = f"{_what(kind)} `{name}` was removed"
+            changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
+        elif recorded[name] != after.describer.hash(name):
+            source = sources[name]
+            changes.append(
+                Change(
+                    codes.HASH_CHANGED,
+                    name,
+                    f"the type hash of `{name}` changed",
+                    frozenset({"hash"}),
+                    path=source.path if source else name,
+                    hint="compare with a folder or a git revision to see what changed it",
+                )
+            )
+    come = tuple(_added(own) for own in after.own if str(own.name) not in recorded)
+    return Comparison(tuple(changes), come, bool(changes or come))
+
+
+def _shorter(name: str) -> Iterator[str]:
+    """Yield what stands before each underscore of a name."""
+    return (name[:at] for at, character in enumerate(name) if character == "_")
+
+
+def _what(kind: str) -> str:
+    return {"msg": "message", "srv": "service"}.get(kind, kind)
+
+
+def _path(interface: ir.Interface) -> str:
+    return interface.source.path if interface.source else str(interface.name)
+
+
+def _removed(interface: ir.Interface) -> Change:
+    return Change(
+        codes.INTERFACE_REMOVED,
+        str(interface.name),
+        f"{_what(interface.name.kind)} `{interface.name}` was removed",
+        frozenset(LEVELS[:3]),
+        path=_path(interface),
+        place=interface.source.file if interface.source else "",
+    )
+
+
+def _added(interface: ir.Interface) -> str:
+    return f"{_what(interface.name.kind)} `{interface.name}`"
+
+
+def called(old: ir.Interface, new: ir.Interface) -> Change:
+    """Return the change of an interface's name."""
+    return Change(
+        codes.INTERFACE_RENAMED,
+        str(old.name),
+        f"{_what(old.name.kind)} `{old.name}` is called `{new.name}` now",
+        frozenset({"hash", "source"}),
+        path=_path(new),
+    )
+
+
+def _renamed(
+    gone: list[ir.Interface], come: list[ir.Interface]
+) -> Iterator[tuple[ir.TypeName, ir.Interface]]:
+    """Yield each interface that disappeared with the one of the same content that appeared."""
+    left: dict[Hashable, list[ir.Interface]] = {}
+    for new in come:
+        left.setdefault(_shape(new), []).append(new)
+    for old in gone:
+        shape = _shape(old)
+        # of very many, the first ones are as good as any
+        alike = left.get(shape, [])[:CANDIDATES] if shape[1] else []
+        if alike:
+            best = min(alike, key=lambda new: edit_distance(old.name.name, new.name.name))
+            left[shape].remove(best)
+            yield old.name, best
+
+
+def _shape(interface: ir.Interface) -> tuple[ir.Kind, tuple[tuple[str, ir.FieldType], ...]]:
+    return interface.name.kind, tuple(
+        (f"{number}.{field.name}", field.type)
+        for number, section in enumerate(derive.sections(interface))
+        for field in section.fields
+    )
+
+
+def part_to_raise(comparison: Comparison) -> Literal["major", "minor", "patch"] | None:
+    """Return the part that semantic versioning asks to raise, `None` if nothing is different."""
+    levels = {level for change in comparison.changes for level in change.levels}
+    if levels & {"wire", "hash", "source"}:
+        return "major"
+    if levels or comparison.additions:
+        return "minor"
+    return "patch" if comparison.differs else None
+
+
+def raised(version: str, part: Literal["major", "minor", "patch"]) -> str | None:
+    """Return a version with a part raised, `None` for one that is not three numbers.
+
+    Before 1.0.0 there is no promise to keep, so a breaking change raises the minor part.
+    """
+    found = re.fullmatch(r"(\d+)\.(\d+)\.(\d+)", version.strip())
+    if found is None:
+        return None
+    major, minor, patch = map(int, found.groups())
+    if part == "patch":
+        return f"{major}.{minor}.{patch + 1}"
+    if part == "minor" or not major:
+        return f"{major}.{minor + 1}.0"
+    return f"{major + 1}.0.0"
+
+
+class Allowance(NamedTuple):
+    """One entry of the allow-list.
+
+    `at` is a type or an element of one (`pkg/msg/Name.field`), `*` and `?` stand for any text;
+    a type covers its elements. `until` is the last day on which it holds, as YYYY-MM-DD. Without
+    a `code` it holds for all.
+    """
+
+    at: str
+    reason: str
+    until: str
+    code: str | None = None
+
+    def covers(self, change: Change) -> bool:
+        """Return whether a change, or the one that it follows from, is meant."""
+        if self.code not in (None, change.code.id):
+            return False
+        names = [change.subject, change.subject.partition(".")[0], change.cause]
+        return any(fnmatchcase(name, self.at) for name in names if name)
+
+
+def without_allowed(
+    changes: Sequence[Change],
+    allowances: Iterable[Allowance],
+    today: str,
+    path: str,
+    report: Report,
+) -> tuple[Change, ...]:
+    """Return the changes that nobody allowed.
+
+    Reports entries that have expired, and those that no change needs; `path` is the file that
+    holds them, `today` a day as YYYY-MM-DD.
+    """
+    allowed: set[int] = set()
+    for entry in allowances:
+        covered = [at for at, change in enumerate(changes) if entry.covers(change)]
+        if not covered:
+            report.add(
+                codes.UNUSED_ALLOWANCE.of(
+                    path,
+                    f"no change needs the allowance for `{entry.at}`",
+                    hint="remove the entry",
+                )
+            )
+        elif entry.until < today:
+            report.add(
+                codes.EXPIRED_ALLOWANCE.of(
+                    path,
+                    f"the allowance for `{entry.at}` ended on {entry.until} ({entry.reason})",
+                    hint="take the change back, or decide again and set a new day",
+                )
+            )
+        else:
+            allowed.update(covered)
+    return tuple(change for at, change in enumerate(changes) if at not in allowed)
+
+
+class BreakingSettings(msgspec.Struct, frozen=True):
+    """`[tool.idlc.breaking]`."""
+
+    allow: Tables = ()
+    against: Text = ""
+
+
+def _words(what: str) -> Meta:
+    return Meta(pattern=r"\S", title="a string that is not blank", description=what)
+
+
+class AllowSettings(msgspec.Struct, frozen=True):
+    """An entry of `[[tool.idlc.breaking.allow]]`."""
+
+    at: Annotated[str, _words("the type or field that it is about")]
+    reason: Annotated[str, _words("why the change is made nevertheless")]
+    until: Annotated[
+        datetime.date,
+        Meta(title="a day, as in 2030-12-31", description="its last day, as in 2030-12-31"),
+    ]
+    code: Text = ""
+
+
+def against(config: Config, report: Report) -> str | None:
+    """Return what `idlc breaking` compares with unless told otherwise."""
+    table, place = command_table(config, "breaking", BreakingSettings, report)
+    if place is not None:
+        place.no_url("against", table.against, report)
+    return table.against or None
+
+
+def allowances(config: Config, report: Report) -> tuple[Allowance, ...]:
+    """Return the entries of `[[tool.idlc.breaking.allow]]`."""
+    entries = command_table(config, "breaking", BreakingSettings, report)[0].allow
+    found = [_allowance(config, at, entry, report) for at, entry in enumerate(entries)]
+    return tuple(entry for entry in found if entry is not None)
+
+
+def _allowance(
+    config: Config, number: int, entry: Mapping[str, Any], report: Report
+) -> Allowance | None:
+    assert config.source is not None
+    at, until = entry.get("at"), entry.get("until")
+    which = f"the entry for `{at}`" if isinstance(at, str) else "an entry"
+    name = "tool.idlc.breaking.allow"
+    place = Place(config.source, name, f"{which} in [[{name}]]", number)
+    day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
+    found = read_table({**entry, **day}, AllowSettings, place, report)
+    if found is None:
+        return None
+    if found.code and not (found.code in CODES and found.code.startswith("IDL5")):
+        message = f"{place.shown} has `{found.code}`, which is no code of a breaking change"
+        place.wrong("code", message, report)
+        return None
+    return Allowance(found.at, found.reason, found.until.isoformat(), found.code or None)

@@ -1,0 +1,106 @@
+"""All codes: their pages as one Markdown document, which is docs/rules.md, and their names."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect
+from collections.abc import Iterator
+from importlib.resources import files
+from itertools import groupby
+from operator import attrgetter
+
+from idlc.diagnostics.codes import CATEGORIES, CODES, Code, find
+from idlc.diagnostics.text import closest
+
+SECTIONS = ("## Why", "## Bad", "## Good")
+
+
+def page(word: str) -> str | None:
+    """Return the Markdown page of a code, given by id or name; `None` if there is none."""
+    known = find(word)
+    if known is None:
+        return None
+    path = files("idlc.diagnostics") / "explain" / f"{known.id}.md"
+    return path.read_text(encoding="utf-8") if path.is_file() else None
+
+
+def close_name(word: str) -> str | None:
+    """Return the id or name of a code that is nearest to a word, `None` if none is near."""
+    return closest(word.upper(), CODES) or closest(word, (known.slug for known in CODES.values()))
+
+
+#: Headings of the list of codes, each from its number on.
+_HEADINGS = {
+    100: "Syntax",
+    200: "Names and references",
+    300: "Types, bounds and values",
+    400: "Style",
+    410: "Surprises of ROS 2's pipeline",
+    420: "Portability",
+    450: "The package around",
+    490: "Remarks that silence others",
+    500: "Breaking changes",
+    600: "Files and projects",
+    900: "idlc itself",
+}
+
+_HEAD = f"""\
+# Rules
+
+What idlc can say, and what to do about it. This file is what `idlc explain --all` prints.
+
+Errors are what ROS 2 itself refuses, and cannot be switched off. Warnings are advice:
+
+```toml
+[tool.idlc.check]
+select = ["all"]            # instead of what is on by default: categories, codes, `IDL40`, slugs
+ignore = ["wide-string"]
+
+[tool.idlc.check.per-path]
+"msg/legacy/*" = ["style"]
+```
+
+The categories are {", ".join(CATEGORIES[:-1])} and {CATEGORIES[-1]}. In a file,
+`# idlc: ignore[IDL405] why` silences one warning: after a definition on that line, on a line of
+its own for the next definition, at the head for the whole file. The reason is mandatory. Beside a
+unit write `ignore(IDL405)`, because ROS 2 takes text in square brackets for the unit.
+"""
+
+
+def document() -> str:
+    """Return the document."""
+    return "\n".join(_parts())
+
+
+def _parts() -> Iterator[str]:
+    yield _HEAD
+    for heading, codes in _by_heading():
+        yield f"## {heading}\n"
+        yield from map(_section, codes)
+
+
+def overview() -> Iterator[str]:
+    """Yield the lines of a list of all codes, by group."""
+    width = max(len(code.slug) for code in CODES.values())
+    for heading, codes in _by_heading():
+        yield heading
+        yield from (f"  {code.id}  {code.slug:{width}}  {code.kind}" for code in codes)
+        yield ""
+    yield "`idlc explain IDL201` or `idlc explain unknown-type` shows a page."
+
+
+def _by_heading() -> Iterator[tuple[str, Iterator[Code]]]:
+    codes = sorted(CODES.values(), key=attrgetter("id"))
+    return groupby(codes, _heading)
+
+
+def _heading(code: Code) -> str:
+    starts = [*_HEADINGS]
+    return _HEADINGS[starts[bisect(starts, int(code.id[3:])) - 1]]
+
+
+def _section(code: Code) -> str:
+    """Return a page with its headings two levels down, and how bad it is."""
+    title, _, body = (page(code.id) or f"# {code.id} {code.slug}\n").partition("\n")
+    body = re.sub(r"(?m)^## (.*)$", r"**\1**", body)
+    return f"##{title} ({code.kind})\n{body}"

@@ -1,0 +1,250 @@
+"""Reports as the documents that CI systems read; `terminal` has text and JSON lines."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Iterable
+from typing import NamedTuple
+from urllib.parse import quote
+from xml.sax.saxutils import escape, quoteattr
+
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.explain import page
+from idlc.diagnostics.report import Diagnostic, Edit, Severity
+from idlc.diagnostics.source import Span
+from idlc.diagnostics.text import one_line
+
+
+class Run(NamedTuple):
+    """What a document tells besides problems: the command, idlc's version and the files read.
+
+    `strict` is whether warnings fail as errors do.
+    """
+
+    command: str
+    version: str
+    files: tuple[str, ...] = ()
+    strict: bool = False
+
+
+def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+    """Return one command for each problem."""
+    return "".join(map(_command, diagnostics))
+
+
+def _command(one: Diagnostic) -> str:
+    slug = CODES[one.code].slug if one.code in CODES else ""
+    facts = {"file": one.file, **_region(one), "title": f"{one.code} {slug}".strip()}
+    listed = ",".join(
+        f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
+    )
+    parts = (one.message, one.breaks, one.holds_for, one.hint, one.within)
+    text = "\n".join(one_line(part) for part in parts if part)
+    return f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
+
+
+def notice(title: str, text: str) -> str:
+    """Return a command that shows a line about the whole run."""
+    return f"::notice title={_property(one_line(title))}::{_escaped(one_line(text))}\n"
+
+
+def _region(one: Diagnostic) -> dict[str, int]:
+    if one.span is None or one.within:
+        return {}
+    line, column = one.span.source.position(one.span.start)
+    end_line, end_column = one.span.source.position(one.span.end)
+    # GitHub shows columns only for places within one line
+    if end_line != line:
+        return {"line": line, "endLine": end_line}
+    return {"line": line, "endLine": line, "col": column, "endColumn": end_column}
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
+
+
+def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
+    """Return the JSON document."""
+    seen: dict[str, int] = {}
+    return json.dumps([_issue(one, seen) for one in diagnostics], indent=2) + "\n"
+
+
+def _issue(one: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
+    line = one.span.source.position(one.span.start)[0] if one.span and not one.within else 1
+    return {
+        "type": "issue",
+        "check_name": one.code,
+        "description": "; ".join(
+            filter(None, (one.message, one.breaks, one.holds_for, one.within))
+        ),
+        "severity": "major" if one.severity is Severity.ERROR else "minor",
+        "fingerprint": fingerprint(one, seen),
+        "location": {"path": one.file or ".", "lines": {"begin": line}},
+    }
+
+
+def fingerprint(one: Diagnostic, seen: dict[str, int]) -> str:
+    """Return what tells a problem from all others, and stays when lines move.
+
+    `seen` counts those that are alike but for their place.
+    """
+    key = "\0".join((one.code, one.file, one.message))
+    number = seen[key] = seen.get(key, 0) + 1
+    return hashlib.sha256(f"{key}\0{number}".encode("utf-8", "replace")).hexdigest()[:32]
+
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def junit(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+    """Return the XML document: a test for each problem, and a passed one for each clean file.
+
+    A warning is a passed test with output, unless it fails the run as well: servers fail a build
+    for what the exit status does not.
+    """
+    found = list(diagnostics)
+    failed = sum(run.strict or one.severity is Severity.ERROR for one in found)
+    clean = [file for file in run.files if file not in {one.where[0] for one in found}]
+    head = (
+        f'<testsuite name="idlc" tests="{len(found) + len(clean)}" '
+        f'failures="{failed}" errors="0" skipped="0">'
+    )
+    cases = [_case(one, failed=run.strict or one.severity is Severity.ERROR) for one in found]
+    cases += [f'  <testcase classname="idlc" name={_quoted(file)}/>' for file in clean]
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""]
+    # whatever encoding it is written in, it is read alike
+    return "\n".join(lines).encode("ascii", "xmlcharrefreplace").decode("ascii")
+
+
+def _case(one: Diagnostic, *, failed: bool) -> str:
+    path, line = one.where[0], ""
+    if one.span:
+        line = ":{}:{}".format(*one.span.source.position(one.span.start))
+    slug = CODES[one.code].slug if one.code in CODES else ""
+    lines = (
+        f"{path}{line}: {one.message}",
+        *filter(None, (one.breaks, one.holds_for, one.hint and f"hint: {one.hint}")),
+    )
+    text = "\n".join(map(one_line, lines))
+    name = f"{one.code} {slug}{line}"
+    kind = one.severity.name.lower()
+    tag = f"failure type={_quoted(kind)} message={_quoted(one.message)}" if failed else "system-out"
+    text = text if failed else f"{kind}: {text}"
+    return (
+        f"  <testcase classname={_quoted(path or 'idlc')} name={_quoted(name)}>\n"
+        f"    <{tag}>{escape(_legal(text))}</{tag.split()[0]}>\n"
+        "  </testcase>"
+    )
+
+
+def _quoted(text: str) -> str:
+    return quoteattr(_legal(one_line(text)))
+
+
+def _legal(text: str) -> str:
+    return _NOT_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+
+
+def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
+    """Return the JSON document; services keep those of several commands apart."""
+    found = list(diagnostics)
+    codes = sorted({one.code for one in found})
+    seen: dict[str, int] = {}
+    whole = {
+        "tool": {
+            "driver": {
+                "name": "idlc",
+                "version": run.version,
+                "rules": [_rule(code) for code in codes],
+            }
+        },
+        "automationDetails": {"id": f"idlc/{run.command}/"},
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(one, codes.index(one.code), seen) for one in found],
+    }
+    return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [whole]}, indent=2) + "\n"
+
+
+def _rule(code: str) -> dict[str, object]:
+    known = CODES.get(code)
+    if known is None:
+        return {"id": code}
+    text = page(code) or ""
+    first = text.split("\n\n")[1] if text.count("\n\n") else known.slug
+    plain = " ".join(first.replace("`", "").split())
+    return {
+        "id": code,
+        "name": "".join(word.capitalize() for word in re.split(r"\W", known.slug)),
+        "shortDescription": {"text": plain},
+        "help": {"text": plain, "markdown": text or plain},
+        "defaultConfiguration": {"level": _level(known.severity)},
+    }
+
+
+def _level(severity: Severity) -> str:
+    return "error" if severity is Severity.ERROR else "warning"
+
+
+def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
+    text = "; ".join(filter(None, (one.message, one.breaks, one.holds_for, one.hint, one.within)))
+    result: dict[str, object] = {
+        "ruleId": one.code,
+        "ruleIndex": rule,
+        "level": _level(one.severity),
+        "message": {"text": text},
+        "partialFingerprints": {"idlc/v1": fingerprint(one, seen)},
+    }
+    if one.file:
+        result["locations"] = [_location(one.span, one.file)]
+    if one.labels:
+        result["relatedLocations"] = [
+            {**_location(label.span, label.span.source.file), "message": {"text": label.text}}
+            for label in one.labels
+        ]
+    if one.edits:
+        result["fixes"] = [{"artifactChanges": [_change(edit) for edit in one.edits]}]
+    return result
+
+
+def _location(span: Span | None, path: str) -> dict[str, object]:
+    place: dict[str, object] = {"artifactLocation": _artifact(path)}
+    if span is not None and span.source.path == path:
+        place["region"] = _physical_region(span)
+    return {"physicalLocation": place}
+
+
+def _artifact(path: str) -> dict[str, str]:
+    if path.startswith("/"):
+        return {"uri": "file://" + quote(path, errors="replace")}
+    if sys.platform == "win32" and re.match("[A-Za-z]:/", path):  # on a drive
+        return {"uri": "file:///" + quote(path, safe="/:", errors="replace")}
+    return {"uri": quote(path, errors="replace")}
+
+
+def _physical_region(span: Span) -> dict[str, int]:
+    line, column = span.source.position(span.start)
+    end_line, end_column = span.source.position(span.end)
+    return {"startLine": line, "startColumn": column, "endLine": end_line, "endColumn": end_column}
+
+
+def _change(edit: Edit) -> dict[str, object]:
+    return {
+        "artifactLocation": _artifact(edit.span.source.path),
+        "replacements": [
+            {"deletedRegion": _physical_region(edit.span), "insertedContent": {"text": edit.text}}
+        ],
+    }
+
+
+#: By the name of the format.
+DOCUMENTS = {"github": github, "sarif": sarif, "junit": junit, "gitlab": gitlab}

@@ -1,0 +1,248 @@
+"""A report as text with source lines and carets, or as JSON lines.
+
+In: diagnostics. Out: strings. Nothing is looked up: colour and width are arguments. Text from
+files is made harmless first: no control character, terminal escape or invisible character of
+a file reaches the terminal as itself.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+
+import msgspec
+
+from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.report import Diagnostic, Label, Severity
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import display_width, one_line, visible
+
+LIMIT = 100
+#: More problems than these end with a count for each code, and warnings that repeat are cut.
+MANY = 10
+#: Warnings of one code that are shown whole then; the others get a line each.
+REPEATS = 3
+LINE_WIDTH = 100
+TEXT_WIDTH = 1000
+BEFORE_CARET = 40
+
+_STYLES = {
+    "error": "1;31",
+    "warning": "1;33",
+    "hint": "1;36",
+    "frame": "1;34",
+    "bold": "1",
+}
+
+
+class _Paint:
+    """Puts ANSI styles around text, or does not."""
+
+    def __init__(self, colour: bool) -> None:
+        self._colour = colour
+
+    def __call__(self, style: str, text: str) -> str:
+        return f"\x1b[{_STYLES[style]}m{text}\x1b[0m" if self._colour and text else text
+
+
+class _Mark(msgspec.Struct, frozen=True):
+    """A stretch of one line to underline; `start` and `end` are characters from its start."""
+
+    source: Source
+    line: int
+    start: int
+    end: int
+    sign: str
+    text: str
+
+
+def text(
+    diagnostics: Iterable[Diagnostic], *, colour: bool = False, limit: int = LIMIT
+) -> Iterator[str]:
+    """Yield each problem as a block of lines, repeated warnings as a list of lines.
+
+    Ends with a count of those beyond `limit`.
+    """
+    paint = _Paint(colour)
+    diagnostics = list(diagnostics)
+    if len(diagnostics) > limit:  # no error is left out for a warning
+        diagnostics.sort(key=lambda diagnostic: diagnostic.severity)
+    repeats = REPEATS if len(diagnostics) > MANY else MANY
+    shown: Counter[str] = Counter()
+    repeated: list[str] = []
+    for diagnostic in diagnostics[:limit]:
+        shown[diagnostic.code] += 1
+        if diagnostic.severity is Severity.WARNING and shown[diagnostic.code] > repeats:
+            repeated.append(_line(diagnostic, paint))
+        else:
+            yield "\n".join(_block(diagnostic, paint)) + "\n"
+    if repeated:
+        yield "\n".join(("more of these warnings:", *repeated)) + "\n"
+    if len(diagnostics) > limit:
+        yield f"… and {len(diagnostics) - limit} more; fix the first ones and run again\n"
+
+
+def _line(diagnostic: Diagnostic, paint: _Paint) -> str:
+    """Return a problem on one line."""
+    place = one_line(diagnostic.path)
+    if diagnostic.span:
+        place = _place(_mark(diagnostic.span, "", ""))
+    code = paint(diagnostic.severity.name.lower(), diagnostic.code)
+    only = f" ({diagnostic.holds_for})" if diagnostic.distros else ""
+    return f"  {place}: {code} {one_line(_shortened(diagnostic.message))}{only}"
+
+
+def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
+    """Yield a line for each code that was found, the most frequent first."""
+    counts = Counter(diagnostic.code for diagnostic in diagnostics)
+    width = max(map(len, map(str, counts.values())), default=0)
+    for code, number in sorted(counts.items(), key=lambda one: (-one[1], one[0])):
+        yield f"{number:>{width}}  {code} {CODES[code].slug if code in CODES else ''}\n"
+
+
+def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
+    level = diagnostic.severity.name.lower()
+    head = paint(level, f"{level}[{diagnostic.code}]")
+    yield f"{head}{paint('bold', ': ' + one_line(_shortened(diagnostic.message)))}"
+    marks = _marks(diagnostic)
+    margin = " " * max((len(str(mark.line)) for mark in marks), default=1)
+    if diagnostic.span:
+        yield from _snippets(marks, margin, paint)
+    elif diagnostic.path:
+        yield f"{margin}{paint('frame', '-->')} {one_line(diagnostic.path)}"
+    if diagnostic.detail:
+        bar = f"{margin} {paint('frame', '|')}"
+        yield bar
+        lines = map(_shortened, diagnostic.detail.split("\n"))
+        yield from (f"{bar} {visible(line)}".rstrip() for line in lines)
+    if diagnostic.levels:
+        sign = paint("frame", "=")
+        yield f"{margin} {sign} {paint('hint', 'breaks')}: {', '.join(diagnostic.levels)}"
+    if diagnostic.distros:
+        sign = paint("frame", "=")
+        yield f"{margin} {sign} {paint('hint', 'for')}: {', '.join(diagnostic.distros)}"
+    if diagnostic.hint:
+        hint = one_line(_shortened(diagnostic.hint))
+        yield f"{margin} {paint('frame', '=')} {paint('hint', 'hint')}: {hint}"
+
+
+def _shortened(text: str) -> str:
+    """Return a text without its middle if it is so long that nobody could read it."""
+    return text if len(text) <= TEXT_WIDTH else f"{text[: TEXT_WIDTH - 200]} … {text[-100:]}"
+
+
+def _marks(diagnostic: Diagnostic) -> list[_Mark]:
+    if not diagnostic.span:
+        return []
+    others = [_mark(label.span, "-", label.text) for label in diagnostic.labels]
+    return [_mark(diagnostic.span, "^", ""), *others]
+
+
+def _mark(span: Span, sign: str, label: str) -> _Mark:
+    """Return the part of a span that lies on its first line; at least one column."""
+    line, column = span.source.position(span.start)
+    start = min(column - 1, len(span.source.line_text(line)))
+    end = min(start + span.end - span.start, len(span.source.line_text(line)))
+    return _Mark(span.source, line, start, max(end, start), sign, label)
+
+
+def _snippets(marks: list[_Mark], margin: str, paint: _Paint) -> Iterator[str]:
+    """Yield the lines of a problem, file by file, the file of the first mark first."""
+    bar = paint("frame", "|")
+    sources = list(dict.fromkeys(mark.source for mark in marks))
+    for source in sources:
+        own = [mark for mark in marks if mark.source is source]
+        arrow = "-->" if source is sources[0] else ":::"
+        yield f"{margin}{paint('frame', arrow)} {_place(own[0])}"
+        yield f"{margin} {bar}"
+        previous = 0
+        for mark in sorted(own, key=lambda mark: mark.line):
+            if previous and mark.line > previous + 1:
+                yield paint("frame", "...")
+            shown, lead, width = _cut(source.line_text(mark.line), mark.start, mark.end)
+            if mark.line != previous or len(source.line_text(mark.line)) > LINE_WIDTH:
+                number = str(mark.line).rjust(len(margin))
+                yield f"{paint('frame', number)} {bar} {shown}".rstrip()
+            sign = paint("error" if mark.sign == "^" else "frame", mark.sign * width)
+            label = f" {one_line(mark.text)}" if mark.text else ""
+            yield f"{margin} {bar} {' ' * lead}{sign}{label}"
+            previous = mark.line
+
+
+def _place(mark: _Mark) -> str:
+    return f"{one_line(mark.source.path)}:{mark.line}:{mark.start + 1}"
+
+
+def _cut(line: str, start: int, end: int) -> tuple[str, int, int]:
+    """Return a line fit for showing, the columns before the mark and the mark's columns."""
+    first, last = 0, len(line)
+    if last > LINE_WIDTH:
+        first = max(0, min(start - BEFORE_CARET, last - LINE_WIDTH))
+        last = min(last, first + LINE_WIDTH)
+    before = visible(("…" if first else "") + line[first:start])
+    lead = display_width(before)
+    marked = visible(line[start : min(end, last)], lead)
+    width = display_width(marked)
+    after = visible(line[min(end, last) : last], lead + width)
+    return before + marked + after + ("…" if last < len(line) else ""), lead, max(width, 1)
+
+
+def summary(diagnostics: Iterable[Diagnostic]) -> str:
+    """Return the closing line, such as `2 errors, 1 warning in 3 files`."""
+    found = list(diagnostics)
+    errors = sum(one.severity is Severity.ERROR for one in found)
+    parts = [
+        counted(number, noun)
+        for number, noun in ((errors, "error"), (len(found) - errors, "warning"))
+        if number
+    ]
+    files = len({one.where[0] for one in found})
+    return f"{', '.join(parts)} in {counted(files, 'file')}" if parts else "no problems"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, in the plural where needed."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def json_lines(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
+    """Yield each problem as a JSON object on a line of its own, ASCII only."""
+    import json
+
+    for diagnostic in diagnostics:
+        yield json.dumps(_facts(diagnostic)) + "\n"
+
+
+def _facts(diagnostic: Diagnostic) -> dict[str, object]:
+    code = CODES.get(diagnostic.code)
+    return {
+        "type": "diagnostic",
+        "code": diagnostic.code,
+        "slug": code.slug if code else "",
+        "severity": diagnostic.severity.name.lower(),
+        "message": diagnostic.message,
+        **_range(diagnostic.span, diagnostic.path),
+        "hint": diagnostic.hint,
+        "detail": diagnostic.detail or None,
+        **({"levels": list(diagnostic.levels)} if diagnostic.levels else {}),
+        **({"distros": list(diagnostic.distros)} if diagnostic.distros else {}),
+        "labels": [_label(label) for label in diagnostic.labels],
+    }
+
+
+def _label(label: Label) -> dict[str, object]:
+    return {"message": label.text, **_range(label.span, "")}
+
+
+def _range(span: Span | None, path: str) -> dict[str, object]:
+    if span is None:
+        return {"path": path, "line": None, "column": None, "end_line": None, "end_column": None}
+    line, column = span.source.position(span.start)
+    end_line, end_column = span.source.position(span.end)
+    return {
+        "path": span.source.path,
+        "line": line,
+        "column": column,
+        "end_line": end_line,
+        "end_column": end_column,
+    }

@@ -1,0 +1,159 @@
+"""Suggestions for misspelt names."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import unicodedata
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+TAB_STOP = 4
+#: Control, format, surrogate, private-use and unassigned characters, line and paragraph ends.
+_HIDDEN = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
+#: Control characters, those of the direction of writing included, other than tabs and line feeds.
+_CONTROL = re.compile("[\\0-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]")
+
+
+def visible(text: str, column: int = 0) -> str:
+    """Return `text` with tabs expanded and every invisible character spelled out.
+
+    `column` is where it starts, which decides how far a tab reaches.
+    """
+    if text.isascii() and text.isprintable():
+        return text
+    parts: list[str] = []
+    for character in text:
+        tab = " " * (TAB_STOP - column % TAB_STOP)
+        part = tab if character == "\t" else _spelled(character)
+        parts.append(part)
+        column += display_width(part)
+    return "".join(parts)
+
+
+def one_line(text: str) -> str:
+    """Return `text` made visible, line ends and tabs included."""
+    if text.isascii() and text.isprintable():
+        return text
+    return "".join(_spelled(character) for character in text)
+
+
+def printable(text: str) -> str:
+    """Return text of any number of lines with its control characters spelled out.
+
+    What writing needs stays, such as the joiners of scripts and emoji.
+    """
+    return _CONTROL.sub(lambda found: _spelled(found[0]), text)
+
+
+def _spelled(character: str) -> str:
+    code = ord(character)
+    if code < 0x20:
+        return chr(0x2400 + code)
+    if code == 0x7F:
+        return "\u2421"
+    if code < 0x7F or unicodedata.category(character) not in _HIDDEN:
+        return character
+    return f"<U+{code:04X}>"
+
+
+def display_width(text: str) -> int:
+    """Return the terminal columns of visible text: wide characters two, combining ones none."""
+    if text.isascii():
+        return len(text)
+    return sum(_width(character) for character in text)
+
+
+def _width(character: str) -> int:
+    if unicodedata.category(character) in ("Mn", "Me"):
+        return 0
+    return 2 if unicodedata.east_asian_width(character) in "WF" else 1
+
+
+def edit_distance(left: str, right: str) -> int:
+    """Return how many insertions, removals, changes and swaps turn one text into the other."""
+    before: list[int] = []
+    row = list(range(len(right) + 1))
+    for i, a in enumerate(left, 1):
+        last, before, row = before, row, [i]
+        for j, b in enumerate(right, 1):
+            best = min(before[j] + 1, row[j - 1] + 1, before[j - 1] + (a != b))
+            if i > 1 and j > 1 and a == right[j - 2] and b == left[i - 2]:
+                best = min(best, last[j - 2] + 1)
+            row.append(best)
+    return row[-1]
+
+
+#: Ends of package names, which say nothing about how much two names are alike.
+_ENDS = ("_msgs", "_interfaces", "_srvs", "_actions")
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that is nearest, or `None` if none is near.
+
+    A name of three letters may have one of them wrong, a long one three.
+    """
+    if len(name) > 100:
+        return None
+    limit = min(max(1, len(name) // 3), 3)
+    best: tuple[int, str] | None = None
+    for candidate in known:
+        if abs(len(candidate) - len(name)) > limit:
+            continue
+        distance = edit_distance(name.lower(), candidate.lower())
+        if distance <= limit and (best is None or (distance, candidate) < best):
+            best = distance, candidate
+    return best[1] if best else None
+
+
+def package_hint(name: str, known: Iterable[str]) -> str:
+    """Return the hint for a package that is nowhere to be found."""
+    near = closest_package(name, known)
+    if near is not None:
+        return f"did you mean `{near}`?"
+    return (
+        f"`{name}` is not built in; {including('DIR')} with the folder of its sources, "
+        "or source the ROS 2 workspace that has it"
+    )
+
+
+_HAS_OPTIONS: ContextVar[bool] = ContextVar("has_options", default=True)
+
+
+@contextmanager
+def without_options() -> Iterator[None]:
+    """Let hints name settings, for users of a build or an editor, who type no options of idlc."""
+    before = _HAS_OPTIONS.set(False)
+    try:
+        yield
+    finally:
+        _HAS_OPTIONS.reset(before)
+
+
+def including(folder: str) -> str:
+    """Return the advice to look for packages in a folder, too."""
+    if _HAS_OPTIONS.get():
+        return f"add `-I {shlex.quote(folder)}`"
+    return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
+
+
+def closest_package(name: str, known: Iterable[str]) -> str | None:
+    """Return the package of the nearest name, or `None` if none is near.
+
+    Digits are no slips of the pen: `nav2_msgs` is not `nav_msgs`.
+    """
+    end = next((end for end in _ENDS if name.endswith(end)), "")
+    digits = "".join(filter(str.isdigit, name))
+    alike = [one for one in known if "".join(filter(str.isdigit, one)) == digits]
+    same_end = {one.removesuffix(end): one for one in alike if one.endswith(end)}
+    found = closest(name.removesuffix(end), same_end)
+    if found is not None:
+        return same_end[found]
+    return closest(name, (one for one in alike if not one.endswith(end)))
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """Return the hint that names the nearest known name, or `None`."""
+    found = closest(name, known)
+    return f"did you mean `{found}`?" if found else None

@@ -1,1 +1,0 @@
-"""Disk: the only package that touches files, folders and the environment."""

@@ -1,1 +1,0 @@
-"""What idlc can always make again, kept for the next run."""

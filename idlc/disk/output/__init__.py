@@ -1,1 +1,0 @@
-"""Output: what is written, and how nothing of the user's is lost while it is."""

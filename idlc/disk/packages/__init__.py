@@ -1,1 +1,0 @@
-"""Which files make a package, what it is called and what is around it."""

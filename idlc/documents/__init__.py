@@ -1,0 +1,1 @@
+"""Interfaces for readers: `idlc docs`, `show`, and schemas for other tools."""

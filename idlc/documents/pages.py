@@ -1,0 +1,217 @@
+"""Models → the files of a site."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+from idlc.diagnostics.text import printable
+from idlc.documents.view import KINDS, Block, Home, Pages, blocks, page, prefix, words
+from idlc.model import derive, ir
+from idlc.model.link import Model
+from idlc.project.templates import RenderedFile, html, verbatim
+
+
+class About(NamedTuple):
+    """What a package's package.xml says of it."""
+
+    version: str = ""
+    description: str = ""
+    maintainers: tuple[str, ...] = ()
+    licenses: tuple[str, ...] = ()
+
+
+class Entry(NamedTuple):
+    """An interface in the list of its package."""
+
+    page: str
+    words: Sequence[str]
+    kind: str
+    what: str
+    about: str
+
+
+class PackagePage(NamedTuple):
+    """The page of a package; `described` is whether any interface says what it is for."""
+
+    title: str
+    root: str
+    words: Sequence[str]
+    description: Sequence[Block]
+    facts: str
+    described: bool
+    entries: Sequence[Entry]
+
+
+class Row(NamedTuple):
+    """A package in the list of packages."""
+
+    page: str
+    words: Sequence[str]
+    facts: str
+    about: str
+
+
+class Front(NamedTuple):
+    """The title page of several packages."""
+
+    title: str
+    root: str
+    rows: Sequence[Row]
+
+
+def homes(names: Sequence[str]) -> dict[str, str]:
+    """Return the page of each package; that of a single one is the title page."""
+    return {name: f"{name}/index.html" if len(names) > 1 else "index.html" for name in names}
+
+
+def package_page(
+    name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
+) -> PackagePage:
+    """Return the page of a package, which is `home`."""
+    entries = [_entry(one, pages) for one in interfaces]
+    return PackagePage(
+        title=name,
+        root="../" * home.count("/"),
+        words=words(name),
+        description=blocks(about.description.split("\n")),
+        facts=" · ".join([*_facts(about), counted(interfaces)]),
+        described=any(entry.about for entry in entries),
+        entries=entries,
+    )
+
+
+def front(
+    packages: Mapping[str, Sequence[ir.Interface]],
+    pages: Mapping[str, str],
+    about: Mapping[str, About],
+) -> Front:
+    """Return the title page of packages, whose own pages are `pages`."""
+    rows = []
+    for name, interfaces in packages.items():
+        own = about.get(name, About())
+        version = [f"version {own.version}"] if own.version else []
+        facts = " · ".join([*version, counted(interfaces)])
+        rows.append(Row(pages[name], words(name), facts, own.description))
+    return Front("Interfaces", "", rows)
+
+
+def counted(interfaces: Sequence[ir.Interface]) -> str:
+    """Return how many interfaces of each kind there are, in words."""
+    kinds: Counter[str] = Counter(one.name.kind for one in interfaces)
+    return ", ".join(
+        f"{kinds[kind]} {word}{'s' * (kinds[kind] > 1)}"
+        for kind, word in KINDS.items()
+        if kinds[kind]
+    )
+
+
+def _entry(interface: ir.Interface, pages: Pages) -> Entry:
+    name = interface.name
+    about = first_line(interface)
+    return Entry(pages[name], words(name.name), name.kind, KINDS[name.kind], about)
+
+
+def _facts(about: About) -> list[str]:
+    listed = (
+        ("version", (about.version,)),
+        ("maintained by", about.maintainers),
+        ("licence", about.licenses),
+    )
+    return [f"{label} {', '.join(values)}" for label, values in listed if any(values)]
+
+
+def first_line(interface: ir.Interface) -> str:
+    """Return the first line that says what an interface is for."""
+    lines = (line for part in derive.sections(interface) for line in part.comment)
+    return next((line for line in lines if line.strip()), "")
+
+
+#: The interfaces of each package that is shown.
+Packages = Mapping[str, Sequence[ir.Interface]]
+
+
+def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedFile, ...]:
+    """Return the pages of all packages, and of what they use, with a search over all.
+
+    `about` tells of packages by name.
+    """
+    known: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
+    for model in models:
+        for name, interface in model.interfaces.items():
+            if interface.source is not None and (name not in known or interface in model.own):
+                known[name] = (interface, model)
+    own = {interface.name for model in models for interface in model.own}
+    pages = {name: _path(name) for name in sorted(known)}
+    users = _users(interface for interface, _ in known.values())
+    shown = [known[name][0] for name in sorted(own)]
+    packages = {name: tuple(found) for name, found in groupby(shown, lambda one: one.name.package)}
+    home = homes([*packages])
+    owners = {name: Home(there, about.get(name, About()).version) for name, there in home.items()}
+    template = html().get_template("site/interface.html.jinja")
+    files = []
+    for name, (interface, model) in sorted(known.items()):
+        owner = owners.get(name.package, Home())
+        shown_page = page(interface, model, users.get(name, set()), pages, owner)
+        files.append(RenderedFile(pages[name], template.render(page=shown_page)))
+    return (
+        *_lists(packages, home, pages, about),
+        RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
+        RenderedFile("search.js", verbatim("site/search.js")),
+        RenderedFile("style.css", verbatim("site/style.css")),
+        *files,
+    )
+
+
+def _lists(
+    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
+) -> Iterator[RenderedFile]:
+    """Yield the pages that list interfaces, and for several packages the one that lists those."""
+    template = html().get_template("site/package.html.jinja")
+    for name, interfaces in packages.items():
+        text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
+        yield RenderedFile(home[name], template.render(page=text))
+    if len(packages) > 1:
+        title = html().get_template("site/index.html.jinja")
+        yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
+
+
+def _path(name: ir.TypeName) -> str:
+    return f"{name.package}/{name.kind}-{name.name}.html"
+
+
+def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
+    found: dict[ir.TypeName, set[ir.TypeName]] = {}
+    for interface in interfaces:
+        for target in derive.references(interface):
+            found.setdefault(target, set()).add(interface.name)
+    return found
+
+
+def _index(
+    packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
+) -> str:
+    """Return what is searched: names, pages, lines about them, and the same of what is in them."""
+    entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
+    for package, interfaces in packages.items():
+        described = printable(about.get(package, About()).description)
+        entries.append((package, home[package], described, []))
+        entries += [
+            (str(one.name), pages[one.name], printable(first_line(one)), [*_items(one)])
+            for one in interfaces
+        ]
+    return json.dumps(entries, separators=(",", ":"))
+
+
+def _items(interface: ir.Interface) -> Iterator[tuple[str, str]]:
+    """Yield fields and constants, as they follow the interface's name, and a line about each."""
+    for part in derive.sections(interface):
+        before = prefix(interface, part)
+        divider = "_" if before else "."
+        items = [(one.name, one.comment) for one in part.constants]
+        items += [(one.name, one.comment) for one in part.fields]
+        for name, comment in items:
+            yield f"{divider}{before}{name}", printable(" ".join(comment[:1]))

@@ -1,0 +1,148 @@
+"""An interface in the languages of other tools: JSON Schema, MCAP, and plain facts as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from idlc.generate.idl import file_text
+from idlc.model import derive, ir
+from idlc.model.ir import spell
+from idlc.model.link import Model
+
+Json = dict[str, object]
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+#: What stands between messages in an MCAP schema of encoding `ros2msg`.
+MCAP_LINE = "=" * 80
+
+
+def facts(interface: ir.Interface, model: Model) -> Json:
+    """Return everything that is known of an interface, and of the messages that it uses."""
+    used = [model.messages[name] for name in _used(derive.sections(interface), model)]
+    return {
+        "name": str(interface.name),
+        "hash": model.describer.hash(str(interface.name)) if model.distro.has_hashes else None,
+        "structures": [_structure(part) for part in derive.sections(interface)],
+        "uses": [_structure(part) for part in used],
+    }
+
+
+def _structure(message: ir.Message) -> Json:
+    return {
+        "name": str(message.name),
+        "comment": list(message.comment),
+        "constants": [
+            {
+                "name": one.name,
+                "type": spell(one.type),
+                "value": one.value,
+                "comment": list(one.comment),
+            }
+            for one in message.constants
+        ],
+        "fields": [_field(one) for one in message.fields],
+    }
+
+
+def _field(field: ir.Field) -> Json:
+    default = {} if field.default is None else {"default": field.default.value}
+    return {
+        "name": field.name,
+        "type": spell(field.type),
+        "unit": field.unit,
+        "comment": list(field.comment),
+        **default,
+        **({"optional": True} if field.optional else {}),
+    }
+
+
+def _used(parts: tuple[ir.Message, ...], model: Model) -> Iterator[ir.TypeName]:
+    """Yield the names of all messages that structures hold, each once, in the order of use."""
+    seen: set[ir.TypeName] = set()
+    waiting = list(reversed(parts))
+    while waiting:
+        for target in waiting.pop().references:
+            if target not in seen:
+                seen.add(target)
+                yield target
+                waiting.insert(0, model.messages[target])
+
+
+def json_schema(interface: ir.Interface, model: Model) -> Json:
+    """Return the JSON Schema of what `to_dict()` gives; a service's are those of its parts."""
+    parts = derive.sections(interface)
+    used = list(_used(parts, model))
+    definitions = {str(name): _object(model.messages[name]) for name in used}
+    head: Json = {"$schema": DIALECT, "title": str(interface.name)}
+    if len(parts) == 1:
+        head |= _object(parts[0])
+    else:
+        definitions |= {str(part.name): _object(part) for part in parts}
+        head["anyOf"] = [_reference(part.name) for part in parts]
+    return {**head, "$defs": definitions} if definitions else head
+
+
+def _reference(name: ir.TypeName) -> Json:
+    return {"$ref": "#/$defs/" + str(name).replace("/", "~1")}
+
+
+def _object(message: ir.Message) -> Json:
+    about: Json = {"description": "\n".join(message.comment)} if message.comment else {}
+    return {
+        **about,
+        "type": "object",
+        "properties": {field.name: _property(field) for field in message.fields},
+        "required": [field.name for field in message.fields if field.default is None],
+        "additionalProperties": False,
+    }
+
+
+def _property(field: ir.Field) -> Json:
+    found = _value(field.type)
+    if field.comment:
+        found["description"] = "\n".join(field.comment)
+    if field.unit:
+        found["x-unit"] = field.unit
+    if field.default is not None:
+        found["default"] = field.default.value
+    return found
+
+
+def _value(type_: ir.FieldType) -> Json:
+    match type_:
+        case ir.Array():
+            size = type_.size
+            return {
+                "type": "array",
+                "items": _value(type_.element),
+                "minItems": size,
+                "maxItems": size,
+            }
+        case ir.Sequence():
+            most = {} if type_.bound is None else {"maxItems": type_.bound}
+            return {"type": "array", "items": _value(type_.element), **most}
+        case ir.String():
+            longest = {} if type_.bound is None else {"maxLength": type_.bound}
+            return {"type": "string", **longest}
+        case ir.Ref():
+            return _reference(type_.target)
+        case ir.Primitive("bool"):
+            return {"type": "boolean"}
+        case ir.Primitive():
+            if type_.info.low is None:
+                return {"type": "number"}
+            return {"type": "integer", "minimum": type_.info.low, "maximum": type_.info.high}
+        case ir.Unknown():
+            return {}
+
+
+def mcap(interface: ir.Interface, model: Model) -> str:
+    """Return a message's MCAP schema of encoding `ros2msg`: its text and those that it uses."""
+    used = [model.interfaces[name] for name in _used(derive.sections(interface), model)]
+    heads = [f"{MCAP_LINE}\nMSG: {one.name.package}/{one.name.name}\n" for one in used]
+    texts = [_ended(file_text(one)) for one in (interface, *used)]
+    return "".join(head + text for head, text in zip(("", *heads), texts, strict=True))
+
+
+def _ended(text: str) -> str:
+    return text if not text or text.endswith("\n") else text + "\n"

@@ -1,0 +1,317 @@
+"""What the pages' templates are given: texts and flags, in the order in which they are shown.
+
+Texts are as the user wrote them; the templates' environment escapes all that it places.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from idlc.model import derive, ir
+from idlc.model.ir import is_range, spell, spell_value
+from idlc.model.link import Model
+
+_HEIGHT = 30
+_GAP = 12
+_CHARACTER = 7.3
+_BETWEEN = 70
+#: More neighbours than these make a picture that nobody reads.
+_MOST = 14
+
+
+class Box(NamedTuple):
+    """An interface; `page` is where a click leads, empty for the page itself and what has none."""
+
+    x: str
+    y: str
+    width: str
+    height: str
+    middle: str
+    baseline: str
+    text: str
+    own: bool
+    page: str
+
+
+class Picture(NamedTuple):
+    """A drawing; `lines` are curves as SVG describes them."""
+
+    label: str
+    width: str
+    height: str
+    lines: Sequence[str]
+    boxes: Sequence[Box]
+
+
+class _Node(NamedTuple):
+    name: ir.TypeName | None
+    text: str
+
+
+class _Column(NamedTuple):
+    """Nodes below each other, from `start` to `end`."""
+
+    nodes: list[_Node]
+    start: float
+    width: float
+
+    @property
+    def end(self) -> float:
+        return self.start + self.width
+
+
+def picture(
+    name: ir.TypeName,
+    users: Iterable[ir.TypeName],
+    used: Iterable[ir.TypeName],
+    pages: Mapping[ir.TypeName, str],
+) -> Picture | None:
+    """Return the picture of an interface, `None` without neighbours."""
+    left, right = _cut(sorted(users), name.package), _cut(sorted(used), name.package)
+    if not left and not right:
+        return None
+    users_ = _column(left, 1.0)
+    own = _column([_Node(name, name.name)], users_.end + (_BETWEEN if left else 0))
+    used_ = _column(right, own.end + _BETWEEN)
+    columns = (users_, own, used_)
+    height = max(len(column.nodes) for column in columns) * (_HEIGHT + _GAP) + _GAP
+    middle = height / 2
+    lines = [_line((users_.end, y), (own.start, middle)) for y, _ in _places(users_, height)]
+    lines += [_line((own.end, middle), (used_.start, y)) for y, _ in _places(used_, height)]
+    others = {one: page for one, page in pages.items() if one != name}
+    return Picture(
+        f"what uses {name.name}, and what it uses",
+        f"{(used_ if right else own).end + 1:.0f}",
+        f"{height:.0f}",
+        lines,
+        [
+            _box(column, y, node, node.name == name, others)
+            for column in columns
+            for y, node in _places(column, height)
+        ],
+    )
+
+
+def _cut(names: list[ir.TypeName], package: str) -> list[_Node]:
+    shown = [
+        _Node(name, name.name if name.package == package else f"{name.package}/{name.name}")
+        for name in names[:_MOST]
+    ]
+    rest = len(names) - _MOST
+    return [*shown, _Node(None, f"and {rest} more")] if rest > 0 else shown
+
+
+def _column(nodes: list[_Node], start: float) -> _Column:
+    longest = max((len(node.text) for node in nodes), default=0)
+    return _Column(nodes, start, longest * _CHARACTER + 24 if nodes else 0)
+
+
+def _places(column: _Column, height: float) -> Iterator[tuple[float, _Node]]:
+    """Yield the nodes, each with the middle of its height."""
+    first = (height - len(column.nodes) * (_HEIGHT + _GAP) + _GAP) / 2 + _HEIGHT / 2
+    for number, node in enumerate(column.nodes):
+        yield first + number * (_HEIGHT + _GAP), node
+
+
+def _line(here: tuple[float, float], there: tuple[float, float]) -> str:
+    middle = (here[0] + there[0]) / 2
+    return (
+        f"M{here[0]:.0f},{here[1]:.0f} C{middle:.0f},{here[1]:.0f} "
+        f"{middle:.0f},{there[1]:.0f} {there[0]:.0f},{there[1]:.0f}"
+    )
+
+
+def _box(
+    column: _Column, y: float, node: _Node, own: bool, pages: Mapping[ir.TypeName, str]
+) -> Box:
+    return Box(
+        x=f"{column.start:.0f}",
+        y=f"{y - _HEIGHT / 2:.0f}",
+        width=f"{column.width:.0f}",
+        height=str(_HEIGHT),
+        middle=f"{column.start + column.width / 2:.0f}",
+        baseline=f"{y + 4.5:.0f}",
+        text=node.text,
+        own=own,
+        page=pages.get(node.name, "") if node.name else "",
+    )
+
+
+KINDS = {"msg": "message", "srv": "service", "action": "action"}
+_SECTIONS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
+
+#: The pages by interface; a link from one page to another goes up one folder.
+Pages = Mapping[ir.TypeName, str]
+
+#: Blanks that draw something: at the start of a line, or several that no punctuation explains.
+_DRAWING = re.compile(r"(?m)^[ \t]|[^\s.,;:!?]([ ]{2,}|\t)\S")
+
+
+class Block(NamedTuple):
+    """A paragraph, or something drawn, which `pre` shows as it stands."""
+
+    tag: str
+    text: str
+
+
+class Link(NamedTuple):
+    """The name of a type; `page` is empty if it has none."""
+
+    page: str
+    title: str
+    words: Sequence[str]
+
+
+class Row(NamedTuple):
+    """A field or constant; its type is a link and what comes after it, or only the latter."""
+
+    anchor: str
+    words: Sequence[str]
+    link: Link | None
+    type: Sequence[str]
+    unit: str
+    value: str
+    meaning: Sequence[Block]
+
+
+class Table(NamedTuple):
+    """Rows, and which of the columns that may be empty are not; `units` is the heading of one."""
+
+    rows: Sequence[Row]
+    units: str
+    values: bool
+    meanings: bool
+
+
+class Section(NamedTuple):
+    """A structure, with a title if it is one of several."""
+
+    title: str
+    about: Sequence[Block]
+    constants: Table
+    fields: Table
+    empty: bool
+
+
+class Home(NamedTuple):
+    """The page of a package and its version; empty what it has not."""
+
+    page: str = ""
+    version: str = ""
+
+
+class Page(NamedTuple):
+    """The page of an interface; `statement` imports its class in Python."""
+
+    title: str
+    root: str
+    package: str
+    home: Home
+    kind: str
+    what: str
+    words: Sequence[str]
+    sections: Sequence[Section]
+    picture: Picture | None
+    users: Sequence[Link]
+    statement: str
+    hash: str
+    source: str
+
+
+def page(
+    interface: ir.Interface, model: Model, users: Iterable[ir.TypeName], pages: Pages, home: Home
+) -> Page:
+    """Return the page of an interface; `users` are the interfaces that refer to it."""
+    own = interface.name
+    titles = _SECTIONS.get(own.kind, ("",))
+    parts = zip(titles, derive.sections(interface), strict=True)
+    return Page(
+        title=str(own),
+        root="../",
+        package=own.package,
+        home=home,
+        kind=own.kind,
+        what=KINDS[own.kind],
+        words=words(own.name),
+        sections=[_section(title, part, prefix(interface, part), pages) for title, part in parts],
+        picture=picture(own, users, derive.references(interface), pages),
+        users=[_link(user, str(user), pages) for user in sorted(users)],
+        statement=f"from {own.package}.{own.kind} import {own.name}",
+        hash=model.describer.hash(str(own)) if model.distro.has_hashes else "",
+        source="\n".join(interface.source.text.splitlines()) if interface.source else "",
+    )
+
+
+def words(name: str) -> list[str]:
+    """Return the pieces of a name between which it may break."""
+    return re.split(r"(?<=[_/.])|(?<=[a-z0-9])(?=[A-Z])", name)
+
+
+def prefix(interface: ir.Interface, part: ir.Message) -> str:
+    """Return what tells the anchors of a service's or action's parts from each other."""
+    return part.name.name.removeprefix(interface.name.name).strip("_") + "." * (
+        part.name != interface.name
+    )
+
+
+def blocks(lines: Sequence[str]) -> list[Block]:
+    """Return comment lines: paragraphs, and what is indented or drawn as it stands."""
+    texts = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
+    return [Block(_tag(text), text) for text in texts if text.strip()]
+
+
+def _tag(text: str) -> str:
+    return "pre" if "\n" in text and _DRAWING.search(text) else "p"
+
+
+def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
+    return Link(pages.get(target, ""), str(target), words(text))
+
+
+def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
+    constants = [
+        Row(
+            before + one.name,
+            words(one.name),
+            None,
+            [spell(one.type)],
+            "",
+            spell_value(one.value),
+            blocks(one.comment),
+        )
+        for one in message.constants
+    ]
+    fields = [_field(one, message.name.package, before, pages) for one in message.fields]
+    empty = not (constants or fields)
+    return Section(title, blocks(message.comment), _table(constants), _table(fields), empty)
+
+
+def _field(field: ir.Field, package: str, before: str, pages: Pages) -> Row:
+    element = ir.element_of(field.type)
+    written = spell(field.type, package)
+    link, rest = None, words(written)
+    if isinstance(element, ir.Ref):
+        text = spell(element, package)
+        link, rest = _link(element.target, text, pages), [written.removeprefix(text)]
+    value = spell_value(field.default.value) if field.default else ""
+    return Row(
+        before + field.name,
+        words(field.name),
+        link,
+        rest,
+        field.unit or "",
+        value,
+        blocks(field.comment),
+    )
+
+
+def _table(rows: Sequence[Row]) -> Table:
+    kinds = {"range" if is_range(row.unit) else "unit" for row in rows if row.unit}
+    return Table(
+        rows,
+        " or ".join(sorted(kinds, reverse=True)),
+        any(row.value for row in rows),
+        any(row.meaning for row in rows),
+    )

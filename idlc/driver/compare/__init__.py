@@ -1,1 +1,0 @@
-"""`idlc breaking`: versions, distributions, the nodes of a graph."""

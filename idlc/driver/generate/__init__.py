@@ -1,1 +1,0 @@
-"""`idlc gen`: from interfaces to packages on disk."""

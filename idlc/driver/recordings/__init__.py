@@ -1,1 +1,0 @@
-"""Recordings: as a source of interfaces, and their messages as columns."""

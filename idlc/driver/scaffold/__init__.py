@@ -1,1 +1,0 @@
-"""`idlc scaffold`: new packages, interfaces and nodes."""

@@ -1,0 +1,121 @@
+"""The documents that a client has open, and how it changes them."""
+
+from __future__ import annotations
+
+import re
+from codecs import BOM_UTF8
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from pathlib import Path
+from urllib.parse import unquote
+
+from idlc.editor.protocol import uris
+from idlc.editor.protocol.parts import Change, DocumentItem, Range
+from idlc.editor.protocol.positions import in_lines, lines_of
+from idlc.model import ir
+from idlc.project.files import Unsaved, absolute
+from idlc.project.find import KINDS
+from idlc.project.lock import digest
+
+#: The language id of interface files.
+LANGUAGE = "rosmsg"
+
+
+class Document:
+    """One document; `path` is that of its file, or where it would be saved; `None` for others."""
+
+    def __init__(self, item: DocumentItem) -> None:
+        self.uri = item.uri
+        self.path = uris.to_path(item.uri) or _draft(item)
+        self.version: int | None = item.version
+        self._lines = lines_of(item.text)
+
+    @cached_property
+    def text(self) -> str:
+        """The whole text."""
+        return "".join(self._lines)
+
+    @property
+    def data(self) -> bytes:
+        """What a file would hold; halves of characters, which no file can hold, become `?`."""
+        return self.text.encode("utf-8", errors="replace")
+
+    def is_on_disk(self) -> bool:
+        """Return whether its file holds this text, however that is spelled on disk."""
+        try:
+            data = self.path.read_bytes() if self.path else b""
+        except OSError:
+            return False
+        return self.path is None or digest(data.removeprefix(BOM_UTF8)) == digest(self.data)
+
+    def change(self, changes: Iterable[Change], encoding: str) -> None:
+        """Make changes, one after the other."""
+        for one in changes:
+            if one.range is None:
+                self._lines = lines_of(one.text)
+            else:
+                self._replace(one.range, one.text, encoding)
+        self.__dict__.pop("text", None)
+
+    def _replace(self, where: Range, new: str, encoding: str) -> None:
+        """Replace a range; only the lines around it are looked at."""
+        lines = self._lines
+        first, start = in_lines(lines, where.start, encoding)
+        last, end = in_lines(lines, where.end, encoding)
+        if (last, end) < (first, start):
+            last, end = first, start
+        # CR and LF may come together or apart at either end
+        low, high = max(first - 1, 0), min(last + 1, len(lines) - 1)
+        before = "".join(lines[low:first]) + lines[first][:start]
+        after = lines[last][end:] + "".join(lines[last + 1 : high + 1])
+        found = lines_of(before + new + after)
+        if high < len(lines) - 1 and not found[-1]:
+            del found[-1]
+        lines[low : high + 1] = found
+
+
+def _draft(item: DocumentItem) -> Path | None:
+    """Return the path of an interface that has never been saved: here, or where its name says.
+
+    How many sections it has says of which kind it is.
+    """
+    scheme, _, name = item.uri.partition(":")
+    if scheme != "untitled" or item.language_id != LANGUAGE:
+        return None
+    if Path(name).suffix in KINDS:
+        return absolute(unquote(name))
+    marks = sum(line.rstrip() == "---" for line in item.text.splitlines())
+    kind = ir.KINDS[min(marks, len(ir.KINDS) - 1)]
+    stem = re.sub(r"[^A-Za-z0-9]", "", name.rpartition("/")[2])
+    return absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
+
+
+class Documents:
+    """All open documents by URI."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, Document] = {}
+
+    def __iter__(self) -> Iterator[Document]:
+        return iter(self._open.values())
+
+    def get(self, uri: str) -> Document | None:
+        """Return an open document."""
+        return self._open.get(uri)
+
+    def open(self, item: DocumentItem) -> Document:
+        """Open a document, again if it is open already."""
+        found = self._open[item.uri] = Document(item)
+        return found
+
+    def close(self, uri: str) -> Document | None:
+        """Close a document; `None` if it was not open."""
+        return self._open.pop(uri, None)
+
+    def at(self, path: Path) -> Document | None:
+        """Return the open document of a file: of two URIs for it, that whose text counts."""
+        return next((one for one in reversed(self._open.values()) if one.path == path), None)
+
+    def unsaved(self) -> Unsaved:
+        """Return what counts instead of the files on disk."""
+        return Unsaved({one.path: one.data for one in self if one.path is not None})

@@ -1,0 +1,126 @@
+"""What stands at a place of an interface file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple, TypeAlias
+
+from idlc.diagnostics.source import Source, Span
+from idlc.editor.protocol.parts import Position
+from idlc.editor.world import Known, World
+from idlc.language import tree
+from idlc.language.parse import parse, parse_definition
+from idlc.model import derive, ir
+from idlc.model.lower import SECTIONS
+
+Part: TypeAlias = Literal["type", "name", "value", "comment"]
+
+
+class Element(NamedTuple):
+    """A definition: its line, what the line says, and what that means, if anything.
+
+    `message` is the structure whose section it stands in.
+    """
+
+    source: Source
+    line: tree.Line
+    body: tree.Field | tree.Constant
+    message: ir.Message
+    meaning: ir.Field | ir.Constant | None
+
+    def span(self, piece: tree.Piece) -> Span:
+        """Return the place of a piece of the line."""
+        start = self.line.start + piece.start
+        return Span(self.source, start, start + len(piece.text))
+
+    @property
+    def whole(self) -> Span:
+        """The definition without its comment."""
+        start = self.line.start
+        return Span(self.source, start, start + len(self.line.definition))
+
+    @property
+    def name(self) -> Span:
+        """Its name."""
+        return self.span(self.body.name)
+
+    @property
+    def type(self) -> Span:
+        """The name in its type, without bounds."""
+        return self.span(self.body.type.name)
+
+    @property
+    def value(self) -> Span | None:
+        """Its value or default."""
+        piece = self.body.value if isinstance(self.body, tree.Constant) else self.body.default
+        return self.span(piece) if piece else None
+
+    @property
+    def comment(self) -> Span:
+        """The comment after it; may be empty."""
+        start = self.line.start + len(self.line.code)
+        return Span(self.source, start, start + len(self.line.comment))
+
+    @property
+    def target(self) -> ir.TypeName | None:
+        """The message that its type names."""
+        if not isinstance(self.meaning, ir.Field):
+            return None
+        element = ir.element_of(self.meaning.type)
+        return element.target if isinstance(element, ir.Ref) else None
+
+
+class Spot(NamedTuple):
+    """A part of a definition."""
+
+    element: Element
+    part: Part
+    span: Span
+
+
+def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
+    """Yield the definitions of a file in order; what is none is left out."""
+    file = parse(source)
+    parts = derive.sections(interface)
+    meanings: dict[int, ir.Field | ir.Constant] = {}
+    for part in parts:
+        meanings |= {one.name_span.start: one for one in part.fields if one.name_span}
+        meanings |= {one.name_span.start: one for one in part.constants if one.name_span}
+    for section, message in zip(file.sections, parts, strict=False):
+        for line in section.lines:
+            code = line.after_optional or line
+            if not code.definition:
+                continue
+            body = parse_definition(code.definition)
+            if not isinstance(body, tree.Broken):
+                meaning = meanings.get(code.start + body.name.start)
+                yield Element(source, code, body, message, meaning)
+
+
+def spot(world: World, known: Known, position: Position) -> Spot | None:
+    """Return what stands at a position; `None` outside of definitions.
+
+    A name counts up to the place after its last character.
+    """
+    offset = world.offset(known.source, position)
+    for one in elements(known.source, known.interface):
+        end = one.line.start + len(one.line.code) + len(one.line.comment)
+        if not one.line.start <= offset <= end:
+            continue
+        parts: list[tuple[Part, Span | None]] = [
+            ("name", one.name),
+            ("type", one.span(one.body.type.whole)),
+            ("value", one.value),
+            ("comment", one.comment),
+        ]
+        for part, span in parts:
+            if span is not None and span.start <= offset <= span.end and span.end > span.start:
+                return Spot(one, part, span)
+        return None
+    return None
+
+
+def section_names(interface: ir.Interface) -> tuple[str, ...]:
+    """Return what the sections of a file are called, such as `Request`; empty for a message."""
+    names = SECTIONS[interface.name.kind]
+    return tuple(name.lstrip("_") for name in names) if len(names) > 1 else ()

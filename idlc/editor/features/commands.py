@@ -1,0 +1,125 @@
+"""Commands, which an editor sends when its user chose one of them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics.report import Report, Severity, first_few
+from idlc.editor.edits import workspace_edit
+from idlc.editor.features import rename
+from idlc.editor.protocol import capabilities
+from idlc.editor.protocol.capabilities import UPDATE_GENERATED
+from idlc.editor.protocol.framing import INVALID_PARAMS, REQUEST_FAILED, RequestError
+from idlc.editor.protocol.parts import Command
+from idlc.editor.world import World
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+    from pathlib import Path
+
+    from idlc.generate.gen import Run
+    from idlc.generate.package import Generated
+
+#: Problems, and packages, that a message names.
+NAMED = 5
+_ERROR, _INFO = 1, 3
+
+
+def command(world: World, uri: str) -> dict[str, object] | None:
+    """Return the command for a document whose generated package is out of date."""
+    found = _generated(world, uri)
+    if found is None or not found[0].is_needed(*found[1]):
+        return None
+    title = f"Update the generated package in {found[0].options.out}"
+    return {"title": title, "command": UPDATE_GENERATED, "arguments": [uri]}
+
+
+def _generated(world: World, uri: str) -> tuple[Run, tuple[str, Mapping[str, str], str]] | None:
+    """Return the run that a document is an input of, and all inputs of its package."""
+    from idlc.generate.gen import run_for
+
+    path = world.path(uri)
+    project = world.projects.of(path) if path else None
+    if path is None or project is None:
+        return None
+    inputs = project.workspace.inputs(path)
+    run = run_for(path, inputs[0])
+    return (run, inputs) if run else None
+
+
+def update(world: World, uri: str) -> None:
+    """Do what `idlc gen` does, and say what that was; raises RequestError."""
+    found = _generated(world, uri)
+    if found is None:
+        raise RequestError(REQUEST_FAILED, "[tool.idlc] does not say where to generate it")
+    run, (package, _, _) = found
+    unsaved = sorted(f"`{one.name}`" for one in _unsaved(world, package))
+    if unsaved:
+        names = first_few(unsaved, NAMED)
+        raise RequestError(REQUEST_FAILED, f"save first, what is on disk is compiled: {names}")
+    report = Report()
+    try:
+        done = run.make(report)
+    except OSError as error:
+        raise RequestError(REQUEST_FAILED, f"nothing was generated: {error}") from error
+    world.projects.forget()
+    failed = report.had_errors
+    message = _failure(report) if failed else _success(done)
+    world.tell("window/showMessage", {"type": _ERROR if failed else _INFO, "message": message})
+
+
+def _unsaved(world: World, package: str) -> Iterator[Path]:
+    """Yield the files of a package that hold another text than their documents."""
+    for one in world.documents:
+        known = world.known(one.uri)
+        if known and one.path and known.interface.name.package == package and not one.is_on_disk():
+            yield one.path
+
+
+def _failure(report: Report) -> str:
+    errors = [one for one in report if one.severity is Severity.ERROR]
+    found = first_few((f"{one.where[0]}: {one.code}: {one.message}" for one in errors), NAMED)
+    return f"idlc gen: nothing was written: {found}"
+
+
+def _success(done: Iterable[Generated]) -> str:
+    return "idlc gen: " + first_few(map(_done, done), NAMED)
+
+
+def _done(one: Generated) -> str:
+    done = [f"{one.written} written"] if one.written else []
+    done += [f"{one.removed} removed"] if one.removed else []
+    return f"{one.package}: {', '.join(done) or 'unchanged'} in {one.out}"
+
+
+def execute(world: World, asked: Command) -> None:
+    """Carry a command out."""
+    match asked.command, *asked.arguments:
+        case capabilities.ADD_DEPENDENCY, str(uri), str(package):
+            _declare(world, uri, package)
+        case capabilities.RENAME_FILE, str(uri), str(new):
+            _rename(world, uri, new)
+        case capabilities.UPDATE_GENERATED, str(uri):
+            update(world, uri)
+        case _:
+            raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}` for these")
+
+
+def _rename(world: World, uri: str, new: str) -> None:
+    world.projects.forget()
+    known = world.known(uri)
+    edit = rename.rename_interface(known, uri, new, known, world) if known else None
+    if edit is not None:
+        world.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
+
+
+def _declare(world: World, uri: str, package: str) -> None:
+    world.projects.notice_changes()  # or the edit may be of an older package.xml
+    known = world.known(uri)
+    path = world.path(uri)
+    project = world.projects.of(path) if path else None
+    edit = project.workspace.dependency(path, package) if project and path else None
+    if known is not None and edit is not None:
+        change = workspace_edit([edit], known.state, world)
+        label = f"declare {package}"
+        world.ask("workspace/applyEdit", {"label": label, "edit": change})

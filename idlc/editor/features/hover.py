@@ -1,0 +1,170 @@
+"""What a definition or type is, in words: comment, unit, range, default, bytes, hash."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from idlc.documents.show import outline
+from idlc.editor.elements import Element, section_names, spot
+from idlc.editor.protocol.parts import AtPosition, Markup, Part, Range
+from idlc.editor.workspace import State
+from idlc.editor.world import World, is_built_in
+from idlc.model import derive, ir
+from idlc.model.ir import is_range, spell, spell_value
+from idlc.model.link import Model
+from idlc.wire.layout import Extent, Placed, layout
+
+#: Lines of a message that are shown.
+MOST_LINES = 40
+
+
+class Hover(Part, frozen=True):
+    """A text about a range."""
+
+    contents: Markup
+    range: Range | None = None
+
+
+def hover(world: World, asked: AtPosition) -> Hover | None:
+    """Return what is known of what stands at a position; of the file itself between definitions."""
+    known = world.known(asked.text_document.uri)
+    if known is None:
+        return None
+    found = spot(world, known, asked.position)
+    state = known.state
+    if found is None or found.part == "comment":
+        return Hover(Markup("\n\n".join(_interface(known.interface, state))))
+    element = found.element
+    if found.part == "type" and element.target is not None:
+        there = next(
+            (
+                one.interfaces[element.target]
+                for one in state.models.values()
+                if element.target in one.interfaces
+            ),
+            None,
+        )
+        if there is None:
+            return None
+        return Hover(Markup("\n\n".join(_interface(there, state))), world.range(found.span))
+    if element.meaning is None:
+        return None
+    text = "\n\n".join(filter(None, _definition(element, known.interface, state)))
+    return Hover(Markup(text), world.range(found.span))
+
+
+def _definition(element: Element, interface: ir.Interface, state: State) -> Iterator[str]:
+    one = element.meaning
+    assert one is not None
+    if isinstance(one, ir.Constant):
+        yield code([f"{spell(one.type)} {one.name}={spell_value(one.value)}"])
+    else:
+        default = f" {spell_value(one.default.value)}" if one.default else ""
+        yield code([f"{spell(one.type)} {one.name}{default}"])
+    yield prose(one.comment)
+    says_range = one.unit is not None and is_range(one.unit)
+    facts = [f"{'range' if says_range else 'unit'}: `{one.unit}`"] if one.unit else []
+    facts += _limits(one.type, has_range=says_range)
+    if isinstance(one, ir.Field):
+        facts += [f"default: `{spell_value(one.default.value)}`"] if one.default else []
+        placed = placed_fields(element.message, interface, state)
+        facts += [_bytes(each) for each in placed[0] if each.field is one] if placed else []
+    yield "  \n".join(facts)
+
+
+def _limits(type_: ir.FieldType, *, has_range: bool) -> list[str]:
+    """Return which values a type has, where that is not all of a float or text."""
+    facts = []
+    element = ir.element_of(type_)
+    if isinstance(element, ir.Primitive) and element.info.low is not None and not has_range:
+        facts.append(f"range: `{element.info.low}` to `{element.info.high}`")
+    if isinstance(element, ir.String) and element.bound is not None:
+        facts.append(f"length: at most {element.bound} characters")
+    if isinstance(type_, ir.Sequence) and type_.bound is not None:
+        facts.append(f"elements: at most {type_.bound}")
+    return facts
+
+
+def _bytes(placed: Placed) -> str:
+    return f"on the wire: {placed.size.in_bytes} at offset {placed.offset}"
+
+
+def placed_fields(
+    message: ir.Message, interface: ir.Interface, state: State
+) -> tuple[list[Placed], Extent] | None:
+    """Return where the fields of a section stand in its bytes, `None` if there are errors."""
+    model = state.model_of(interface)
+    return layout(message, model.messages) if model else None
+
+
+def _interface(interface: ir.Interface, state: State) -> Iterator[str]:
+    """Yield what an interface is."""
+    yield f"**{interface.name}**"
+    model = state.model_of(interface)
+    if model is None:
+        yield prose(derive.sections(interface)[0].comment)
+        return
+    yield code(shortened(list(outline(interface, model))))
+    yield "  \n".join(_sizes(interface, model))
+    if model.distro.has_hashes:
+        yield f"`{model.describer.hash(str(interface.name))}`"
+    if interface.source is not None and is_built_in(interface.source):
+        # the catalogue has no comments
+        package = interface.name.package
+        page = f"https://docs.ros.org/en/{model.distro.name}/p/{package}/"
+        yield f"[{prose((package,))} in the documentation of ROS 2]({page})"
+
+
+def _sizes(interface: ir.Interface, model: Model) -> Iterator[str]:
+    names = section_names(interface) or ("",)
+    for name, section in zip(names, derive.sections(interface), strict=True):
+        of = f" of the {name.lower()}" if name else ""
+        yield f"on the wire{of}: {layout(section, model.messages)[1].in_bytes}"
+
+
+def shortened(lines: list[str]) -> list[str]:
+    """Return the first lines of a definition, with a remark that counts the others."""
+    more = [f"# {len(lines) - MOST_LINES} more lines"] if len(lines) > MOST_LINES else []
+    return lines[:MOST_LINES] + more
+
+
+def code(lines: list[str]) -> str:
+    """Return lines as code; what they hold cannot end it."""
+    text = "\n".join(lines)
+    fence = "`" * max(3, 1 + max((len(run) for run in _runs(text)), default=0))
+    return f"{fence}rosmsg\n{text}\n{fence}"
+
+
+def _runs(text: str) -> Iterator[str]:
+    """Yield each run of backticks."""
+    return iter(re.findall("`+", text))
+
+
+#: What begins a heading, list, quotation, table, rule, or fenced code at the start of a line.
+_BLOCK = r"^\s*(?:[#>+=~|:*_-]|\d+(?=[.)]))"
+#: Text in backticks, which is code in Markdown as in comments.
+_CODE = r"(?<!`)`[^`]+`(?!`)"
+#: What Markdown may take for something else than text: the beginning of a span suffices.
+_MARKS = (
+    r"\\(?=[!-/:-@\[-`{-~])|\\$|`|<(?=[\w/!?])|&(?=[\w#])|\](?=[(\[:])"
+    r"|(?<![^\W_])_+(?=\S)|[*~]+(?=\S)"
+)
+
+
+def prose(lines: tuple[str, ...]) -> str:
+    """Return a comment as it was written, as Markdown that shows it so.
+
+    Only what Markdown would take for something else is escaped, as some editors show each escape.
+    """
+    escape = re.compile(rf"{_CODE}|{_BLOCK}|{_MARKS}")
+    return "  \n".join(escape.sub(_escaped, line) for line in lines)
+
+
+def _escaped(match: re.Match[str]) -> str:
+    text = match[0]
+    if text.startswith("`") and len(text) > 1:
+        return text
+    blanks = text[: len(text) - len(text.lstrip())]
+    mark = text.lstrip()
+    return blanks + (f"{mark}\\" if mark.isdigit() else "".join(f"\\{one}" for one in mark))

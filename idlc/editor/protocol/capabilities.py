@@ -1,0 +1,82 @@
+"""What client and server can do, as they say it to each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from idlc.version import __version__
+
+TYPES = ["type", "struct", "property", "enumMember", "number", "string", "comment", "operator"]
+TYPES += ["keyword", "namespace"]
+MODIFIERS = ["declaration", "readonly", "defaultLibrary"]
+
+
+#: What positions can be counted in, and what holds if nothing was agreed on.
+ENCODINGS = ("utf-8", "utf-16", "utf-32")
+DEFAULT_ENCODING = "utf-16"
+#: The command that declares a package in package.xml, for what is completed.
+ADD_DEPENDENCY = "idlc.addDependency"
+#: The command that gives a document's file, and its interface, another name.
+RENAME_FILE = "idlc.renameFile"
+#: The command that does what `idlc gen` does for a document, and the kind of action that offers it.
+UPDATE_GENERATED = "idlc.updateGenerated"
+UPDATE_KIND = "source.updateGenerated.idlc"
+
+
+def encoding(client: dict[str, Any]) -> str:
+    """Return the first encoding of positions that a client offers and the server knows."""
+    general = client.get("general")
+    offered = general.get("positionEncodings") if isinstance(general, dict) else None
+    known = [one for one in offered or () if one in ENCODINGS]
+    return known[0] if known else DEFAULT_ENCODING
+
+
+def answer(client: dict[str, Any]) -> dict[str, object]:
+    """Return the answer to `initialize` for what a client can do."""
+    return {
+        "capabilities": {"positionEncoding": encoding(client), **CAPABILITIES},
+        "serverInfo": {"name": "idlc", "version": __version__},
+    }
+
+
+_INTERFACE_FILES = {"filters": [{"pattern": {"glob": "**/*.{msg,srv,action}"}}]}
+CAPABILITIES: dict[str, object] = {
+    "textDocumentSync": {"openClose": True, "change": 2, "save": {"includeText": False}},
+    "diagnosticProvider": {
+        "identifier": "idlc",
+        "interFileDependencies": True,
+        "workspaceDiagnostics": True,
+    },
+    "completionProvider": {
+        "triggerCharacters": ["/", "=", "[", "(", " "],
+        "resolveProvider": True,
+    },
+    "codeActionProvider": {"codeActionKinds": ["quickfix", "source.fixAll.idlc", UPDATE_KIND]},
+    "renameProvider": {"prepareProvider": True},
+    "inlayHintProvider": True,
+    "codeLensProvider": {"resolveProvider": True},
+    "semanticTokensProvider": {
+        "legend": {"tokenTypes": TYPES, "tokenModifiers": MODIFIERS},
+        "full": True,
+        "range": True,
+    },
+    "foldingRangeProvider": True,
+    "selectionRangeProvider": True,
+    "documentLinkProvider": {},
+    "executeCommandProvider": {"commands": [ADD_DEPENDENCY, RENAME_FILE, UPDATE_GENERATED]},
+    "hoverProvider": True,
+    "definitionProvider": True,
+    "typeDefinitionProvider": True,
+    "referencesProvider": True,
+    "documentHighlightProvider": True,
+    "documentSymbolProvider": True,
+    "workspaceSymbolProvider": True,
+    "documentFormattingProvider": True,
+    "documentRangeFormattingProvider": True,
+    "documentOnTypeFormattingProvider": {"firstTriggerCharacter": "\n"},
+    "workspace": {
+        "textDocumentContent": {"schemes": ["idlc"]},
+        "fileOperations": {"willRename": _INTERFACE_FILES, "didRename": _INTERFACE_FILES},
+        "workspaceFolders": {"supported": True, "changeNotifications": True},
+    },
+}

@@ -1,0 +1,403 @@
+"""The loop of the server: messages come in one after the other, and are answered in this order.
+
+A thread reads, so that a cancellation is known before its request is begun, and so that many
+changes in a row are followed by one check. Whatever a client sends, the server lives on.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import queue
+import threading
+from collections import Counter
+from collections.abc import Callable
+from functools import cached_property
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeAlias
+
+from idlc.editor.protocol import capabilities, framing
+from idlc.editor.protocol.framing import (
+    CANCELLED,
+    INTERNAL_ERROR,
+    INVALID_PARAMS,
+    INVALID_REQUEST,
+    METHOD_NOT_FOUND,
+    NOT_INITIALIZED,
+    PARSE_ERROR,
+    RequestError,
+)
+
+if TYPE_CHECKING:
+    from idlc.editor.workbench import Workbench
+
+
+class Method(NamedTuple):
+    """A function of a module in `idlc.editor.features`, and the type of what it is asked with."""
+
+    module: str
+    function: str
+    params: str
+
+    def prepare(self) -> ModuleType:
+        """Import and return its module."""
+        return import_module(f"idlc.editor.features.{self.module}")
+
+    def call(self, world: Any, params: object) -> object:
+        """Return what the function answers; raises ValidationError for wrong parameters."""
+        import msgspec
+
+        asked = msgspec.convert(
+            params, getattr(import_module("idlc.editor.protocol.parts"), self.params)
+        )
+        answer: object = getattr(self.prepare(), self.function)(world, asked)
+        return answer
+
+
+METHODS = {
+    "textDocument/diagnostic": Method("diagnostics", "document", "OfDocument"),
+    "workspace/diagnostic": Method("diagnostics", "workspace", "AskedWorkspace"),
+    "textDocument/completion": Method("completion", "complete", "AtPosition"),
+    "completionItem/resolve": Method("completion", "resolve", "CompletionItem"),
+    "textDocument/codeAction": Method("actions", "actions", "AskedActions"),
+    "textDocument/prepareRename": Method("rename", "prepare", "AtPosition"),
+    "textDocument/rename": Method("rename", "rename", "AskedRename"),
+    "workspace/willRenameFiles": Method("rename", "files", "AskedFileRenames"),
+    "workspace/executeCommand": Method("commands", "execute", "Command"),
+    "textDocument/hover": Method("hover", "hover", "AtPosition"),
+    "textDocument/definition": Method("navigation", "definition", "AtPosition"),
+    "textDocument/typeDefinition": Method("navigation", "type_definition", "AtPosition"),
+    "textDocument/references": Method("navigation", "references", "AskedReferences"),
+    "textDocument/documentHighlight": Method("navigation", "highlights", "AtPosition"),
+    "textDocument/documentSymbol": Method("structure", "document", "OfDocument"),
+    "workspace/symbol": Method("structure", "workspace", "AskedSymbols"),
+    "textDocument/inlayHint": Method("lenses", "hints", "OfRange"),
+    "textDocument/codeLens": Method("lenses", "lenses", "OfDocument"),
+    "codeLens/resolve": Method("lenses", "resolve", "Lens"),
+    "textDocument/semanticTokens/full": Method("tokens", "document", "OfDocument"),
+    "textDocument/semanticTokens/range": Method("tokens", "part", "OfRange"),
+    "textDocument/foldingRange": Method("structure", "folds", "OfDocument"),
+    "textDocument/selectionRange": Method("structure", "selections", "AtPositions"),
+    "textDocument/documentLink": Method("structure", "links", "OfDocument"),
+    "workspace/textDocumentContent": Method("navigation", "built_in_text", "AskedContent"),
+    "textDocument/formatting": Method("formatting", "document", "OfDocument"),
+    "textDocument/rangeFormatting": Method("formatting", "part", "OfRange"),
+    "textDocument/onTypeFormatting": Method("formatting", "typed", "AtPosition"),
+}
+
+
+#: No process has a higher number.
+MAX_PROCESS = 1 << 31
+
+
+class Session:
+    """A session; `notify` and `ask` send something to the client."""
+
+    def __init__(self, notify: Callable[..., None], ask: Callable[..., None]) -> None:
+        self.is_shut_down = False
+        self._notify = notify
+        self._ask = ask
+        self._given: dict[str, Any] | None = None
+
+    @cached_property
+    def workbench(self) -> Workbench:
+        """The documents, and what is known of them."""
+        from idlc.editor.workbench import Workbench
+
+        assert self._given is not None
+        return Workbench(self._given, self._notify, self._ask)
+
+    def client_is_gone(self) -> bool:
+        """Return whether the process of the client has ended; where that can be asked."""
+        client = (self._given or {}).get("processId")
+        if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
+            return False
+        try:
+            os.kill(client, 0)
+        except ProcessLookupError:
+            return True
+        except OSError:
+            return False
+        return False
+
+    def answer(self, name: str, params: object) -> object:
+        """Return the answer to a request; raises RequestError."""
+        if self.is_shut_down or (self._given is not None and name == "initialize"):
+            raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
+        if name == "initialize":
+            if not isinstance(params, dict):
+                raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
+            self._given = params
+            client = params.get("capabilities")
+            return capabilities.answer(client if isinstance(client, dict) else {})
+        if self._given is None:
+            raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
+        if name == "shutdown":
+            self.is_shut_down = True
+            return None
+        if name not in METHODS:
+            raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
+        return METHODS[name].call(self.workbench.world, params)
+
+    def take(self, name: str, params: object) -> None:
+        """Take a notification; those that are not known, or not for now, are passed over."""
+        if self._given is not None and not self.is_shut_down:
+            self.workbench.take(name, params)
+
+    def encode(self, message: object) -> bytes:
+        """Return a message as JSON."""
+        if "workbench" not in self.__dict__:
+            return json.dumps(message).encode()
+        import msgspec
+
+        try:
+            return msgspec.json.encode(message)
+        except UnicodeEncodeError:  # words of a client that are no text
+            return json.dumps(msgspec.to_builtins(message)).encode()
+
+    def idle(self) -> None:
+        """Do what can be done while the client says nothing."""
+        if "workbench" in self.__dict__ and not self.is_shut_down:
+            self.workbench.idle()
+
+    def prepare(self) -> None:
+        """Import what answers, so that the first time takes no longer than others; look around."""
+        if "workbench" not in self.__dict__ or self.is_shut_down:
+            return
+        if any(True for _ in self.workbench.world.documents):
+            for method in METHODS.values():
+                method.prepare()
+        self.workbench.rest()
+
+    def settle(self) -> None:
+        """Tell the client which problems there are now, where that changed."""
+        if "workbench" in self.__dict__ and not self.is_shut_down:
+            self.workbench.settle()
+
+
+#: Messages in a row after which problems are told although more are waiting.
+MOST_IN_A_ROW = 500
+#: Seconds without a message after which there is time for what nobody waits for; it is twice as
+#: long until the next look at what changed and whether the client still lives, and so on.
+QUIET = 0.3
+#: Seconds between such looks at most.
+PATIENCE = 10.0
+#: What came in: a message, something that is none, or the end.
+Message: TypeAlias = "dict[str, Any]"
+Arrival: TypeAlias = "Message | RequestError | None"
+Answer: TypeAlias = Callable[[Any], None]
+
+
+def serve(reader: BinaryIO, writer: BinaryIO) -> int:
+    """Serve a client until it ends that or is gone, and return the exit status."""
+    return Server(reader, writer).run()
+
+
+class Server:
+    """A server between two streams."""
+
+    def __init__(self, reader: BinaryIO, writer: BinaryIO) -> None:
+        self._reader = reader
+        self._writer = writer
+        self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        #: How many requests of an id wait for their answer, and which of the ids are cancelled.
+        self._waiting: Counter[int | str | None] = Counter()
+        self._cancelled: set[int | str] = set()
+        self._lock = threading.Lock()
+        self._count = 0
+        self._asked: dict[int, Answer] = {}
+        self._session = Session(self._notify, self._ask)
+
+    def run(self) -> int:
+        """Serve, and return the exit status."""
+        threading.Thread(target=self._read, daemon=True).start()
+        # to search for garbage takes longer than any answer, and there is hardly any
+        gc.disable()
+        in_a_row = since = 0
+        wait = PATIENCE
+        try:
+            while True:
+                if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
+                    in_a_row = 0
+                    self._attempt("problems", self._session.settle)
+                if since >= MOST_IN_A_ROW:
+                    since = self._tidy()
+                try:
+                    arrival = self._arrivals.get(timeout=wait)
+                except queue.Empty:
+                    wait = min(2 * wait, PATIENCE)
+                    if since:
+                        since = self._tidy()
+                    elif self._session.client_is_gone():
+                        return 1
+                    else:
+                        self._attempt("idle", self._session.idle)
+                    continue
+                in_a_row += 1
+                since += 1
+                wait = QUIET
+                if arrival is None or _is_exit(arrival):
+                    return 0 if self._session.is_shut_down else 1
+                self._take(arrival)
+        except (OSError, ValueError):  # nobody reads what is written
+            return 1
+
+    def _tidy(self) -> int:
+        """Do what nobody waits for; return how many messages came since then."""
+        self._attempt("preparation", self._session.prepare)
+        gc.collect()
+        return 0
+
+    def _read(self) -> None:
+        """Put each message that comes in where the loop takes it; `None` comes last."""
+        while True:
+            try:
+                body = framing.read(self._reader)
+                if body is None:
+                    break
+                message = _message(body)
+                if message.get("method") == "$/cancelRequest":
+                    id_ = _cancelled(message)
+                    with self._lock:
+                        if id_ in self._waiting:
+                            self._cancelled.add(id_)
+                    continue
+                if "method" in message and "id" in message:
+                    with self._lock:
+                        self._waiting[message["id"]] += 1
+                self._arrivals.put(message)
+            except framing.TooLongError:
+                self._arrivals.put(RequestError(INVALID_REQUEST, "the message is too long"))
+            except RequestError as error:
+                self._arrivals.put(error)
+            except (OSError, ValueError):  # the stream was closed
+                break
+        self._arrivals.put(None)
+
+    def _take(self, arrival: Message | RequestError) -> None:
+        if isinstance(arrival, RequestError):
+            self._fail(None, arrival)
+        elif "method" not in arrival:
+            self._take_answer(arrival)
+        elif "id" in arrival:
+            self._answer(arrival)
+        else:
+            name, params = arrival["method"], arrival.get("params")
+            self._attempt(name, lambda: self._session.take(name, params))
+
+    def _take_answer(self, arrival: Message) -> None:
+        """Take an answer to what was asked of the client; one to nothing that was is left."""
+        asked = arrival.get("id")
+        take = self._asked.pop(asked, None) if isinstance(asked, int) else None
+        if take is not None and "result" in arrival:
+            self._attempt("answer", lambda: take(arrival["result"]))
+
+    def _answer(self, request: Message) -> None:
+        id_, name = request["id"], request["method"]
+        if self._is_cancelled(id_):
+            self._fail(id_, RequestError(CANCELLED, "cancelled"))
+            return
+        failure, result = self._result(lambda: self._session.answer(name, _params(request)))
+        if failure is None:
+            self._write({"jsonrpc": "2.0", "id": id_, "result": result})
+            return
+        if failure.code == INTERNAL_ERROR:
+            self._log(f"{name}: {failure.message}")
+        self._fail(id_, failure)
+
+    def _is_cancelled(self, id_: int | str) -> bool:
+        """Return whether the request that is to be answered now was cancelled."""
+        with self._lock:
+            self._waiting[id_] -= 1
+            if not self._waiting[id_]:
+                del self._waiting[id_]
+            is_cancelled = id_ in self._cancelled
+            self._cancelled.discard(id_)
+        return is_cancelled
+
+    def _attempt(self, what: str, action: Callable[[], object]) -> None:
+        """Do what needs no answer; only the log says if that fails."""
+        failure, _ = self._result(action)
+        if failure is not None:
+            self._log(f"{what}: {failure.message}")
+
+    def _result(self, action: Callable[[], object]) -> tuple[RequestError | None, object]:
+        try:
+            return None, action()
+        except RequestError as error:
+            return error, None
+        except BrokenPipeError:
+            raise
+        except Exception as error:
+            kind = type(error).__name__
+            if kind == "ValidationError":  # msgspec's, which is not imported here
+                return RequestError(INVALID_PARAMS, str(error)), None
+            return RequestError(INTERNAL_ERROR, f"{kind}: {error}"), None
+
+    def _fail(self, id_: int | str | None, error: RequestError) -> None:
+        told = {"code": error.code, "message": error.message}
+        self._write({"jsonrpc": "2.0", "id": id_, "error": told})
+
+    def _log(self, message: str) -> None:
+        self._notify("window/logMessage", {"type": 1, "message": f"idlc: {message}"})
+
+    def _notify(self, method: str, params: object) -> None:
+        self._write({"jsonrpc": "2.0", "method": method, "params": params})
+
+    def _ask(self, method: str, params: object, answer: Answer | None = None) -> None:
+        """Ask the client something."""
+        id_ = self._count
+        self._count += 1
+        if answer is not None:
+            self._asked[id_] = answer
+        self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
+
+    def _write(self, message: object) -> None:
+        framing.write(self._writer, self._session.encode(message))
+
+
+def _message(body: bytes) -> Message:
+    """Return a message; raises RequestError if it is none."""
+    try:
+        message = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        raise RequestError(PARSE_ERROR, str(error)) from error
+    if not isinstance(message, dict):
+        raise RequestError(INVALID_REQUEST, "a message is an object")
+    if not isinstance(message.get("method", ""), str):
+        raise RequestError(INVALID_REQUEST, "the name of a method is a string")
+    id_ = message.get("id")
+    if type(id_) not in (int, str, type(None)) or not _is_text(id_):
+        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+    return message
+
+
+def _params(request: Message) -> object:
+    """Return what a request asks with; raises RequestError for text that is none."""
+    if not _is_text(request):
+        raise RequestError(INVALID_PARAMS, "a string has one half of a surrogate pair")
+    return request.get("params")
+
+
+def _is_text(value: object) -> bool:
+    """Return whether all strings in a value of JSON can be encoded, as halves of pairs cannot."""
+    try:
+        json.dumps(value, ensure_ascii=False).encode()
+    except (UnicodeEncodeError, RecursionError):
+        return False
+    return True
+
+
+def _cancelled(message: Message) -> int | str:
+    """Return which request is cancelled; raises RequestError."""
+    params = message.get("params")
+    id_ = params.get("id") if isinstance(params, dict) else None
+    if not isinstance(id_, (int, str)):
+        raise RequestError(INVALID_REQUEST, "an id is an integer or a string")
+    return id_
+
+
+def _is_exit(arrival: Message | RequestError) -> bool:
+    return isinstance(arrival, dict) and arrival.get("method") == "exit"

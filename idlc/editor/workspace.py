@@ -1,0 +1,291 @@
+"""What `idlc check` says of a folder, again and again while its files are edited.
+
+What is on disk is read when `Workspace.load` is called. After that only texts change, until the
+next load: what an editor has open counts instead of what its file holds.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from idlc.check import select
+from idlc.check.run import checkers, judged
+from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.text import without_options
+from idlc.model import ir
+from idlc.project import inputs, prefixes, settings
+from idlc.project.files import MAX_SIZE, Unsaved, absolute
+from idlc.project.find import Found, Picture, look, root_of
+from idlc.project.inputs import locks, places
+from idlc.project.package_xml import MANIFEST, manifest
+from idlc.project.scope import scope, working_in
+from idlc.project.settings import load_settings
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from idlc.check.select import Selection
+    from idlc.compare.breaking import Earlier, Side
+    from idlc.diagnostics.report import Diagnostic, Edit
+    from idlc.diagnostics.source import Source, Span
+    from idlc.model.link import Model
+    from idlc.project.library import Library
+    from idlc.project.package_xml import Facts
+
+#: What a check of a package may read beside its interfaces.
+AROUND = (MANIFEST, settings.FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
+
+
+class Wishes(msgspec.Struct, frozen=True, rename="camel"):
+    """What an editor's settings say, as options of `idlc check` do."""
+
+    select: str = ""
+    ignore: str = ""
+    package: str = ""
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    distro: str = ""
+
+
+class State(msgspec.Struct, frozen=True, dict=True):
+    """What is known of a folder at one moment.
+
+    `models` are those of its packages for the first of its distributions, by name, and `library`
+    has everything else.
+    """
+
+    folder: Path
+    problems: tuple[Diagnostic, ...]
+    models: Mapping[str, Model]
+    library: Library
+    selection: Selection
+
+    @cached_property
+    def interfaces(self) -> Mapping[Path, tuple[ir.Interface, Source]]:
+        """The interfaces of the folder's own files, by absolute path, with their texts."""
+        return {
+            self.path_of(one.source): (one, one.source)
+            for model in self.models.values()
+            for one in model.own
+            if one.source
+        }
+
+    @cached_property
+    def _broken(self) -> frozenset[str]:
+        """The files that have errors."""
+        errors = (one for one in self.problems if one.severity is Severity.ERROR)
+        return frozenset(one.where[0] for one in errors)
+
+    def model_of(self, interface: ir.Interface) -> Model | None:
+        """Return a model of an interface, `None` if there are errors in what it needs.
+
+        Other interfaces of the package may have some.
+        """
+        for model in self.models.values():
+            if model.interfaces.get(interface.name) is interface:
+                reach = model.reach(interface.name)
+                paths = {one.source.path for one in reach if one and one.source}
+                is_sound = model.is_sound(interface.name) and not paths & self._broken
+                return model.alone(interface) if is_sound else None
+        return None
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface of any package."""
+        with working_in(self.folder):
+            return self.library.source(name)
+
+    def path_of(self, source: Source) -> Path:
+        """Return the absolute path of a file's text."""
+        return absolute(self.folder / source.path)
+
+
+class Workspace:
+    """A folder that is checked as if `idlc check PATHS` ran in it.
+
+    Without `paths`, what its pyproject.toml says is meant, or the folder.
+    """
+
+    def __init__(self, folder: Path, wishes: Wishes, paths: tuple[str, ...] = ()) -> None:
+        self.folder = folder
+        self._wishes = wishes
+        self._paths = paths
+        self._earlier: dict[str, Earlier] = {}
+
+    def load(self, unsaved: Unsaved) -> None:
+        """Read what there is; problems that do not depend on texts are remembered.
+
+        Raises OSError if the folder is gone.
+        """
+        self._fixed = report = Report()
+        self._older, self._earlier = self._earlier, {}
+        self._packages: tuple[inputs.Inputs, ...] = ()
+        there = Found((), (), (), {})
+        begun = time.time_ns()
+        with working_in(self.folder), without_options():
+            wishes = self._wishes
+            self._settings = settings = load_settings(report, unsaved)
+            selected = select.selection(settings, report)
+            self._selection = selected.with_lists(wishes.select, wishes.ignore)
+            found = scope(
+                settings, wishes.package or None, wishes.include, wishes.exclude, wishes.distro
+            )
+            self._scope = msgspec.structs.replace(found, unsaved=unsaved)
+            # a mistake in the settings stops the command line, too
+            if not report.had_errors:
+                paths = self._paths or settings.paths or (".",)
+                there = look(paths, report, found.exclude, unsaved)
+                self._packages = inputs.packages(there.files, self._scope, report, there.packages)
+            self._checkers = checkers(self._packages, self._scope, again=True)
+            files = (path for path in self._read(there) if not unsaved.has(path))
+            self._picture = Picture(there.folders, files, begun)
+        self._places = {
+            absolute(self.folder / one.file.path): (number, at)
+            for number, given in enumerate(self._packages)
+            for at, one in enumerate(given.files)
+        }
+
+    def _read(self, there: Found) -> Iterator[Path]:
+        """Yield the absolute paths of the files that a load reads in packages and for settings."""
+        yield from (absolute(one.path) for one in there.files)
+        homes = {self.folder, *there.packages, *(one.root for one in there.files)}
+        homes |= {self._settings.folder} if self._settings.folder else set()
+        yield from (home / name for home in homes for name in AROUND)
+
+    def is_current(self) -> bool:
+        """Return whether the folder surely holds what was read last."""
+        return self._picture.is_true()
+
+    def counts(self, path: Path) -> bytes | None:
+        """Return the text that counts for one of the files that are checked; `None` for others."""
+        number, at = self._places.get(path, (-1, -1))
+        return self._packages[number].files[at].data if number >= 0 else None
+
+    def change(self, path: Path, data: bytes) -> bool:
+        """Let a text count for one of the files that are checked, if that can change no other.
+
+        Otherwise, a load is needed.
+        """
+        number, at = self._places.get(path, (-1, -1))
+        if number < 0 or len(data) > MAX_SIZE or self._is_named_by_lock(number):
+            return False
+        packages = list(self._packages)
+        files = list(packages[number].files)
+        files[at] = inputs.Input(files[at].file, data)
+        packages[number] = msgspec.structs.replace(packages[number], files=tuple(files))
+        self._packages = tuple(packages)
+        return True
+
+    def state_with(self, path: Path, text: str) -> State | None:
+        """Return what would be known with another text for a file; nothing is changed."""
+        packages = self._packages
+        try:
+            return self.state() if self.change(path, text.encode("utf-8", "replace")) else None
+        finally:
+            self._packages = packages
+
+    def _is_named_by_lock(self, number: int) -> bool:
+        """Return whether the texts of a package may decide what it is called."""
+        home = self._packages[number].home
+        with working_in(self.folder):
+            return not manifest(home) and any(map(locks, places(home)))
+
+    def concerns(self, path: Path) -> bool:
+        """Return whether a file outside of the packages may change what is known."""
+        if path.name in (settings.FILE, MANIFEST) and self.folder.is_relative_to(path.parent):
+            return True
+        folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
+        return any(path.is_relative_to(one) for one in (*folders, *prefixes.ament_prefixes()))
+
+    def name_of(self, path: Path) -> ir.TypeName:
+        """Return the name of the interface of one of the files that are checked."""
+        number, at = self._places[path]
+        file = self._packages[number].files[at].file
+        return ir.TypeName(self._packages[number].package, file.kind, file.name)
+
+    def inputs(self, path: Path) -> tuple[str, Mapping[str, str], str]:
+        """Return the package of a file, its files' digests, and the file's name among them."""
+        number, at = self._places[path]
+        given = self._packages[number]
+        return given.package, given.digests, given.files[at].file.key
+
+    def packages(self) -> Iterable[str]:
+        """Return the packages that are known here and have messages."""
+        return (one for one in self._library.packages() if self.names(one))
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of the messages of a package."""
+        return self._library.names(package)
+
+    def dependency(self, path: Path, package: str) -> Edit | None:
+        """Return the edit of package.xml by which a file may use a package; `None` if it may."""
+        from idlc.check.package.manifest import dependency
+
+        found = self._around(path)
+        return dependency(found, package) if found else None
+
+    def declaration(self, path: Path, package: str) -> Span | None:
+        """Return where package.xml of a file's package declares another."""
+        from idlc.check.package.manifest import declaration
+
+        found = self._around(path)
+        return declaration(found, package) if found else None
+
+    def _around(self, path: Path) -> Facts | None:
+        given = self._packages[self._places[path][0]]
+        with working_in(self.folder):
+            return next(iter(self._checkers.values())).around(given)
+
+    def earlier(self, against: str = "") -> Earlier:
+        """Return what the packages are compared with: `against`, or what pyproject.toml says."""
+        if against not in self._earlier:
+            from idlc.compare.breaking import Earlier
+
+            found = Earlier(self.folder, against, self._settings, self._scope)
+            found.follow(self._older.get(against))
+            self._earlier[against] = found
+        return self._earlier[against]
+
+    def before(self, against: str = "") -> Side:
+        """Return the packages as they were."""
+        return self.earlier(against).side(self._packages)
+
+    @property
+    def _library(self) -> Library:
+        return next(iter(self._checkers.values())).library
+
+    def state(self) -> State:
+        """Return what is known now."""
+        found: dict[str, Report] = {}
+        models: dict[str, list[Model]] = {}
+        with working_in(self.folder), without_options():
+            for distro, checker in self._checkers.items():
+                found[distro] = Report()
+                models[distro] = checker.check(self._packages, self._selection, found[distro])
+            every = [model for some in models.values() for model in some]
+            problems = [*self._fixed, *judged(found, every, self._selection)]
+        first = next(iter(self._checkers))
+        return State(
+            self.folder,
+            tuple(problems),
+            {model.package: model for model in models[first]},
+            self._checkers[first].library,
+            self._selection,
+        )
+
+
+def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """Return for a file of no workspace the folder in which it is checked, and what is there.
+
+    That is its package; without a package.xml, only the file with those that it refers to.
+    """
+    root = root_of(str(path.parent))
+    manifest.cache_clear()  # there may be another since the last look
+    declared = manifest(root)
+    if declared is None:
+        return root, (path.relative_to(root).as_posix(),)
+    return declared.parent, (".", path.relative_to(declared.parent).as_posix())

@@ -1,1 +1,0 @@
-"""Emit: Python output, from layout plan to rendered files."""

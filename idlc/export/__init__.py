@@ -1,1 +1,0 @@
-"""Export: an interface in other languages: IDL, JSON Schema, MCAP, an outline for people."""

@@ -1,0 +1,1 @@
+"""Writing packages: Python classes with codecs, libraries for C++ tools, prefixes."""

@@ -1,0 +1,283 @@
+"""The type support of a package's messages, in two libraries as C++ tools look for them.
+
+A handle answers who asks for another identifier with another handle, or with NULL:
+
+    rosidl_typesupport_cpp                what rclcpp, rosbag2 and the like load
+    ├─ rosidl_typesupport_fastrtps_c      what Fast DDS asks for: a name, no bound, no codec
+    └─ rosidl_typesupport_introspection_c what others ask for: fields with types and offsets
+    rosidl_typesupport_introspection_cpp  what tools load that only want to know the fields
+
+So messages travel in serialized form only, which is what these tools do with types that they were
+not compiled with. There is no service and no action among the symbols: each tool copes with a
+symbol that is missing, none with half a service.
+"""
+
+from __future__ import annotations
+
+from struct import pack
+
+from idlc.generate.native import aarch64, x86_64
+from idlc.generate.native.elf import Image, Machine, Place, shared_library
+from idlc.generate.native.layouts import (
+    LAYOUTS,
+    MESSAGE,
+    STRING,
+    TYPE_IDS,
+    WSTRING,
+    Layout,
+    Structures,
+)
+from idlc.model import derive, ir
+from idlc.model.describe import FieldDict, IndividualDict
+from idlc.model.link import Model
+
+#: Words of a structure of C.
+Words = tuple[int | Place | None, ...]
+
+
+def hash_bytes(text: str) -> bytes:
+    """Return a type's hash as C has it: the version, and the digest."""
+    return b"\1" + bytes.fromhex(text.removeprefix("RIHS01_"))
+
+
+class Descriptions:
+    """The functions of each type that return these three, made once."""
+
+    def __init__(self, model: Model, image: Image) -> None:
+        self._model = model
+        self._image = image
+        self._individuals: dict[str, Words] = {}
+        self._about: dict[str, tuple[Place, Place, Place]] = {}
+
+    def about(self, name: str) -> tuple[Place, Place, Place]:
+        """Return functions that return a type's hash, description and sources."""
+        if name not in self._about:
+            told = (self._hash(name), *self._description(name))
+            hash_, description, sources = (
+                self._image.function("get", target=place) for place in told
+            )
+            self._about[name] = (hash_, description, sources)
+        return self._about[name]
+
+    def _hash(self, name: str) -> Place:
+        return self._image.constants.put(hash_bytes(self._model.describer.hash(name)))
+
+    def _description(self, name: str) -> tuple[Place, Place]:
+        full = self._model.describer.description(name)
+        referenced = full["referenced_type_descriptions"]
+        own, *others = (self._individual(one) for one in (full["type_description"], *referenced))
+        description = self._image.tables.words(*own, *self._sequence(others))
+        names = (name, *(one["type_name"] for one in referenced))
+        sources = [self._source(one) for one in names]
+        return description, self._image.tables.words(*self._sequence(sources))
+
+    def _individual(self, one: IndividualDict) -> Words:
+        name = one["type_name"]
+        if name not in self._individuals:
+            fields = [self._field(field) for field in one["fields"]]
+            self._individuals[name] = (*self._string(name), *self._sequence(fields))
+        return self._individuals[name]
+
+    def _field(self, field: FieldDict) -> Words:
+        kind = field["type"]
+        return (
+            *self._string(field["name"]),
+            kind["type_id"],
+            kind["capacity"],
+            kind["string_capacity"],
+            *self._string(kind["nested_type_name"]),
+            *self._string(field["default_value"]),
+        )
+
+    def _source(self, name: str) -> Words:
+        """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
+        interface = self._model.interfaces.get(ir.TypeName.parse(name))
+        source = interface.source if interface else None
+        encoding = name.split("/")[1] if source else "implicit"
+        text = source.text if source else ""
+        return (*self._string(name), *self._string(encoding), *self._string(text))
+
+    def _string(self, text: str) -> Words:
+        """Return a string of C with its size, and with room for what ends it."""
+        size = len(text.encode())
+        return (self._image.string(text), size, size + 1) if text else (None, 0, 0)
+
+    def _sequence(self, rows: list[Words]) -> Words:
+        if not rows:
+            return None, 0, 0
+        first = self._image.tables.words(*(word for row in rows for word in row))
+        return first, len(rows), len(rows)
+
+
+MACHINES = {"x86_64": x86_64.MACHINE, "aarch64": aarch64.MACHINE}
+
+AUTHOR = b"idlc"
+OWN = "rosidl_typesupport_cpp"
+FASTRTPS = "rosidl_typesupport_fastrtps_c"
+FIELDS = "rosidl_typesupport_introspection_c"
+FIELDS_CPP = "rosidl_typesupport_introspection_cpp"
+#: Zeros after the callbacks for Fast DDS: later distributions read more of them.
+ROOM = 72
+
+
+def libraries(
+    model: Model, machine: Machine, layout: Layout = LAYOUTS["jazzy"]
+) -> dict[str, bytes]:
+    """Return the content of each library of a package by the name of its file.
+
+    Whoever has one open must not see it change: write it beside, and move it there.
+    """
+    return {
+        f"lib{model.package}__{identifier}.so": _library(model, Image(machine), layout, identifier)
+        for identifier in (OWN, FIELDS_CPP)
+        if model.own
+    }
+
+
+def told(layout: Layout) -> bytes:
+    """Return what a library's constants begin with: who made it, and for which layout."""
+    return AUTHOR + pack(f"<{len(layout)}I", *layout)
+
+
+def symbol(identifier: str, name: ir.TypeName) -> str:
+    """Return the symbol under which tools ask a library of this kind for a message."""
+    return "__".join((identifier, "get_message_type_support_handle", *name))
+
+
+def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
+    image.constants.put(told(layout))
+    support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
+    for interface in model.own:
+        for message in derive.messages(interface):
+            handle = support.fields[message.name]
+            if identifier == OWN:
+                handle = support.own(message.name, handle)
+            name = symbol(identifier, message.name)
+            image.exports[name] = image.function("get", target=handle)
+    return shared_library(image, f"lib{model.package}__{identifier}.so")
+
+
+class _TypeSupport:
+    """The handles of one library. `fields` has those of FIELDS, or with `cpp` of FIELDS_CPP."""
+
+    def __init__(self, model: Model, image: Image, layout: Layout, *, cpp: bool) -> None:
+        self.image = image
+        self.layout = layout
+        self.cpp = cpp
+        self.descriptions = Descriptions(model, image)
+        self.structures = Structures(layout.of_cpp() if cpp else layout)
+        self.refuse = image.function("refuse")
+        self.fields: dict[ir.TypeName, Place] = {}
+        for message in _reached(model):
+            self.fields[message.name] = self._fields(message)
+
+    def own(self, name: ir.TypeName, fields: Place) -> Place:
+        """Return the handle that answers for all others."""
+        image = self.image
+        answers = {FASTRTPS: self._fastrtps(name), FIELDS: fields}
+        rows = [word for key, handle in answers.items() for word in (image.string(key), handle)]
+        # the table holds the handle itself, which follows: its place is known before
+        handle = Place(image.data, len(image.data.data))
+        table = image.tables.words(*rows, image.string(OWN), handle, None, None)
+        return self._handle(OWN, table, image.function("resolve"), name)
+
+    def _handle(self, identifier: str, data: Place, find: Place, name: ir.TypeName) -> Place:
+        about = self.descriptions.about(str(name))
+        return self.image.data.words(self.image.string(identifier), data, find, *about)
+
+    def _single(self, identifier: str, data: Place, name: ir.TypeName) -> Place:
+        """Return a handle that knows its own identifier only."""
+        image = self.image
+        places = {"identifier": image.string(identifier), "function": image.function("same")}
+        return self._handle(identifier, data, image.function("knows", **places), name)
+
+    def _fastrtps(self, name: ir.TypeName) -> Place:
+        string, refuse = self.image.string, self.refuse
+        data = self.image.tables.words(
+            string(f"{name.package}::{name.kind}"),
+            string(name.name),
+            *(refuse, refuse, refuse),  # serialize, deserialize, size
+            self.image.function("unbounded"),
+            None,  # no key
+            *[0] * (ROOM // 8),
+        )
+        return self._single(FASTRTPS, data, name)
+
+    def _fields(self, message: ir.Message) -> Place:
+        image, name = self.image, message.name
+        offsets, size, _ = self.structures.add(name, message.wire_fields)
+        rows = [
+            word
+            for field, offset in zip(message.wire_fields, offsets, strict=True)
+            for word in self._member(field, offset)
+        ]
+        separator = "::" if self.cpp else "__"
+        data = image.tables.words(
+            image.string(f"{name.package}{separator}{name.kind}"),
+            image.string(name.name),
+            len(offsets),
+            size,
+            *[0] * (self.layout.members // 8 - 4),  # whether there is a key
+            image.tables.words(*rows),
+            *self._memory(name),
+        )
+        return self._single(FIELDS_CPP if self.cpp else FIELDS, data, name)
+
+    def _member(self, field: ir.Field, offset: int) -> tuple[int | Place | None, ...]:
+        kind, bound, nested = _element(ir.element_of(field.type))
+        count, bounded, resize = 0, 0, None
+        if isinstance(field.type, ir.Array):
+            count = field.type.size
+        elif isinstance(field.type, ir.Sequence):
+            count, bounded = field.type.bound or 0, int(field.type.bound is not None)
+            resize = self.refuse
+        many = isinstance(field.type, (ir.Array, ir.Sequence))
+        return (
+            self.image.string(field.name),
+            kind,
+            bound,
+            self.fields[nested] if nested else None,
+            many << 8 * (self.layout.is_array - 32),
+            count,
+            bounded | offset << 32,
+            *(None, None, None, None, None, None),  # default, size, get, get, fetch, assign
+            resize,
+            *[0] * (self.layout.member // 8 - 14),
+        )
+
+    def _memory(self, name: ir.TypeName) -> tuple[Place | None, Place | None]:
+        """Return the functions that begin and end a message in memory: C++ cannot have any."""
+        if not self.cpp:
+            return None, None
+        image = self.image
+        text = f"{name} was compiled by idlc, not in C++: it can only be handled in serialized form"
+        slot = image.imported("_ZSt21__throw_runtime_errorPKc", "libstdc++.so.6")
+        throw = image.function("throw", message=image.string(text), function=slot)
+        return throw, image.function("nothing")
+
+
+def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
+    """Return how introspection calls a type, its bound, and which message it is."""
+    match element:
+        case ir.Primitive():
+            return TYPE_IDS[element.name], 0, None
+        case ir.String():
+            return (WSTRING if element.wide else STRING), element.bound or 0, None
+        case ir.Ref():
+            return MESSAGE, 0, element.target
+        case ir.Unknown():
+            raise ValueError("an unknown type has no type support")
+
+
+def _reached(model: Model) -> list[ir.Message]:
+    """Return a package's messages and all that they refer to, those first that others hold."""
+    held: dict[str, int] = {}
+    for interface in model.own:
+        for message in derive.messages(interface):
+            full = model.describer.description(str(message.name))
+            references = (one["type_name"] for one in full["referenced_type_descriptions"])
+            held.update(dict.fromkeys((str(message.name), *references), 0))
+    for name in held:
+        held[name] = len(model.describer.description(name)["referenced_type_descriptions"])
+    names = sorted(held, key=lambda name: (held[name], name))
+    return [model.messages[ir.TypeName.parse(name)] for name in names]

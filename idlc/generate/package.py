@@ -1,0 +1,256 @@
+"""One package of `idlc gen`: rendered, compared with what is on disk, ready to be written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from symtable import symtable
+from typing import TYPE_CHECKING, NamedTuple
+
+from msgspec import UNSET
+
+from idlc.check.compiler import Compiler, derived_names, stage
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, Severity
+from idlc.generate.target import Target, dependencies
+from idlc.model import derive, ir
+from idlc.model.distros import Distro
+from idlc.project import inputs, lock
+from idlc.project.inputs import accept_name
+from idlc.project.library import Library
+from idlc.project.write import Plan
+from idlc.version import __version__
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+
+
+class Package(NamedTuple):
+    """A package ready to be written."""
+
+    target: Target
+    plan: Plan
+    lock: lock.Lock
+
+
+def _key(name: ir.TypeName) -> str:
+    return f"{name.kind}/{name.name}.{name.kind}"
+
+
+def as_inputs(names: Iterable[ir.TypeName], library: Library) -> dict[str, str]:
+    """Return the digests of a library's interfaces as those of input files are recorded."""
+    digests = dependencies(names, library)
+    return {_key(name): digests[str(name)] for name in names}
+
+
+def package_of(
+    model: Model,
+    target: Target,
+    digests: dict[str, str],
+    library: Library,
+    *,
+    check: bool,
+    vendored: Sequence[str] | None = None,
+) -> Package | None:
+    """Return a sound model rendered and compared with what is on disk.
+
+    `vendored` are the packages that are written because of it, where that was asked for.
+    """
+    from idlc.generate.python.render import render_package
+    from idlc.project import templates
+    from idlc.wire.layout import oversized
+
+    refused = list(oversized(model))
+    if refused:
+        target.report.extend(refused)
+        return None
+    templates.keep()
+    with stage("render", model.package):
+        modules = {file.path: file.text for file in render_package(model)}
+        files = _with_surroundings(model, modules, target)
+    plan = target.plan(files, check=check)
+    if plan is None:
+        return None
+    _check_syntax(plan, target)
+    own = {
+        ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if _key(n) in digests
+    }
+    others = [name for name in model.interfaces if name not in own]
+    return Package(
+        target,
+        plan,
+        lock.Lock(
+            idlc=__version__,
+            package=model.package,
+            vendor_deps=vendored is not None,
+            converts_values=model.distro.converts_values or UNSET,
+            vendored=tuple(vendored or ()),
+            imports=_imports(model),
+            inputs=digests,
+            dependencies=dependencies(others, library),
+            types={n: model.describer.hash(n) for own in model.own for n in derived_names(own)},
+            outputs=plan.outputs,
+        ),
+    )
+
+
+def _with_surroundings(
+    model: Model, modules: Mapping[str, str], target: Target
+) -> dict[str, str | bytes]:
+    """Return the files to write: modules, and in a prefix all that ROS 2 looks for there."""
+    if not target.modules:  # a package folder
+        return {**modules}
+    from idlc.generate.prefix import overlaid
+
+    return overlaid(model, modules, target)
+
+
+def _check_syntax(plan: Plan, target: Target) -> None:
+    """Fail on rendered code that Python cannot read, which would be idlc's own fault.
+
+    Only text from an interface file can have that effect, and text that could has a backslash in
+    front of it; modules without one are like those that the tests read.
+    """
+    for change in plan.changes:
+        rendered = change.path.endswith(".py") and "/_idlc/" not in f"/{change.path}"
+        if rendered and change.new and b"\\" in change.new:
+            with stage("compile", f"{target.name}/{change.path}"):
+                # parses, and resolves names, without the cost of making bytecode
+                symtable(change.new.decode("utf-8"), change.path, "exec")
+
+
+def _imports(model: Model) -> tuple[str, ...]:
+    """Return the modules of other packages that the package's own files refer to."""
+    targets = {target for own in model.own for target in derive.references(own)}
+    return tuple(sorted({f"{t.package}.{t.kind}" for t in targets if t.package != model.package}))
+
+
+def planned(
+    models: Sequence[Model],
+    wanted: Mapping[Target, inputs.Inputs],
+    compiler: Compiler,
+    *,
+    check: bool,
+    vendor_deps: bool,
+) -> list[Package]:
+    """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
+    vendor = _Vendor({model.package for model in models}, compiler, check=check)
+    found: list[Package | None] = []
+    for model, (target, given) in zip(models, wanted.items(), strict=True):
+        names = vendor.add(model, target) if vendor_deps else None
+        library = compiler.library
+        found.append(package_of(model, target, given.digests, library, check=check, vendored=names))
+    found += [vendor.packages[name] for name in sorted(vendor.packages)]
+    return [] if None in found else [one for one in found if one]
+
+
+class _Vendor:
+    """The packages that others depend on, whole, to be written beside them."""
+
+    def __init__(self, own: set[str], compiler: Compiler, *, check: bool) -> None:
+        self._own = own
+        self._compiler = compiler
+        self._check = check
+        self._needed: dict[str, set[str]] = {}
+        #: Each ready to be written, `None` for one that must not be.
+        self.packages: dict[str, Package | None] = {}
+
+    def add(self, model: Model, target: Target) -> list[str]:
+        """Add what a model depends on, and return the names."""
+        names: set[str] = set()
+        waiting = _needed(model) - self._own
+        while waiting:
+            package = waiting.pop()
+            names.add(package)
+            if package not in self.packages:
+                self.packages[package] = self._whole(package, target)
+            waiting |= self._needed[package] - self._own - names
+        return sorted(names)
+
+    def _whole(self, package: str, target: Target) -> Package | None:
+        library, report = self._compiler.library, Report()
+        names = library.interfaces(package)
+        sources = [(name, source) for name in names if (source := library.source(name))]
+        whole = self._compiler.model(package, self._compiler.add(sources, report), report)
+        target.report.extend(one for one in report if one.severity is Severity.ERROR)
+        self._needed[package] = _needed(whole)
+        if not accept_name(package, "what is depended on", target.report) or report.had_errors:
+            return None
+        beside, digests = target.beside(package), as_inputs(names, library)
+        return package_of(whole, beside, digests, library, check=self._check)
+
+
+def _needed(model: Model) -> set[str]:
+    """Return the packages that a model's generated code may import, its own included."""
+    implied = {package for own in model.own for package in derive.IMPLICIT_PACKAGES[own.name.kind]}
+    return implied | {name.package for name in model.interfaces}
+
+
+class Generated(NamedTuple):
+    """What a run of `idlc gen` did to one package.
+
+    `files` counts all that it consists of; `needs` are packages that it imports
+    and that are not here.
+    """
+
+    package: str
+    out: str
+    interfaces: int
+    files: int
+    written: int = 0
+    removed: int = 0
+    needs: tuple[str, ...] = ()
+
+
+def generated(one: Package) -> Generated:
+    """Return what is done to a package that is ready to be written."""
+    removed = sum(change.new is None for change in one.plan.changes)
+    written = len(one.plan.changes) - removed
+    target = one.target
+    files = len(one.plan.outputs)
+    return Generated(target.package, target.name, len(one.lock.inputs), files, written, removed)
+
+
+def up_to_date(
+    target: Target, digests: dict[str, str], library: Library, vendor_deps: bool
+) -> tuple[Generated, ...]:
+    """Return what there is if a run would change nothing; empty otherwise."""
+    if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
+        return ()
+    found = [target]
+    for package in target.lock.vendored:
+        found.append(target.beside(package))
+        names = library.interfaces(package)
+        if not found[-1].unchanged(as_inputs(names, library), library):
+            return ()
+    return tuple(
+        Generated(one.package, one.name, len(one.lock.inputs), len(one.lock.outputs))
+        for one in found
+        if one.lock
+    )
+
+
+def with_needs(
+    done: Iterable[Generated], targets: Iterable[Target], distro: Distro, report: Report, again: str
+) -> tuple[Generated, ...]:
+    """Report IDL617 for generated packages that need others that cannot be imported here.
+
+    Where they are not imported anyway, that is only noted in what is returned.
+    """
+    quiet: dict[str, tuple[str, ...]] = {}
+    for target in targets:
+        missing = target.missing()
+        if not missing:
+            continue
+        if not target.is_at_home():
+            quiet[target.name] = tuple(missing)
+            continue
+        names = ", ".join(f"`{name}`" for name in missing)
+        report.add(
+            codes.DEPENDENCY_NOT_IMPORTABLE.of(
+                target.name,
+                f"`{target.package}` imports {names}, which this Python cannot import",
+                hint=f"{distro.installing(missing)}, or run `{again} --vendor-deps`, "
+                "which writes it next to this one",
+            )
+        )
+    return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)

@@ -1,0 +1,245 @@
+"""A prefix that ROS 2 and its tools look into, with several packages and files of others in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from shlex import quote
+from typing import TYPE_CHECKING, NamedTuple
+
+from idlc.check.compiler import stage
+from idlc.diagnostics.report import Report
+from idlc.generate.idl import file_text, idl
+from idlc.generate.native.inspect import inspect
+from idlc.generate.target import Target
+from idlc.project import prefixes, write
+from idlc.project.atomic import alone
+from idlc.project.files import read_bytes, shown
+from idlc.project.library import Library
+from idlc.project.lock import Tree
+from idlc.project.package_xml import manifest
+from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
+from idlc.project.write import Change, Plan
+
+if TYPE_CHECKING:
+    from idlc.generate.native.elf import Machine
+    from idlc.generate.native.layouts import Layout
+    from idlc.model.link import Model
+
+
+class Libraries(NamedTuple):
+    """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
+
+    `missing` says why there are none although the package has interfaces. Such a package must not
+    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel of the
+    package has in its name, so that wheels for different distributions have different names.
+    """
+
+    files: Mapping[str, bytes]
+    missing: str = ""
+    build_tag: str = ""
+
+
+def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
+    """Return the libraries of a model without errors, by default for what is installed here.
+
+    Who writes them moves them into place: programs may have the old ones open.
+    """
+    from idlc.generate.native.library import libraries
+
+    found = found or distribution()
+    target = target_of(found)
+    if not model.own or isinstance(target, str):
+        missing = target if model.own and isinstance(target, str) else ""
+        return Libraries({}, missing, build_tag(model))
+    with stage("libraries", model.package):
+        files = libraries(model, *target)
+    placed = {f"lib/{name}": content for name, content in files.items()}
+    return Libraries(placed, build_tag=build_tag(model, found.name))
+
+
+def build_tag(model: Model, *libraries: str) -> str:
+    """Return a wheel's build tag; `libraries` is the distribution that it has libraries for."""
+    names = dict.fromkeys((model.distro.name, *libraries))
+    return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
+
+
+def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
+    """Return for which processor and layout libraries are made here, or why none can be."""
+    from idlc.generate.native.layouts import LAYOUTS
+    from idlc.generate.native.library import MACHINES
+
+    machine = MACHINES.get(prefixes.machine())
+    layout = LAYOUTS.get(found.name)
+    if machine is None:
+        return f"idlc makes libraries for Linux on {' and '.join(MACHINES)}, and this is neither"
+    if layout is None:
+        return f"idlc does not know this distribution of ROS 2 ({found.why})"
+    return machine, layout
+
+
+#: The list of the packages that have interfaces, each a file with their names.
+INTERFACES = f"{INDEX}/rosidl_interfaces"
+
+
+def shared(
+    model: Model, manifest: str | bytes | None, libraries: Libraries, report: Report
+) -> dict[str, bytes]:
+    """Return libraries, package.xml, interfaces and entries in the index, in the order to write.
+
+    What leads to others comes after these. Without libraries the package is registered neither as
+    a package nor as one with interfaces: recorders stop at the one, `ros2 interface list` at the
+    other alone.
+    """
+    name = model.package
+    found: dict[str, str | bytes] = {**libraries.files}
+    if manifest is not None:
+        found[f"share/{name}/package.xml"] = manifest
+    interfaces = {}
+    for own in model.own:
+        key = f"{own.name.kind}/{own.name.name}"
+        interfaces[f"{key}.{own.name.kind}"] = file_text(own)
+        interfaces[f"{key}.idl"] = idl(own)
+        described = model.describer.installed(str(own.name))
+        found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
+    found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
+    found[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
+    if libraries.missing:
+        report.notes.append(
+            f"`{name}` is not registered in the index of ROS 2, because recorders stop at packages "
+            f"without a library: {libraries.missing}"
+        )
+    else:
+        found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
+        found[f"{INDEX}/packages/{name}"] = ""
+    return {
+        path: content.encode() if isinstance(content, str) else content
+        for path, content in found.items()
+    }
+
+
+def dependencies(model: Model) -> list[str]:
+    """Return the packages whose interfaces a model has besides its own."""
+    return sorted({one.package for one in model.interfaces} - {model.package})
+
+
+#: How the files begin by which shells learn of a prefix, and which all packages in it share.
+MARK = b"# Written by idlc"
+
+
+class Overlay(Target):
+    """A package in a prefix. What idlc wrote of it is recorded in its share folder."""
+
+    def __init__(
+        self,
+        name: str,
+        package: str,
+        home: Path | None,
+        report: Report,
+        *,
+        force: bool = False,
+        distros: Sequence[str] = (),
+    ) -> None:
+        super().__init__(name, package, report, force=force)
+        self._distros = distros
+        declared = manifest(home) if home else None
+        #: The content of its package.xml; `None` if there is none to be copied.
+        self.manifest = read_bytes(declared, shown(declared), report) if declared else None
+        self.home = f"share/{package}/"
+        self.modules = f"{prefixes.modules_folder()}/{package}/"
+
+    @property
+    def place(self) -> str:
+        """The prefix's path, which shells need where they do not know what they read."""
+        return self._path.as_posix()
+
+    @property
+    def distribution(self) -> Distribution:
+        """The distribution that libraries are for: the installed one, unless others are wanted."""
+        found = distribution((self._path, *prefixes.ament_prefixes()))
+        if not self._distros or found.name in self._distros:
+            return found
+        wanted = self._distros[0]
+        self.report.notes.append(
+            f"`{self.name}` gets libraries for {wanted}, not for {found.name} ({found.why})"
+        )
+        return Distribution(wanted, f"--distro {wanted}")
+
+    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
+        del beside
+        return alone(self._path)
+
+    def beside(self, package: str) -> Overlay:
+        """Return another package in the prefix."""
+        home = Library((), Report()).home(package)
+        return Overlay(
+            self.name, package, home, self.report, force=self._force, distros=self._distros
+        )
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Return whether nothing is to be done: not to be told from interfaces alone.
+
+        Libraries depend on what else is installed, too.
+        """
+        del inputs, library, vendor_deps
+        return False
+
+    def cause(self, change: Change) -> str:
+        """Say why a library differs, if another distribution is the reason."""
+        old, new = (inspect(data or b"") for data in (change.old, change.new))
+        if old is None or new is None or old.told == new.told:
+            return ""
+        return "it is for another distribution of ROS 2"
+
+    def share(self, files: Mapping[str, str]) -> bool:
+        """Write the files for shells, but not over those of others, which are noted."""
+        tree, changes = Tree(self._path), []
+        for path, text in files.items():
+            old, new = tree.read(path), text.encode("utf-8")
+            if old is None or (isinstance(old, bytes) and old.startswith(MARK)):
+                changes += [] if old == new else [Change(path, old, new)]
+            else:
+                self.report.notes.append(
+                    f"`{self.name}/{path}` is not idlc's: put `{self.name}` into AMENT_PREFIX_PATH"
+                )
+        plan = Plan(self._path, tuple(changes), {})
+        return write.apply_changes(plan, self.name, self.report)
+
+
+_SHELLS = ("sh", "bash", "zsh")
+
+
+def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[str, str | bytes]:
+    """Return the files of a package by their paths in the prefix.
+
+    They are in the order in which to write them: what leads to others comes after these.
+    """
+    assert isinstance(overlay, Overlay)
+    manifest = overlay.manifest or _rendered(
+        "overlay/package.xml.jinja", name=model.package, depends=dependencies(model)
+    )
+    libraries = libraries_of(model, overlay.distribution)
+    placed = {f"{overlay.modules}{path}": modules[path] for path in modules}
+    return {**placed, **shared(model, manifest, libraries, overlay.report)}
+
+
+def enter(overlay: Target) -> bool:
+    """Write the files by which a shell learns of the prefix; return whether that went well."""
+    assert isinstance(overlay, Overlay)
+    files = {
+        f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))
+        for shell in _SHELLS
+        for name in ("local_setup", "setup")
+    }
+    return overlay.share(files)
+
+
+def _rendered(template: str, **given: object) -> str:
+    from idlc.project.templates import environment
+
+    return environment().get_template(template).render(**given)

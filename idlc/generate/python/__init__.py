@@ -1,0 +1,1 @@
+"""Models as Python source: classes, fields and codecs."""

@@ -1,0 +1,415 @@
+"""From a layout to the statements that read it.
+
+Numbers that follow each other are read by one precompiled Struct. A Struct and an index check
+their own bounds; a slice that ends after the buffer's end is shorter, and whatever is read next,
+or a check at the end, fails. Before structures are made, their least size is compared with the
+bytes that are left: nothing is allocated that the buffer does not hold. Any failure is explained
+afterwards, by the runtime.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
+from idlc.generate.python.position import START, Cursor
+from idlc.generate.python.statements import Block, Emitter, Line, Statement, Tables
+from idlc.model import ir
+from idlc.wire import plan
+from idlc.wire.layout import multiple_of
+
+TOO_SHORT = (Line('raise ValueError("too short")'),)
+TOO_MANY = (Line('raise ValueError("too many elements")'),)
+
+
+class Run:
+    """Fixed-size values that are read together."""
+
+    def __init__(self) -> None:
+        self.fields: list[str] = []
+        self.targets: list[str] = []
+        self.sizes: list[tuple[int, int]] = []
+        self.after: list[Statement] = []
+
+    def add(self, token: str, align: int, size: int, target: str = "") -> None:
+        """Add a value of `size` bytes, stored in `target`."""
+        self.fields.append(token)
+        self.sizes.append((align, size))
+        if target:
+            self.targets.append(target)
+
+    def skipped(self, cursor: Cursor) -> Cursor:
+        """Return the position after the values, of which the first is at `cursor`."""
+        for align, size in self.sizes:
+            if not cursor.known.knows(align):
+                cursor = cursor.where(multiple_of(align))
+            cursor = cursor.skip(cursor.known.padding(align) + size)
+        return cursor
+
+    def assignment(self, value: Group) -> Line:
+        """Return the statement that reads the values."""
+        return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
+
+
+class Running(Emitter):
+    """Statements that read: those so far, the values to be read together, the position before them.
+
+    `source` is what buffers are cut from. `limited` is whether a check needs the buffer's size,
+    `unchecked` whether nothing has noticed yet that a buffer was cut short. With `worded`, the
+    sizes of strings are in `words` and their text in `chars`.
+    """
+
+    def __init__(self, tables: Tables, source: str) -> None:
+        super().__init__()
+        self.tables = tables
+        self.source = source
+        self.here = START
+        self.run = Run()
+        self.limited = False
+        self.unchecked = False
+        self.worded = False
+
+    def flush(self, *, last: bool = False) -> None:
+        """Read the run; the position after it is of no interest if it is the `last`."""
+        run, self.run = self.run, Run()
+        if not run.fields:
+            return
+        self.unchecked = False
+        widest = max(align for align, _ in run.sizes)
+        if run.sizes[0][0] == widest:
+            self.align(widest)
+        fields = "".join(run.fields)
+        here = self.here.text()
+        if self.worded and fields == "I":
+            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
+            self.here = run.skipped(self.here)
+        elif self.here.known.knows(widest):
+            reader = self.tables.reader(fields, self.here.known.residue)
+            self.body.append(run.assignment(call(reader, "data", here)))
+            self.here = run.skipped(self.here)
+        else:
+            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
+            struct = table if last else "struct"
+            if not last:
+                self.line(table, struct)
+            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
+            if not last:
+                self.line(f"{here} + struct.size", "at")
+                self.here = run.skipped(self.here).at("at")
+        self.body += run.after
+
+    def align(self, align: int) -> None:
+        """Go to the next multiple of `align`, counted from the end of the header."""
+        if self.here.known.knows(align):
+            self.here = self.here.skip(self.here.known.padding(align))
+        elif align == 8:
+            self.line(f"({self.here.text(3)} & -8) + 4", "at")
+            self.here = Cursor("at", 0, multiple_of(8))
+        else:
+            lead = 4 if self.worded and align == 4 else 0  # what comes after the size
+            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
+            self.here = Cursor("at", -lead, multiple_of(align))
+
+    def settle(self, base: str, offset: int = 0) -> None:
+        """Bring the position into a variable, as `base + offset`."""
+        value = self.here.text(-offset)
+        if value != base:
+            self.line(value, base)
+        self.here = self.here.at(base, offset)
+
+    def number(self, target: str) -> None:
+        """Read a count or size into a variable, together with the numbers before it."""
+        self.run.add("I", 4, 4, target)
+        self.flush()
+
+    def count(self, bound: int | None) -> str:
+        """Read the count of a sequence and check its upper limit."""
+        self.number("count")
+        if bound is not None:
+            self.body.append(Block(f"if count > {bound}:", TOO_MANY))
+        return "count"
+
+    def start(self) -> str:
+        """Return the position as an expression that stays true when `end` changes."""
+        if self.here.base == "end":
+            self.settle("at")
+        return self.here.text()
+
+    def buffer(self, count: str, align: int, size: int, source: str) -> str:
+        """Return the slice of `count` elements, and move after it.
+
+        It is shorter if the buffer is, which whatever is read next notices.
+        """
+        if not self.here.known.is_at(align):
+            self.settle("at")
+            self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
+            self.here = self.here.where(multiple_of(4))
+        start = self.start()
+        self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
+        self.unchecked = True
+        self.here = Cursor("end", 0, self.here.known.modulo(size & -size))
+        return f"{source}{slice_of(start)}"
+
+    def finish(self) -> None:
+        """Emit the check that nothing after the last buffer makes."""
+        if self.unchecked:
+            self.short_if(f"{self.here.text()} > limit")
+
+    def short_if(self, condition: str) -> None:
+        """Emit a check that the buffer is long enough."""
+        self.limited = True
+        self.body.append(Block(f"if {condition}:", TOO_SHORT))
+
+
+def slice_of(start: str, end: str = "end") -> str:
+    """Return the slice from one expression to another."""
+    if " " in start + end:
+        return f"[{start} : {end}]"
+    return f"[{start}:{end}]"
+
+
+UNENDED = (Line('raise ValueError("text without end")'),)
+
+
+def is_bulk(steps: tuple[plan.Step, ...]) -> bool:
+    """Return whether a structure holds numeric buffers, which are read through a memoryview."""
+    return any(
+        isinstance(step, plan.Numbers)
+        or (isinstance(step, plan.Block) and step.is_large)
+        or (isinstance(step, plan.Items) and is_bulk(step.body))
+        for step in steps
+    )
+
+
+def decode(
+    steps: tuple[plan.Step, ...],
+    tables: Tables,
+    own: str,
+    makers: dict[ir.TypeName, str],
+    foreign: Mapping[ir.TypeName, str],
+    *,
+    bulk: bool,
+) -> tuple[Statement, ...]:
+    """Return the statements that read a message; what they use is defined in `tables`.
+
+    `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
+    packages; `bulk` is what `is_bulk` says.
+    """
+    decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
+    decoder.line(f"{own}()", "message")
+    for step in steps:
+        decoder.step(step)
+    decoder.flush(last=True)
+    decoder.finish()
+    first = []
+    if decoder.limited or decoder.source == "view":
+        first.append(Line("len(data)", "limit"))
+    if decoder.source == "view":
+        first.append(Line(f"data if limit < {tables.small()} else memoryview(data)", "view"))
+    return (*first, *decoder.body, Line("return message"))
+
+
+class _Decoder(Running):
+    """Emits a message's steps; `makers` name the functions that make empty objects."""
+
+    def __init__(
+        self,
+        tables: Tables,
+        makers: dict[ir.TypeName, str],
+        foreign: Mapping[ir.TypeName, str],
+        source: str,
+    ) -> None:
+        super().__init__(tables, source)
+        self.makers = makers
+        self.foreign = foreign
+        self.looping = False
+
+    def step(self, step: plan.Step) -> None:
+        """Emit one step."""
+        match step:
+            case plan.Block() if step.is_large:
+                self.block(step)
+            case plan.Number() | plan.Dummy() | plan.Block():
+                self.fixed(step, self.run)
+            case plan.Enter(place, type_):
+                self.body += self.enter(place, type_)
+            case plan.Text(place, wide):
+                self.line(self.wide_text() if wide else self.text(), place.text)
+            case plan.Bytes(place, primitive, bound):
+                name = f"read_{plan.LIST_PRIMITIVES[primitive]}"
+                raw = self.buffer(self.count(bound), 1, 1, self.source)
+                self.line(call(self.tables.function(name, name), raw), place.text)
+            case plan.Numbers():
+                self.numbers(step)
+            case plan.Texts():
+                self.texts(step)
+            case plan.Items():
+                self.items(step)
+
+    # Values of fixed size.
+
+    def fixed(self, step: plan.Step, run: Run) -> None:
+        """Add a value to a run."""
+        match step:
+            case plan.Number(place, letter, size):
+                run.add(letter, size, size, place.text)
+            case plan.Block(place):
+                run.add(step.token, step.unit, step.size, place.local)
+                reader = self.tables.block_reader(step)
+                run.after.append(Line(call(reader, place.local), place.text))
+            case _:
+                run.add("x", 1, 1)
+
+    def enter(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
+        """Return the statements that make a nested object."""
+        return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
+
+    # Values of variable size.
+
+    def text(self) -> Node:
+        """Read the size of a string; return the expression that reads the string.
+
+        The last byte must be zero; to look at it is to check the bounds.
+        """
+        size = "size"
+        if self.worded and not self.run.fields:
+            self.align(4)
+            self.here = self.here.skip(4)
+            start = self.start()
+            size = f"words[{start} >> 2]"
+        else:
+            self.number(size)
+            start = self.start()
+        self.line(f"{self.here.text(-1)} + {size}", "end")
+        self.body.append(Block("if data[end]:", UNENDED))
+        self.here = Cursor("end", 1, multiple_of(1))
+        if self.worded:
+            return call("to_str", f"chars{slice_of(start)}")
+        return call(self.tables.text(), f"data{slice_of(start)}")
+
+    def wide_text(self) -> Node:
+        """Read the size of a wstring; return the expression that reads the wstring."""
+        self.number("count")
+        raw = self.buffer("count", 4, 4, "data")
+        return call(self.tables.function("read_wide_text", "read_wide_text(order)"), raw)
+
+    def numbers(self, step: plan.Numbers) -> None:
+        """Read a numeric sequence as one buffer."""
+        raw = self.buffer(self.count(step.bound), step.unit, step.unit, "view")
+        kind = self.foreign.get(step.place.type)
+        reading = f"reading.of({kind})" if kind else "reading"
+        self.line(call(self.tables.sequence_reader(step, reading), raw), step.place.text)
+
+    def block(self, step: plan.Block) -> None:
+        """Read a large array of fixed size as one buffer."""
+        self.flush()
+        self.align(step.unit)
+        start, end = self.here.text(), self.here.text(step.size)
+        self.short_if(f"{end} > limit")
+        self.here = self.here.skip(step.size)
+        reader = self.tables.block_reader(step)
+        self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
+
+    def begin(self, step: plan.Texts | plan.Items) -> str:
+        """Read the count, or return the size."""
+        if step.size is None:
+            return self.count(step.bound)
+        self.flush()
+        return str(step.size)
+
+    def texts(self, step: plan.Texts) -> None:
+        """Read an array or sequence of strings."""
+        count = self.begin(step)
+        self.align(4)
+        reader = self.tables.texts_reader(step)
+        texts = call(reader, "data", self.here.text(), count)
+        self.line(texts, tuple_of(step.place.text, "end"))
+        self.here = Cursor("end", 0, multiple_of(4 if step.wide else 1))
+
+    def items(self, step: plan.Items) -> None:
+        """Read an array or sequence of structures."""
+        repeat = plan.fixed(step.body)
+        if repeat is not None and repeat.stride == repeat.size:
+            self.rows(step, repeat)
+            return
+
+        def element() -> None:
+            for part in step.body:
+                self.step(part)
+            self.flush()
+
+        count = self.begin(step)
+        least = plan.smallest(step.body)
+        if step.size is None:
+            wanted = count if least == 1 else f"{least} * {count}"
+            self.short_if(f"{self.here.text()} + {wanted} > limit")
+        else:
+            self.short_if(f"{self.here.text(least * step.size)} > limit")
+        empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
+        self.line(empty, step.place.local)
+        self.line(step.place.local, step.place.text)
+        worded = self.worded
+        many = plan.is_many(step) and plan.is_text(step.body)
+        # not within a loop: it goes over all that follows
+        if many and not worded and self.source == "data" and not self.looping:
+            strings = call(self.tables.strings(), "data", self.here.text())
+            self.line(strings, tuple_of("words", "chars", "to_str"))
+            self.worded = True
+        self.loop(f"for {step.item} in {step.place.local}:", element)
+        self.worded = worded
+
+    def rows(self, step: plan.Items, repeat: plan.Fixed) -> None:
+        """Read structures of constant size: one Struct yields the values of each."""
+        count = self.begin(step)
+        self.line("[]", f"{step.place.local}: list[_idlc.Any]")
+        self.line(step.place.local, step.place.text)
+        if step.size is not None:
+            self.align(repeat.align)
+        run = Run()
+        entered: list[Statement] = []
+        for part in step.body:
+            if isinstance(part, plan.Enter):
+                entered += self.enter(part.place, part.type)
+            else:
+                self.fixed(part, run)
+        reader = self.tables.rows("".join(run.fields))
+        values = self.tables.local(f"{step.item}_values") if run.targets else "_"
+        rows = self.buffer(count, repeat.align, repeat.size, self.source)
+        stored = [Line(values, tuple_of(*run.targets))] if run.targets else []
+        body = (
+            Line(f"{self.makers[step.type]}()", step.item),
+            Line(call(f"{step.place.local}.append", step.item)),
+            *entered,
+            *stored,
+            *run.after,
+        )
+        self.body.append(Block(f"for {values} in {reader}({rows}):", body))
+
+    def loop(self, head: str, emit: Callable[[], None]) -> None:
+        """Emit a loop; `emit` emits its body, until what is known of the position holds.
+
+        Between two rounds the position is in `at`, or in `end` if the body ends with a string.
+        """
+        entry, first = self.here, self.here.at("at")
+        unchecked = self.unchecked
+        looping, self.looping = self.looping, True
+        while True:
+            mark = self.tables.mark()
+            with self.within(head):
+                self.here = first
+                emit()
+                again = first.where(first.known.meet(self.here.known))
+                if first.base == "at" and self.here.base == "end":
+                    again = again.at("end", self.here.offset)
+                self.settle(again.base, again.offset)
+            loop = self.body.pop()
+            if again == first:
+                break
+            first = again
+            self.tables.reset(mark)
+        self.looping = looping
+        self.here = entry
+        self.settle(first.base, first.offset)
+        self.body.append(loop)
+        self.here = first
+        self.unchecked |= unchecked

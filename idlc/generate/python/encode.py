@@ -1,0 +1,420 @@
+"""From a layout to the statements that write it.
+
+Numbers that follow each other are written by one precompiled Struct; so is a string between
+them, by one Struct for each of its sizes. Positions modulo 8 are followed as far as they are
+known, so that padding is part of the Structs. Where a string or a sequence made them unknown,
+the statement picks the Struct by the position, which is noted in `at` (or, if 4 is enough, its
+remainder in `low`) only where somebody reads it.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+import msgspec
+
+from idlc.generate.python import statements
+from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
+from idlc.generate.python.position import Position, aligned_to_8
+from idlc.generate.python.statements import Emitter, Note, Put, Tables
+from idlc.wire import plan
+from idlc.wire.layout import Alignment, multiple_of
+
+_POSITIONS = re.compile(r"\b(?:at|low)\b")
+
+
+class Frame:
+    """Fixed-size values that follow each other, with at most one text: one Struct."""
+
+    def __init__(self, start: Position) -> None:
+        self.start = start.known
+        self.fields: list[str] = []
+        self.values: list[Node] = []
+        self.text_size = ""
+        self.widest = 1
+
+    def phase(self) -> str:
+        """Return the subscript that picks a Struct by the position, empty if one is enough."""
+        if self.start.knows(self.widest):
+            return ""
+        return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
+
+
+class Framing(Emitter):
+    """Statements that write: those so far, the frame that grows, and the position after both."""
+
+    def __init__(self, tables: Tables, here: Position) -> None:
+        super().__init__()
+        self.tables = tables
+        self.here = here
+        self.frame = Frame(here)
+
+    def put(self, part: Node, reads: str = "") -> None:
+        """Emit a part of the message."""
+        self.body.append(Put(part, positions(reads)))
+
+    def fixed(self, step: plan.Step) -> None:
+        """Add a value of fixed size to the frame."""
+        match step:
+            case plan.Number(place, "?"):
+                truths = self.tables.function("truths", "TRUTHS")
+                self.field("?", 1, 1, f"{truths}[{place.text}]")
+            case plan.Number(place, letter, size):
+                self.field(letter, size, size, place.text)
+            case plan.Block(place):
+                value = call(self.tables.block_writer(step), place.text)
+                self.field(step.token, step.unit, step.size, value)
+            case _:
+                self.field("x", 1, 1)
+
+    def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
+        """Add a value to the frame."""
+        frame = self.frame
+        frame.fields.append(token)
+        frame.widest = max(frame.widest, align)
+        if value is not None:
+            frame.values.append(value)
+        self.here.align(align)
+        self.here.advance(size)
+
+    def text(self, place: plan.Place) -> None:
+        """Add a string to the frame; a frame has at most one."""
+        if self.frame.text_size:
+            self.flush(4)
+        size = self.tables.local(f"{place.local}_size")
+        self.line(f"{place.text}.encode()", place.local)
+        self.line(call("len", place.local), size)
+        self.field("I", 4, 4, f"{size} + 1")
+        self.frame.fields.append("*")
+        self.frame.values.append(place.local)
+        self.frame.text_size = size
+        self.here.skip(size, 1)
+        self.here.advance(1)
+
+    def flush(self, align: int) -> None:
+        """Write the frame; with the padding for a following `align` where that is known."""
+        frame = self.frame
+        if frame.fields:
+            if max(frame.start.modulus, frame.widest) < align:
+                align = 1
+            frame.widest = max(frame.widest, align)
+            phase = frame.phase()
+            start = None if phase else frame.start.residue
+            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
+            key = f"[{frame.text_size}]" if frame.text_size else ""
+            method = ".pack" if phase and not key else ""
+            self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
+            self.here.align(align)
+        self.settle()
+
+    def settle(self) -> None:
+        """Note the position in `at` and `low`, and begin a new frame there."""
+        here = self.here
+        for target, value in here.before:
+            self.note(target, value)
+        here.before.clear()
+        if not here.constant:
+            self.note("at", here.text)
+            if not here.known.knows(4):
+                self.note("low", here.low)
+            self.here = Position.variable(here.known)
+        self.frame = Frame(self.here)
+
+    def pad(self, align: int, unless_empty: str = "") -> None:
+        """Emit padding as a part of its own."""
+        here = self.here
+        if here.known.is_at(align):
+            return
+        phase = "[at & 7]" if align == 8 else "[low & 3]"
+        index = f"[{here.known.residue}]" if here.known.knows(align) else phase
+        part = f"{self.tables.pad(align)}{index}"
+        self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
+        if not unless_empty:
+            here.align(align)
+
+    def note(self, target: str, value: str) -> None:
+        """Note a position; dropped later unless it is read."""
+        value = without_parentheses(value)
+        if target != value:
+            self.body.append(Note(target, value, positions(value)))
+
+
+@lru_cache(maxsize=1024)  # few are different
+def positions(expression: str) -> frozenset[str]:
+    """Return the variables in an expression that hold positions."""
+    return frozenset(_POSITIONS.findall(expression))
+
+
+def without_parentheses(value: str) -> str:
+    """Return an expression without parentheses around all of it."""
+    if not value.startswith("("):
+        return value
+    depth = 0
+    for place, character in enumerate(value):
+        depth += (character == "(") - (character == ")")
+        if depth == 0 and place < len(value) - 1:
+            return value
+    return value[1:-1]
+
+
+NONE: frozenset[str] = frozenset()
+
+
+def encode(steps: tuple[plan.Step, ...], tables: Tables, indent: int) -> list[str]:
+    """Return the lines that write a message; what they use is defined in `tables`."""
+    encoder = _Encoder(tables, Position(Alignment()))
+    encoder.field("4s", 1, 4, tables.function("encapsulation", "HEADERS[order]"))
+    for step in steps:
+        encoder.step(step)
+    encoder.flush(1)
+    body = statements.prune(tuple(encoder.body), NONE)
+    return statements.function(body, indent, tuple(encoder.again))
+
+
+class _Encoder(Framing):
+    """Emits a message's steps."""
+
+    def __init__(self, tables: Tables, here: Position) -> None:
+        super().__init__(tables, here)
+        #: What is true if another thread changed the length of an array that was not copied.
+        self.again: list[str] = []
+        self.looping = False
+
+    def step(self, step: plan.Step) -> None:
+        """Emit one step."""
+        match step:
+            case plan.Block() if step.is_large:
+                self.block(step)
+            case plan.Number() | plan.Dummy() | plan.Block():
+                self.fixed(step)
+            case plan.Enter(place):
+                if not step.empty:
+                    self.line(place.text, place.local)
+            case plan.Text(place, wide):
+                if wide:
+                    writer = self.tables.function("wide_text", "wide_text(order)")
+                    self.buffer(place, call(writer, place.text), 4)
+                else:
+                    self.text(place)
+            case plan.Bytes(place, primitive, bound):
+                function = plan.LIST_PRIMITIVES[primitive]
+                writer = self.tables.function(function, function)
+                self.buffer(place, call(writer, place.text), 1, bound)
+            case plan.Numbers():
+                self.numbers(step)
+            case plan.Texts():
+                self.texts(step)
+            case plan.Items():
+                self.items(step)
+
+    # Values of variable or large size are parts of their own.
+
+    def block(self, step: plan.Block) -> None:
+        """Emit a large array of fixed size."""
+        self.flush(step.unit)
+        self.pad(step.unit)
+        self.put(call(self.tables.buffer_writer(step), step.place.text))
+        self.here.advance(step.size)
+        self.settle()
+
+    def check(self, condition: str, problem: str) -> None:
+        """Emit a check; `validate` finds the field and the words afterwards."""
+        raised = statements.Line(f'raise ValueError("{problem}")')
+        self.body.append(statements.Block(f"if {condition}:", (raised,)))
+
+    def bound(self, count: str, bound: int | None) -> None:
+        """Check a sequence's upper limit."""
+        if bound is not None:
+            self.check(f"{count} > {bound}", "too many elements")
+
+    def buffer(self, place: plan.Place, value: Node, unit: int, bound: int | None = None) -> None:
+        """Emit the count of a buffer's units, and the buffer."""
+        local = place.local
+        self.line(value, local)
+        self.bound(f"len({local})", bound)
+        count = f"len({local})" if unit == 1 else f"len({local}) // {unit}"
+        self.field("I", 4, 4, count)
+        self.flush(1)
+        self.put(local)
+        self.here.skip(f"len({local})", unit)
+        self.settle()
+
+    def numbers(self, step: plan.Numbers) -> None:
+        """Emit a numeric sequence."""
+        local = step.place.local
+        count = self.tables.local(f"{local}_count")
+        if self.looping:
+            self.line(call(self.tables.sequence_copier(step), step.place.text), local)
+            self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
+        else:
+            self.line(step.place.text, local)
+            converted = statements.Line(call(self.tables.sequence_writer(step), local), local)
+            array = self.tables.function("array", "array_of(order)")
+            self.body.append(statements.Block(f"if type({local}) is not {array}:", (converted,)))
+            self.line(f"len({local})", count)
+            self.again.append(f"len({local}) != {count}")
+        self.bound(count, step.bound)
+        self.field("I", 4, 4, count)
+        self.flush(1)
+        repeat = plan.Fixed(step.unit, step.unit, step.unit)
+        self.elements(local, count, repeat, unless=count)
+
+    def texts(self, step: plan.Texts) -> None:
+        """Emit an array or sequence of strings, its count included."""
+        local = step.place.local
+        self.flush(4)
+        self.pad(4)
+        self.line(call(self.tables.texts_writer(step), step.place.text), local)
+        self.put(local)
+        self.here.skip(f"len({local})", 4 if step.wide else 1)
+        self.settle()
+
+    def count(self, step: plan.Items, count: str) -> None:
+        """Emit the check of a size, or the count."""
+        self.bound(count, step.bound)
+        if step.size is None:
+            self.field("I", 4, 4, count)
+        else:
+            self.check(f"{count} != {step.size}", "wrong number of elements")
+
+    def rows(self, step: plan.Items) -> None:
+        """Emit structures of strings: what goes around each is looked up, all is encoded once."""
+        local = step.place.local
+        rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
+        sized = self.tables.function("sized", "sizes(order)")
+        ended = self.tables.function("ended", "ENDS")
+        places = [part.place for part in step.body if isinstance(part, plan.Text)]
+        parts = [
+            part
+            for one in places
+            for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
+        ]
+        lines = [statements.Line(one.text, one.local) for one in places]
+        lines.append(statements.Line(tuple_of(*parts), rows, "+="))
+        loop = f"for {step.item} in {local}"
+        given = tuple_of(*(one.text for one in places))
+        each = self.tables.local("each")
+        texts = Comprehension(each, ((step.item, local), (each, given)))
+        unsized = call(self.tables.function("unsized", "unsized"), texts)
+        self.line(step.place.text, local)
+        self.line("[]", f"{rows}: list[str]")
+        attempt = statements.Block("try:", (statements.Block(f"{loop}:", tuple(lines)),))
+        instead = statements.Block("except IndexError:", (statements.Line(unsized, rows),))
+        self.body.append(statements.Block(f"if len({local}):", (attempt, instead)))
+        self.count(step, f"len({rows}) // {len(parts)}")
+        self.flush(4)
+        self.pad(4)
+        self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
+        self.put(block)
+        self.here.skip(f"len({block})", 1)
+        self.settle()
+
+    def items(self, step: plan.Items) -> None:
+        """Emit an array or sequence of structures, as many as there are at one moment."""
+        repeat = plan.fixed(step.body)
+        only_texts = all(isinstance(part, plan.Text) and not part.wide for part in step.body)
+        if only_texts and plan.is_many(step):
+            self.rows(step)
+            return
+        local = step.place.local
+        self.line(call(self.tables.function("listed", "listed"), step.place.text), local)
+        self.count(step, f"len({local})")
+        if repeat is None:
+            self.loop(step)
+        else:
+            self.fused(step, repeat)
+
+    def fused(self, step: plan.Items, repeat: plan.Fixed) -> None:
+        """Emit structures of constant size: one Struct, one join."""
+        local = step.place.local
+        self.flush(1 if step.size is None else repeat.align)
+        inner = _Encoder(self.tables, Position(Alignment(8, 4)))
+        for part in inlined(step):
+            inner.fixed(part)
+        writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
+        row = Group(writer, tuple(inner.frame.values))
+        block = self.tables.local(f"{local}_block")
+        gap = "\\x00" * (repeat.stride - repeat.size)
+        blocks = Comprehension(row, ((step.item, local),))
+        self.line(Group(f'b"{gap}".join', (blocks,)), block)
+        self.elements(block, f"len({local})", repeat, unless=local if step.size is None else "")
+
+    def elements(self, part: str, count: str, repeat: plan.Fixed, *, unless: str) -> None:
+        """Emit elements of constant size; no padding goes before if `unless` is false."""
+        gap = repeat.stride - repeat.size
+        size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
+        size += f" - {gap}" if gap else ""
+        modulus = power_of_two(repeat.size, repeat.stride)
+        if not unless or (self.here.known.is_at(repeat.align) and not gap):
+            self.pad(repeat.align)
+            self.put(part)
+            self.here.skip(size, modulus)
+        else:
+            self.settle()
+            if self.here.constant:
+                self.note("at", self.here.text)
+            self.note("low", self.here.low)
+            self.pad(repeat.align, unless)
+            self.put(part)
+            with self.within(f"if {unless}:"):
+                start = aligned_to_8("at") if repeat.align == 8 else "at"
+                self.note("at", f"{start} + {size}")
+                self.note("low", size)
+            self.here = Position.variable(multiple_of(4).modulo(modulus))
+        self.settle()
+
+    def loop(self, step: plan.Items) -> None:
+        """Emit structures one by one."""
+        self.flush(1)
+        entry = self.here
+        if entry.constant:
+            self.note("at", entry.text)
+        if entry.known.knows(4):
+            self.note("low", entry.low)
+        head = entry.known
+        looping, self.looping = self.looping, True
+        while True:
+            mark = self.tables.mark()
+            with self.within(f"for {step.item} in {step.place.local}:"):
+                self.here = Position.variable(head)
+                self.frame = Frame(self.here)
+                for part in step.body:
+                    self.step(part)
+                self.flush(1)
+                end = self.here
+                if end.known.knows(4) and not head.knows(4):
+                    self.note("low", end.low)
+            met = head.meet(end.known)
+            if met == head:
+                break
+            head = met
+            self.tables.reset(mark)
+            self.body.pop()
+        self.looping = looping
+        self.here = Position.variable(head)
+        self.frame = Frame(self.here)
+
+
+def power_of_two(*sizes: int) -> int:
+    """Return the largest power of two, up to 8, that divides all sizes."""
+    return min(size & -size for size in (*sizes, 8))
+
+
+def inlined(step: plan.Items) -> list[plan.Step]:
+    """Return an element's fixed-size steps, with attribute chains instead of variables."""
+    paths = {step.item: step.item}
+    found: list[plan.Step] = []
+    for part in step.body:
+        match part:
+            case plan.Enter(place):
+                paths[place.local] = f"{paths[place.owner]}.{place.slot}"
+            case plan.Number(place, letter, size):
+                moved = msgspec.structs.replace(place, owner=paths[place.owner])
+                found.append(plan.Number(moved, letter, size))
+            case plan.Block(place, primitive, count):
+                moved = msgspec.structs.replace(place, owner=paths[place.owner])
+                found.append(plan.Block(moved, primitive, count))
+            case _:
+                found.append(part)
+    return found

@@ -1,0 +1,297 @@
+"""How one field looks in its class: annotation, parameter, default and storing."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import msgspec
+
+from idlc.generate.python import documentation, lines
+from idlc.generate.python.imports import References
+from idlc.generate.python.lines import WIDTH, Group, Node, assign, call, flat, tuple_of
+from idlc.model import ir, python_names
+from idlc.wire.plan import LIST_PRIMITIVES
+
+ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}
+BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
+
+
+class FieldView(msgspec.Struct, frozen=True, kw_only=True):
+    """A field, as text; `store` is a statement on as many lines as it takes.
+
+    `wire_name` and `idl` are what rosidl says of it. The conditions of `doubt` are all true, in
+    the constructor, for an argument that is perhaps not of the field's type; a field of numbers
+    has none, because it converts what it is given.
+    """
+
+    name: str
+    wire_name: str
+    idl: str
+    description: str
+    docstring: str
+    annotation: str
+    parameter: str
+    store: str
+    doubt: tuple[str, ...]
+
+
+class Naming(msgspec.Struct, frozen=True):
+    """How a class names what its fields could hide: `self` and what is builtin."""
+
+    receiver: str
+    options: str
+    builtins: str
+    not_implemented: str
+
+    @classmethod
+    def of(cls, structure: ir.Message) -> Naming:
+        """Return the naming of a structure's class; no field can begin with an underscore."""
+        names = {field.name for field in structure.fields}
+        return cls(
+            receiver="_self" if "self" in names else "self",
+            options="_options" if "options" in names else "options",
+            builtins="_builtins." if shadows(structure) else "",
+            not_implemented=(
+                "_builtins.NotImplemented"
+                if _hides_not_implemented(structure)
+                else "NotImplemented"  # as type checkers know it
+            ),
+        )
+
+
+def shadows(structure: ir.Message) -> bool:
+    """Return whether the class needs a builtin whose name a field has, or the interface."""
+    hidden = any(python_names.field(field.name) in BUILTINS for field in structure.fields)
+    return hidden or _hides_not_implemented(structure)
+
+
+def _hides_not_implemented(structure: ir.Message) -> bool:
+    return structure.name.name.partition("_")[0] == "NotImplemented"
+
+
+def support(type_: ir.FieldType) -> str:
+    """Return what a field needs of the runtime: "sequence", "array" or nothing."""
+    if (
+        isinstance(type_, (ir.Sequence, ir.Array))
+        and isinstance(type_.element, ir.Primitive)
+        and type_.element.name not in LIST_PRIMITIVES
+    ):
+        return "sequence" if isinstance(type_, ir.Sequence) else "array"
+    return ""
+
+
+def numeric_class(type_: ir.Sequence | ir.Array) -> str:
+    """Return the descriptor class of a numeric array."""
+    assert isinstance(type_.element, ir.Primitive)
+    name = ir.PRIMITIVES[type_.element.name].dtype
+    stem = name.replace("uint", "UInt") if name.startswith("u") else name.capitalize()
+    return stem + ("Sequence" if isinstance(type_, ir.Sequence) else "Array")
+
+
+def idl_text(type_: ir.FieldType) -> str:
+    """Return a type as rosidl's `get_fields_and_field_types` spells it."""
+    match type_:
+        case ir.Array(element, size):
+            return f"{idl_text(element)}[{size}]"
+        case ir.Sequence(element, bound):
+            limit = "" if bound is None else f", {bound}"
+            return f"sequence<{idl_text(element)}{limit}>"
+        case ir.String(wide, bound):
+            return ("wstring" if wide else "string") + ("" if bound is None else f"<{bound}>")
+        case ir.Ref(target):
+            return f"{target.package}/{target.name}"
+        case ir.Primitive():
+            return type_.info.idl
+        case ir.Unknown():
+            raise ValueError("an unknown type cannot be emitted")
+
+
+def view(
+    field: ir.Field, references: References, naming: Naming, file: str, *, converts: bool
+) -> FieldView:
+    """Return the view of a field; `file` is the one that defines it.
+
+    With `converts`, `None` is the default of any field, and a list is made of any iterable.
+    """
+    name = python_names.field(field.name)
+    slot = f"{naming.receiver}.{python_names.slot(field.name)}"
+    shape = _shape(field, references, naming, converts=converts)
+    words = documentation.words(field)
+    return FieldView(
+        name=name,
+        wire_name=field.name,
+        idl=idl_text(field.type),
+        description=documentation.entry(name, field, words),
+        docstring=documentation.attribute(field, words, file),
+        annotation=shape.annotation + _ignored(name),
+        parameter=shape.parameter,
+        store="\n".join(_store(slot, name, shape)).lstrip(),
+        doubt=shape.doubt,
+    )
+
+
+class _Shape(NamedTuple):
+    """What the fields of a kind have in common: annotations, and how a value gets into the slot.
+
+    `fresh` is the default of a field whose parameter is None without an argument.
+    """
+
+    annotation: str
+    parameter: str
+    stored: Node
+    fresh: Node = ""
+    doubt: tuple[str, ...] = ()
+
+
+def _shape(field: ir.Field, references: References, naming: Naming, *, converts: bool) -> _Shape:
+    name = python_names.field(field.name)
+    kind = f"{name}.__class__"  # faster than a call, and no field can hide it
+    if isinstance(field.type, (ir.Primitive, ir.String)):
+        annotation = naming.builtins + _element(field.type, references)
+        default = _scalar_default(field)
+        unlike = f"{kind} is not {annotation}"
+        if not converts:
+            return _Shape(annotation, f"{annotation} = {default}", name, doubt=(unlike,))
+        parameter = f"{annotation} | None = None"
+        return _Shape(annotation, parameter, name, default, (f"{name} is not None", unlike))
+    if support(field.type):
+        return _numbers(field, name)
+    if isinstance(field.type, ir.Ref):
+        annotation = _element(field.type, references)
+        fresh: Node = f"{annotation}()"
+        known = "" if field.type.target in references.implied else annotation
+    else:
+        element = _element(ir.element_of(field.type), references)
+        inner = naming.builtins + element if element in BUILTINS else element
+        known = f"{naming.builtins}list"
+        annotation = f"{known}[{inner}]"
+        fresh = _fresh_list(field, references)
+    doubt = (f"{name} is not None", *([f"{kind} is not {known}"] if known else []))
+    if converts and not isinstance(field.type, ir.Ref):
+        inside = getattr(ir.element_of(field.type), "name", "")
+        read = [f"_idlc.read_{LIST_PRIMITIVES[inside]}"] if inside in LIST_PRIMITIVES else []
+        stored = call("_idlc.to_list", name, f'"{name}"', *read)
+        declared = assign(f"{name}: _idlc.ListOf[{inner}]", f"_idlc.ListOf({', '.join(read)})", 4)
+        annotation = "\n".join(declared).strip().removeprefix(f"{name}: ")
+        parameter = f"_idlc.Iterable[{inner}] | None = None"
+        if len(name) + len(parameter) + 11 > WIDTH:
+            parameter = parameter.replace(" |", "\n        |")
+        return _Shape(annotation, parameter, stored, fresh, doubt)
+    return _Shape(annotation, f"{annotation} | None = None", name, fresh, doubt)
+
+
+def _ignored(name: str) -> str:
+    # type checkers take a field of a method's name for a mistake
+    return "  # type: ignore[assignment]" if python_names.hides_method(name) else ""
+
+
+def _element(element: ir.Element, references: References) -> str:
+    match element:
+        case ir.Primitive(name):
+            return ANNOTATIONS.get(name, "int")
+        case ir.String():
+            return "str"
+        case ir.Ref(target):
+            return references.annotation(target)
+        case ir.Unknown():
+            raise ValueError("an unknown type cannot be emitted")
+
+
+def _store(slot: str, name: str, shape: _Shape) -> list[str]:
+    """Return the statement that gives a slot its value, indented as in the constructor."""
+    if not shape.fresh:
+        return assign(slot, shape.stored, 8)
+    one = f"        {slot} = {flat(shape.fresh)} if {name} is None else {flat(shape.stored)}"
+    if len(one) <= WIDTH:
+        return [one]
+    return [
+        f"        if {name} is None:",
+        *assign(slot, shape.fresh, 12),
+        "        else:",
+        *assign(slot, shape.stored, 12),
+    ]
+
+
+def _scalar_default(field: ir.Field) -> str:
+    assert isinstance(field.type, (ir.Primitive, ir.String))
+    if field.default is not None and not isinstance(field.default.value, tuple):
+        return lines.scalar(field.type, field.default.value)
+    return zero(field.type)
+
+
+def zero(element: ir.Element) -> str:
+    """Return the literal of the value without a declared default."""
+    match element:
+        case ir.Primitive("bool"):
+            return "False"
+        case ir.Primitive("byte"):
+            return 'b"\\x00"'
+        case ir.Primitive("float32" | "float64"):
+            return "0.0"
+        case ir.String():
+            return '""'
+        case _:
+            return "0"
+
+
+def _values(field: ir.Field) -> tuple[str, ...] | None:
+    if field.default is None:
+        return None
+    values = field.default.value
+    assert isinstance(values, tuple)
+    return tuple(lines.scalar(ir.element_of(field.type), value) for value in values)
+
+
+def _fresh_list(field: ir.Field, references: References) -> Node:
+    values = _values(field)
+    if values is not None:
+        return Group("", values, brackets="[]")
+    if isinstance(field.type, ir.Array):
+        element = field.type.element
+        if isinstance(element, ir.Ref):
+            return call("_idlc.several", references.name(element.target), str(field.type.size))
+        return f"[{zero(element)}] * {field.type.size}"
+    return "[]"
+
+
+def _fresh_numbers(field: ir.Field) -> Node:
+    values = _values(field)
+    assert isinstance(field.type, (ir.Sequence, ir.Array))
+    assert isinstance(field.type.element, ir.Primitive)
+    if isinstance(field.type, ir.Sequence):
+        code = f'"{field.type.element.info.code}"'
+        return call("_array", code, *([tuple_of(*values)] if values else []))
+    dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
+    if values is None:
+        return call("_arrays.zeros", str(field.type.size), dtype)
+    return call("_arrays.array", tuple_of(*values), dtype)
+
+
+def _numbers(field: ir.Field, name: str) -> _Shape:
+    assert isinstance(field.type, (ir.Sequence, ir.Array))
+    assert isinstance(field.type.element, ir.Primitive)
+    kind = numeric_class(field.type)
+    fresh = _fresh_numbers(field)
+    if isinstance(field.type, ir.Sequence):
+        code = f'"{field.type.element.info.code}"'
+        values = "_idlc.Floats" if kind.startswith("Float") else "_idlc.Integers"
+        annotation = f"_idlc.{kind} = _idlc.{kind}()"
+        stored = call("_idlc.to_array", code, name, f'"{name}"')
+    else:
+        dtype = f"_arrays.{ir.PRIMITIVES[field.type.element.name].dtype.upper()}"
+        values = "_arrays.Values"
+        annotation = f"_arrays.{kind} = _arrays.{kind}({field.type.size})"
+        stored = call("_arrays.to_ndarray", dtype, str(field.type.size), name, f'"{name}"')
+    return _Shape(annotation, f"{values} | None = None", stored, fresh)
+
+
+def default_constant(field: ir.Field) -> list[str]:
+    """Return the lines of the class attribute FIELD__DEFAULT."""
+    name = f"{field.name.upper()}__DEFAULT"
+    if isinstance(field.type, (ir.Primitive, ir.String)):
+        return assign(name, _scalar_default(field), 4)
+    if not support(field.type):
+        return assign(name, call("_idlc.FreshList", *(_values(field) or ())), 4)
+    fresh = _fresh_numbers(field)
+    assert isinstance(fresh, Group)
+    return assign(name, call("_idlc.Fresh", fresh.before, *fresh.items), 4)

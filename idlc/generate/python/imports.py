@@ -1,0 +1,216 @@
+"""Import statements, sorted as linters want them."""
+
+from __future__ import annotations
+
+import builtins
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterable
+
+import msgspec
+
+from idlc.generate.python import lines
+from idlc.model import derive, ir, link, python_names
+from idlc.wire import plan
+
+
+def natural(name: str) -> list[tuple[int, str]]:
+    """Return a key that sorts numbers in names by their value."""
+    parts = re.findall(r"\d+|\D+", name)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
+
+
+def _order(name: str) -> tuple[bool, list[tuple[int, str]]]:
+    is_constant = name.isupper() and len(name) > 1  # as linters see it
+    return not is_constant, natural(name)
+
+
+def statements(module: str, names: Collection[str], indent: int = 0) -> list[str]:
+    """Return the lines that import names from a module; `X as Y` has a statement of its own."""
+    statements = [(name,) for name in names if " as " in name]
+    plain = sorted((name for name in names if " as " not in name), key=_order)
+    ordered = sorted([*statements, *([tuple(plain)] if plain else [])])
+    return [line for one in ordered for line in lines.import_from(module, one, indent)]
+
+
+class Homes:
+    """The module of each structure of a package, without the package and the kind.
+
+    Those of other packages are inside of the Python package `around`, if that is not empty.
+    """
+
+    def __init__(
+        self, interface: ir.Interface, modules: python_names.Modules, around: str = ""
+    ) -> None:
+        self.modules = modules
+        self.around = f"{around}." if around else ""
+        self.classes = modules[interface.name]
+        self.protocol = python_names.protocol_module(self.classes)
+        self.sections = {message.name for message in derive.sections(interface)}
+        self.derived = {message.name for message in derive.messages(interface)} - self.sections
+
+    def of(self, structure: ir.TypeName) -> python_names.ModuleName:
+        """Return the module that defines a structure's class."""
+        if structure in self.sections:
+            return self.classes
+        return self.protocol if structure in self.derived else self.modules[structure]
+
+
+class References:
+    """The names of all classes that a module mentions.
+
+    `own` are the structures that it defines, `others` those of other packages that their fields
+    name. `direct` are imported with the module; `implied` are others of fields that ROS 2 adds,
+    imported when they are used, so that each part of a protocol needs only what it holds.
+    """
+
+    def __init__(
+        self,
+        interface: ir.Interface,
+        structures: Iterable[ir.Message],
+        messages: plan.Messages,
+        homes: Homes,
+    ) -> None:
+        self._homes = homes
+        self.package = interface.name.package
+        self.kind = interface.name.kind
+        self.own = {message.name for message in structures}
+        named = {name for message in structures for name in message.references} - self.own
+        self.others = {name for name in named if name.package != self.package}
+        self.implied = self.others if self.own & homes.derived else set()
+        self.direct = named - self.implied
+        groups = {interface.name, *(service.name for service in derive.services(interface))}
+        self._names = self._named(self.own | groups, _closure(self.own, messages))
+
+    def _named(
+        self, own: set[ir.TypeName], others: set[ir.TypeName]
+    ) -> dict[ir.TypeName, python_names.ClassName]:
+        """Return each structure's class; those that the module defines keep their plain name.
+
+        Others get another one if something else has it: an exception of Python, for example.
+        """
+        by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
+        for name in own | others:
+            by_class[python_names.class_(name)].append(name)
+        return {
+            name: python_names.class_(name)
+            if name in own or (len(same) == 1 and not hasattr(builtins, class_))
+            else python_names.qualified_class(name)
+            for class_, same in by_class.items()
+            for name in same
+        }
+
+    def name(self, type_: ir.TypeName) -> python_names.ClassName:
+        """Return the class's name in this module."""
+        return self._names[type_]
+
+    def annotation(self, type_: ir.TypeName) -> str:
+        """Return the class as annotations and constructors name it."""
+        if type_ in self.implied:
+            return f"{_module(type_)}.{python_names.class_(type_)}"
+        return self.name(type_)
+
+    def modules(self) -> list[tuple[str, str]]:
+        """Return the modules of implied types, with their names in this module."""
+        return sorted({(self._outside(type_), _module(type_)) for type_ in self.implied})
+
+    def _outside(self, type_: ir.TypeName) -> str:
+        return f"{self._homes.around}{type_.package}.{type_.kind}"
+
+    def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
+        """Return import statements, those of this package and those of others, sorted.
+
+        Those of others are indented by four more columns.
+        """
+        inside: dict[tuple[int, str], set[str]] = defaultdict(set)
+        outside: dict[str, set[str]] = defaultdict(set)
+        for type_ in types:
+            name: str = python_names.class_(type_)
+            if self.name(type_) != name:
+                name = f"{name} as {self.name(type_)}"
+            if type_.package != self.package:
+                outside[self._outside(type_)].add(name)
+            elif type_.kind == self.kind:
+                inside[1, f".{self._homes.of(type_)}"].add(name)
+            else:
+                inside[0, f"..{type_.kind}.{self._homes.of(type_)}"].add(name)
+        return (
+            [
+                line
+                for (_, module), names in sorted(inside.items())
+                for line in statements(module, names, indent)
+            ],
+            [
+                line
+                for module, names in sorted(outside.items())
+                for line in statements(module, names, indent + 4)
+            ],
+        )
+
+
+def _module(type_: ir.TypeName) -> str:
+    return f"_{type_.package}_{type_.kind}"
+
+
+def _closure(own: set[ir.TypeName], messages: plan.Messages) -> set[ir.TypeName]:
+    found: set[ir.TypeName] = set()
+    waiting = list(own)
+    while waiting:
+        for name in messages[waiting.pop()].references:
+            if name not in found:
+                found.add(name)
+                waiting.append(name)
+    return found
+
+
+TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}
+
+
+class NameView(msgspec.Struct, frozen=True):
+    """A class, and the module that it is in."""
+
+    name: str
+    module: str
+
+
+class PackageView(msgspec.Struct, frozen=True):
+    """A package that imports its modules when a name is asked for."""
+
+    path: str
+    title: str
+    imports: tuple[str, ...]
+    names: tuple[NameView, ...]
+
+
+def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str, str]:
+    """Return the names that an interface's modules offer, with their modules."""
+    homes = Homes(interface, modules)
+    names: dict[str, str] = {
+        python_names.class_(message.name): homes.of(message.name)
+        for message in derive.messages(interface)
+    }
+    for service in derive.services(interface):
+        names[python_names.class_(service.name)] = homes.protocol
+    names[python_names.class_(interface.name)] = homes.classes
+    return names
+
+
+def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> PackageView:
+    """Return the view of one kind's package."""
+    found: dict[str, str] = {}
+    for interface in model.own:
+        if interface.name.kind == kind:
+            found |= exported(interface, modules)
+    by_module: dict[str, list[str]] = defaultdict(list)
+    for name, module in found.items():
+        by_module[module].append(name)
+    return PackageView(
+        path=f"{kind}/__init__.py",
+        title=f"{TITLES[kind]} of {model.package}, imported when they are asked for.",
+        imports=tuple(
+            line
+            for module in sorted(by_module, key=natural)
+            for line in statements(f".{module}", by_module[module], 4)
+        ),
+        names=tuple(NameView(name, found[name]) for name in sorted(found, key=natural)),
+    )

@@ -1,0 +1,259 @@
+"""Python statements as lines, broken as ruff breaks them.
+
+In: expressions as text, or as a `Group` where they may be broken. Out: lines without indentation
+errors: a statement that fits stays on one line, otherwise each item of a group gets a line of its
+own and a trailing comma, which formatters keep.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+import unicodedata
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import msgspec
+
+from idlc.model import ir
+
+#: Columns in generated packages; who writes other files gives another width.
+WIDTH = 88
+
+
+class Group(msgspec.Struct, frozen=True):
+    """A call, list, dictionary or tuple: `before`, the items between brackets, `after`.
+
+    Round brackets with nothing before them are a tuple, also around one item.
+    """
+
+    before: str
+    items: tuple[Node, ...]
+    after: str = ""
+    brackets: str = "()"
+
+    def flat(self) -> str:
+        """Return the group on one line."""
+        # a list, and no call for a str: half of all rendering passes through here
+        inner = ", ".join([one if isinstance(one, str) else one.flat() for one in self.items])
+        if len(self.items) == 1 and self.brackets == "()" and not self.before:
+            inner += ","
+        return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}{self.after}"
+
+
+class Comprehension(msgspec.Struct, frozen=True):
+    """A list comprehension: what is made of each element; each `for`'s targets and iterable."""
+
+    element: Node
+    loops: tuple[tuple[str, Node], ...]
+
+    def flat(self) -> str:
+        """Return the comprehension on one line."""
+        loops = (f"for {targets} in {flat(values)}" for targets, values in self.loops)
+        return f"[{flat(self.element)} {' '.join(loops)}]"
+
+
+Node: TypeAlias = str | Group | Comprehension
+
+
+def tuple_of(*items: Node) -> Group:
+    """Return a tuple, of values or of targets."""
+    return Group("", items)
+
+
+def call(function: str, *arguments: Node) -> Group:
+    """Return a call."""
+    return Group(function, arguments)
+
+
+def flat(node: Node) -> str:
+    """Return a node on one line."""
+    return node if isinstance(node, str) else node.flat()
+
+
+def layout_lines(
+    node: Node, indent: int, before: str = "", after: str = "", width: int = 0
+) -> list[str]:
+    """Return `before`, the node and `after` as lines, indented by `indent` columns."""
+    margin = " " * indent
+    width = width or WIDTH
+    if isinstance(node, str):
+        return [f"{margin}{before}{node}{after}"]
+    one = f"{margin}{before}{node.flat()}{after}"
+    if len(one) <= width:
+        return [one]
+    if isinstance(node, Comprehension):
+        body = [f"{margin}    {node.flat()[1:-1]}"]
+        if len(body[0]) > width:
+            body = layout_lines(node.element, indent + 4, width=width)
+            for targets, values in node.loops:
+                body += layout_lines(values, indent + 4, f"for {targets} in ", width=width)
+        return [f"{margin}{before}[", *body, f"{margin}]{after}"]
+    return _broken(node, indent, before, f"{node.after}{after}", width)
+
+
+def _broken(
+    group: Group, indent: int, before: str = "", after: str = "", width: int = 0
+) -> list[str]:
+    """Return a group with each item on a line of its own; a comma follows each."""
+    margin = " " * indent
+    result = [f"{margin}{before}{group.before}{group.brackets[0]}"]
+    for item in group.items:
+        result += layout_lines(item, indent + 4, "", ",", width)
+    result.append(f"{margin}{group.brackets[1]}{after}")
+    return result
+
+
+def import_from(module: str, names: Sequence[str], indent: int = 0, width: int = 0) -> list[str]:
+    """Return the lines of an import statement."""
+    margin = " " * indent
+    one = f"{margin}from {module} import {', '.join(names)}"
+    if len(one) <= (width or WIDTH) or " as " in one:
+        return [one]
+    items = [f"{margin}    {name}," for name in names]
+    return [f"{margin}from {module} import (", *items, f"{margin})"]
+
+
+def all_of(conditions: Sequence[str], indent: int) -> list[str]:
+    """Return lines that return whether all conditions are true."""
+    margin = " " * indent
+    one = f"{margin}return {' and '.join(conditions)}"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
+
+
+def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
+    """Return conditions joined by a word, on one line, or on one each."""
+    margin = " " * indent
+    one = f"{margin}{f' {word} '.join(conditions)}"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
+
+
+def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
+    """Return the head of an `if` of one condition, or else all of the others."""
+    margin = " " * indent
+    if len(rest) < 2:
+        return any_of([first, *rest], indent, "if ", ":")
+    one = f"{margin}if {first} or ({' and '.join(rest)}):"
+    if len(one) <= WIDTH:
+        return [one]
+    return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
+
+
+def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
+    """Return the lines of `before`, whether any condition is true, and `after`."""
+    margin = " " * indent
+    one = f"{margin}{before}{' or '.join(conditions)}{after}"
+    if len(one) <= WIDTH:
+        return [one]
+    brackets = ("", "") if before.endswith("(") else ("(", ")")
+    return [
+        f"{margin}{before}{brackets[0]}",
+        *_spread(conditions, "or", indent + 4),
+        f"{margin}{brackets[1]}{after}",
+    ]
+
+
+def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[str]:
+    """Return an assignment as lines."""
+    margin = " " * indent
+    left = flat(target)
+    if isinstance(target, Group) and len(target.items) > 1:
+        left = left[1:-1]  # as formatters have it
+    one = f"{margin}{left} {operator} {flat(value)}"
+    if len(one) <= WIDTH:
+        return [one]
+    if isinstance(target, Group):
+        *targets, last = _broken(target, indent)
+        return [*targets, *assign(last.strip(), value, indent, operator)]
+    if not isinstance(value, str):
+        return layout_lines(value, indent, f"{left} {operator} ")
+    if len(margin) + 4 + len(value) <= WIDTH:
+        return [f"{margin}{left} {operator} (", f"{margin}    {value}", f"{margin})"]
+    return [one]
+
+
+def text(value: str) -> str:
+    """Return a string literal with the quotes that formatters choose."""
+    quote = '"' if value.count('"') <= value.count("'") else "'"
+    if value.isascii() and value.isprintable():
+        return quote + value.replace("\\", "\\\\").replace(quote, "\\" + quote) + quote
+    return quote + "".join(_escaped(c, quote) for c in value) + quote
+
+
+def octet(value: int) -> str:
+    """Return a bytes literal of one byte."""
+    quote = "'" if value == ord('"') else '"'
+    if value == ord("\\"):
+        return 'b"\\\\"'
+    return f"b{quote}{chr(value)}{quote}" if 0x20 <= value < 0x7F else f'b"\\x{value:02x}"'
+
+
+def number(value: ir.Scalar) -> str:
+    """Return a bool, int or float literal."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return f'float("{value}")'
+    return repr(value)
+
+
+def scalar(type_: ir.Element, value: ir.Scalar) -> str:
+    """Return the literal of a value of a primitive or string type."""
+    if isinstance(type_, ir.String):
+        return text(str(value))
+    if isinstance(type_, ir.Primitive) and type_.name == "byte":
+        return octet(int(value))
+    if isinstance(type_, ir.Primitive) and type_.name.startswith("float"):
+        return number(float(value))
+    return number(value)
+
+
+def _escaped(character: str, quote: str) -> str:
+    if character == quote or character == "\\":
+        return "\\" + character
+    return printable(character)
+
+
+def printable(character: str) -> str:
+    """Return a character, or its escape if it does not print or reorders what does."""
+    if character.isprintable() and unicodedata.category(character) not in {"Cf", "Zl", "Zp"}:
+        return character
+    return repr(character)[1:-1] if not character.isprintable() else f"\\u{ord(character):04x}"
+
+
+def prose(line: str) -> str:
+    """Return a line of a docstring."""
+    if line.isascii() and line.isprintable():
+        shown = line.replace("\\", "\\\\")
+    else:
+        shown = "".join("\\\\" if c == "\\" else printable(c) for c in line.expandtabs(4))
+    return shown.replace('"""', '\\"\\"\\"').rstrip()
+
+
+def docstring(lines: list[str], *, one_line: bool) -> str:
+    """Return finished lines (see `prose`) as they stand after the opening quotes of a docstring.
+
+    With `one_line`, the closing quotes follow if there is but one.
+    """
+    first = lines[0].lstrip()
+    if one_line and len(lines) == 1 and first.endswith('"') and not first.endswith('\\"'):
+        first = first[:-1] + '\\"'  # would join the closing quotes
+    if first.startswith('"'):
+        first = "\\" + first
+    return "\n".join([first, *lines[1:]])
+
+
+def wrapped(words: str, indent: int, hanging: int = 0) -> list[str]:
+    """Return words on lines that fit when they are indented, all but the first by `hanging` too."""
+    width = WIDTH - 4 - indent
+    if len(words) <= width:
+        return [words]
+    return textwrap.wrap(
+        words,
+        width,
+        subsequent_indent=" " * hanging,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

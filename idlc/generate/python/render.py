@@ -1,0 +1,267 @@
+"""From the model to the files of a package, by way of the view-model and the templates.
+
+Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, TypedDict
+
+import jinja2
+import msgspec
+
+from idlc.generate.idl import file_text
+from idlc.generate.python import classes, documentation, fields, imports
+from idlc.generate.python.classes import GroupView, MessageView
+from idlc.generate.python.codec import CodecView, codec
+from idlc.generate.python.imports import Homes, References
+from idlc.generate.python.lines import text as literal_text
+from idlc.model import derive, ir, link, python_names
+from idlc.model.describe import IndividualDict
+from idlc.project.templates import RenderedFile, environment
+from idlc.wire import plan
+
+
+class TypesDict(TypedDict):
+    """Descriptions and hashes by full name, and the package's own files by interface name.
+
+    Other packages' files are left out: their text differs between an installation and the
+    catalogue, and the same input must give the same output.
+    """
+
+    package: str
+    descriptions: dict[str, IndividualDict]
+    hashes: dict[str, str]
+    sources: dict[str, str]
+
+
+def content(model: link.Model) -> TypesDict:
+    """Return the descriptions of a package's types and of everything that they refer to."""
+    describer = model.describer
+    descriptions: dict[str, IndividualDict] = {}
+    for interface in model.own:
+        structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
+        for structure in structures:
+            full = describer.description(str(structure.name))
+            for one in (full["type_description"], *full["referenced_type_descriptions"]):
+                descriptions[one["type_name"]] = one
+    sources = {
+        # rosidl reads texts so, and no checkout of git's makes a difference then
+        str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
+        for interface in model.own
+        if interface.source is not None
+    }
+    return {
+        "package": model.package,
+        "descriptions": dict(sorted(descriptions.items())),
+        "hashes": {name: describer.hash(name) for name in sorted(descriptions)},
+        "sources": dict(sorted(sources.items())),
+    }
+
+
+def type_data_source(model: link.Model, around: str = "") -> str:
+    """Return the text of the module: one line of it for each type."""
+    parts = _parts(content(model), around)
+    lines = "".join(f"    {literal_text(part)}\n" for part in parts)
+    return f'"""The types of {model.package}, read by `typeinfo`."""\n\nJSON = (\n{lines})\n'
+
+
+def _parts(tables: TypesDict, around: str) -> Iterator[str]:
+    """Yield pieces that joined are the JSON text."""
+    yield f'{{"package":{_json(tables["package"])}'
+    if around:
+        yield f',"around":{_json(f"{around}.")}'
+    for key in ("descriptions", "hashes", "sources"):
+        mark = f',"{key}":{{'
+        entries: dict[str, Any] = tables[key]
+        for name, value in entries.items():
+            yield f"{mark}{_json(name)}:{_json(value)}"
+            mark = ","
+        yield "}" if entries else mark + "}"
+    yield "}"
+
+
+_json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode
+
+
+class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
+    """A module of classes or of codecs; `imports` are lines.
+
+    `protocol` is the module of what ROS 2 adds to the service or action.
+    """
+
+    template: str
+    path: str
+    origin: str
+    pragmas: tuple[str, ...]
+    title: str
+    imports: tuple[str, ...] = ()
+    messages: tuple[MessageView, ...] = ()
+    codecs: tuple[CodecView, ...] = ()
+    services: tuple[GroupView, ...] = ()
+    action: GroupView | None = None
+    protocol: str = ""
+
+
+PRAGMAS = (
+    '# mypy: disable-error-code="import-not-found,import-untyped"',
+    "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
+)
+HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
+
+
+class _Part(NamedTuple):
+    """What one module of classes defines of an interface."""
+
+    interface: ir.Interface
+    structures: tuple[ir.Message, ...]
+    references: References
+    module: python_names.ModuleName
+    is_added: bool
+    converts: bool
+
+
+def module_views(
+    interface: ir.Interface,
+    messages: plan.Messages,
+    names: python_names.Modules,
+    around: str = "",
+    *,
+    converts: bool = False,
+) -> Iterator[ModuleView]:
+    """Yield the views of an interface's modules; `names` has the modules of all its package.
+
+    `converts` is whether classes convert values as those of Lyrical do.
+    """
+    homes = Homes(interface, names, around)
+    written = derive.sections(interface)
+    added = derive.messages(interface)[len(written) :]
+    for structures, module in ((written, homes.classes), (added, homes.protocol)):
+        if structures:
+            references = References(interface, structures, messages, homes)
+            part = _Part(interface, structures, references, module, structures is added, converts)
+            yield _classes(part, homes)
+            yield _codecs(part, messages)
+
+
+def _classes(part: _Part, homes: Homes) -> ModuleView:
+    interface, references = part.interface, part.references
+    name = interface.name
+    purposes = documentation.purposes(interface)
+    is_action = isinstance(interface, ir.Action)
+    file = f"{name.kind}/{name.name}.{name.kind}"
+    return ModuleView(
+        template="protocol" if part.is_added else name.kind,
+        path=f"{name.kind}/{part.module}.py",
+        origin=f"{name}.{name.kind}",
+        pragmas=(
+            *(PRAGMAS if references.others else ()),
+            *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
+        ),
+        title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
+        imports=tuple(_imports(references, part.structures)),
+        messages=tuple(
+            classes.message(one, references, purposes, file, converts=part.converts)
+            for one in part.structures
+        ),
+        # a service's own class is its author's; those of an action's services are not
+        services=classes.services(interface, purposes) if part.is_added == is_action else (),
+        action=classes.action(interface) if isinstance(interface, ir.Action) else None,
+        protocol=homes.protocol,
+    )
+
+
+def _codecs(part: _Part, messages: plan.Messages) -> ModuleView:
+    name = part.interface.name
+    codecs = tuple(codec(one, part.references, messages) for one in part.structures)
+    return ModuleView(
+        template="codec",
+        path=f"{name.kind}/{python_names.codec_module(part.module)}.py",
+        origin=f"{name}.{name.kind}",
+        pragmas=PRAGMAS if any(one.outside for one in codecs) else (),
+        title=f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}.",
+        codecs=codecs,
+    )
+
+
+def _hides_methods(structure: ir.Message) -> bool:
+    return any(python_names.hides_method(field.name) for field in structure.fields)
+
+
+def _imports(references: References, structures: tuple[ir.Message, ...]) -> Iterator[str]:
+    used = {fields.support(field.type) for message in structures for field in message.fields}
+    standard = ["import builtins as _builtins"] if any(map(fields.shadows, structures)) else []
+    if "sequence" in used:
+        standard.append("from array import array as _array")
+    inside, outside = references.imports(references.direct)
+    yield from (*standard, "") if standard else ()
+    yield "from .. import _idlc"
+    if "array" in used:
+        yield "from .._idlc import arrays as _arrays"
+    yield from inside
+    if outside:
+        yield from ("", "with _idlc.importing():", *outside)
+    implied = references.modules()
+    if implied:
+        yield from ("", "TYPE_CHECKING = False", "if TYPE_CHECKING:")
+        yield from (f"    import {module} as {name}" for module, name in implied)
+        yield "else:"
+        yield from (f'    {name} = _idlc.Package("{module}")' for module, name in implied)
+
+
+PACKAGE = Path(__file__).parents[2]
+
+
+@cache
+def _template(name: str) -> jinja2.Template:
+    return environment().get_template(name)
+
+
+@cache
+def runtime_files() -> tuple[RenderedFile, ...]:
+    """Return the support package, a verbatim copy of idlc.runtime."""
+    runtime = PACKAGE / "runtime"
+    return tuple(
+        RenderedFile(
+            f"_idlc/{path.relative_to(runtime).as_posix()}", path.read_text(encoding="utf-8")
+        )
+        for path in sorted(runtime.rglob("*.py"))
+    )
+
+
+def support_packages() -> list[str]:
+    """Return the Python packages that the support package consists of, itself first."""
+    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
+
+
+def module_files(
+    interface: ir.Interface, model: link.Model, modules: python_names.Modules, around: str = ""
+) -> Iterator[RenderedFile]:
+    """Yield the modules of one interface."""
+    converts = model.distro.converts_values
+    for module in module_views(interface, model.messages, modules, around, converts=converts):
+        template = _template(f"message/{module.template}.py.jinja")
+        yield RenderedFile(module.path, template.render(module=module))
+
+
+def render_package(model: link.Model, around: str = "") -> tuple[RenderedFile, ...]:
+    """Return all files of a generated package but its lock, sorted by path.
+
+    Other packages are imported from the Python package `around`, if that is not empty.
+    The model must be without errors: no `Unknown` type, nothing that is not found.
+    """
+    modules = python_names.modules(interface.name for interface in model.own)
+    files = [file for own in model.own for file in module_files(own, model, modules, around)]
+    for kind in sorted({interface.name.kind for interface in model.own}):
+        page = imports.package(model, kind, modules)
+        text = _template("message/package_init.py.jinja").render(package=page)
+        files.append(RenderedFile(page.path, text))
+    files.append(RenderedFile("_idlc/type_data.py", type_data_source(model, around)))
+    # a package without it would lose to any other of its name, wherever that stands on the path
+    files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
+    files.append(RenderedFile("py.typed", ""))
+    return tuple(sorted((*files, *runtime_files()), key=lambda file: file.path))

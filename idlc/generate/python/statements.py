@@ -1,0 +1,346 @@
+"""Statements of an emitted function before they are text, and what can be dropped from them.
+
+The encoder notes the position after every value whose size is not constant; most of these notes
+are never read. `prune` drops them, `text_of` turns the rest into lines.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple, TypeAlias
+
+import msgspec
+
+from idlc.generate.python.lines import Group, Node, any_of, assign, call, layout_lines
+from idlc.model import ir, python_names
+from idlc.wire import plan
+
+
+class Line(msgspec.Struct, frozen=True):
+    """A statement without effect on the position: `target = value`, or `value` alone."""
+
+    value: Node
+    target: Node = ""
+    operator: str = "="
+
+
+class Put(msgspec.Struct, frozen=True):
+    """A part of the message; `reads` names the position variables in it."""
+
+    part: Node
+    reads: frozenset[str] = frozenset()
+
+
+class Note(msgspec.Struct, frozen=True):
+    """An update of a position variable, without other effect."""
+
+    target: str
+    value: str
+    reads: frozenset[str]
+
+
+class Block(msgspec.Struct, frozen=True):
+    """A compound statement; a loop runs any number of times, a branch at most once."""
+
+    head: str
+    body: tuple[Statement, ...]
+
+
+Statement: TypeAlias = Line | Put | Note | Block
+
+
+class Emitter:
+    """The statements so far."""
+
+    def __init__(self) -> None:
+        self.body: list[Statement] = []
+
+    def line(self, value: Node, target: Node = "") -> None:
+        """Emit a statement without effect on the position."""
+        self.body.append(Line(value, target))
+
+    @contextmanager
+    def within(self, head: str) -> Iterator[None]:
+        """Make what is emitted meanwhile the body of a compound statement."""
+        outside, self.body = self.body, []
+        yield
+        outside.append(Block(head, tuple(self.body)))
+        self.body = outside
+
+
+def prune(body: tuple[Statement, ...], live: frozenset[str]) -> tuple[Statement, ...]:
+    """Return the statements without the notes that nothing reads; `live` is read afterwards."""
+    return tuple(reversed(_prune(body, live)[0]))
+
+
+def _prune(
+    body: tuple[Statement, ...], live: frozenset[str]
+) -> tuple[list[Statement], frozenset[str]]:
+    kept: list[Statement] = []
+    for statement in reversed(body):
+        match statement:
+            case Note(target, _, reads):
+                if target not in live:
+                    continue
+                live = live - {target} | reads
+            case Put(_, reads):
+                live |= reads
+            case Block(head, inner):
+                remaining, before = _prune(inner, live)
+                while not before <= live:
+                    live |= before
+                    remaining, before = _prune(inner, live)
+                if not remaining:
+                    continue
+                statement = Block(head, tuple(reversed(remaining)))
+        kept.append(statement)
+    return kept, live
+
+
+def text_of(body: tuple[Statement, ...], indent: int) -> list[str]:
+    """Return the statements of a function as lines, each part appended by `put`."""
+    result: list[str] = []
+    for statement in body:
+        match statement:
+            case Line(value, target, operator):
+                if target:
+                    result += assign(target, value, indent, operator)
+                else:
+                    result += layout_lines(value, indent)
+            case Block(head, inner):
+                result.append(" " * indent + head)
+                result += text_of(inner, indent + 4)
+            case Note(target, value):
+                result += assign(target, value, indent)
+            case Put(part):
+                result += layout_lines(Group("put", (part,)), indent)
+    return result
+
+
+def _interferes(statement: Statement, waiting: list[Put]) -> bool:
+    """Return whether a statement must not run before the parts that wait to be put."""
+    match statement:
+        case Note(target):
+            return any(target in put.reads for put in waiting)
+        case Block(_, inner):
+            return any(isinstance(s, Put) or _interferes(s, waiting) for s in inner)
+        case _:
+            return False
+
+
+def function(body: tuple[Statement, ...], indent: int, again: tuple[str, ...]) -> list[str]:
+    """Return the lines of a function that returns what `join` makes of its parts.
+
+    Parts are collected as long as no position that they read changes. If one of the conditions
+    of `again` is true in the end, the function begins anew.
+    """
+    result: list[str] = []
+    waiting: list[Put] = []
+    begun = False
+
+    def flush(*, last: bool = False) -> None:
+        nonlocal begun
+        parts = tuple(put.part for put in waiting)
+        waiting.clear()
+        if not begun:
+            begun = True
+            result.extend(assign("parts", Group("", parts, brackets="[]"), indent))
+            if not last:
+                result.extend(assign("put", "parts.append", indent))
+        else:
+            for part in parts:
+                result.extend(layout_lines(Group("put", (part,)), indent))
+
+    for statement in body:
+        match statement:
+            case Put():
+                waiting.append(statement)
+                continue
+            case _ if _interferes(statement, waiting):
+                flush()
+            case _:
+                pass
+        result += text_of((statement,), indent)
+    if waiting:
+        flush(last=True)
+    return result + _joined(again, indent)
+
+
+def _joined(again: tuple[str, ...], indent: int) -> list[str]:
+    margin = " " * indent
+    if not again:
+        return [f"{margin}return join(parts)"]
+    return [
+        f"{margin}raw = join(parts)",
+        *any_of(list(again), indent, "if ", ":"),
+        f"{margin}    return encode(message, join)",
+        f"{margin}return raw",
+    ]
+
+
+class Mark(NamedTuple):
+    """What was named at some point."""
+
+    made: dict[Hashable, tuple[str, Node]]
+    names: frozenset[str]
+
+
+class Tables:
+    """Gives each distinct expression one name, in order of first use."""
+
+    def __init__(self, names: python_names.Locals) -> None:
+        self._names = names
+        self._made: dict[Hashable, tuple[str, Node]] = {}
+
+    @property
+    def definitions(self) -> tuple[tuple[str, Node], ...]:
+        """Names and expressions, in order of first use."""
+        return tuple(self._made.values())
+
+    def local(self, wanted: str) -> str:
+        """Return a free local variable."""
+        return self._names.new(wanted)
+
+    def mark(self) -> Mark:
+        """Return what `reset` needs."""
+        return Mark(self._made.copy(), self._names.mark())
+
+    def reset(self, mark: Mark) -> None:
+        """Forget everything named since `mark`."""
+        self._made = mark.made
+        self._names.reset(mark.names)
+
+    def define(self, wanted: str, key: Hashable, expression: Node) -> str:
+        """Return the name of an expression, making it on first use of `key`."""
+        known = self._made.get(key)
+        if known is None:
+            known = self._made[key] = (self._names.new(wanted), expression)
+        return known[0]
+
+    def made(self, wanted: str, function: str, *arguments: str, after: str = "") -> str:
+        """Return the name of what a runtime function makes for the byte order."""
+        value = Group(f"_idlc.{function}", ("order", *arguments), after)
+        return self.define(wanted, (function, *arguments, after), value)
+
+    def function(self, name: str, expression: str) -> str:
+        """Return the name of a runtime function."""
+        return self.define(name, expression, f"_idlc.{expression}")
+
+    def reader(self, fields: str, start: int | None) -> str:
+        """Return what unpacks a run: a function, or without `start` a table by position."""
+        name = f"read_{_content(fields)}"
+        if start is None:
+            return self.made(f"{name}_at", "phases", f'"{fields}"')
+        arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
+        return self.made(name, "layout", *arguments, after=".unpack_from")
+
+    def rows(self, fields: str) -> str:
+        """Return the function that yields the values of one structure after the other."""
+        return self.made("read_rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
+
+    def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
+        """Return what packs a frame: a function, or a table by text size or by position."""
+        name = f"write_{_content(fields)}"
+        arguments = [f'"{fields}"']
+        if start:
+            arguments.append(f"start={start}")
+        if align > 1:
+            arguments.append(f"align={align}")
+        if start is None:
+            return self.made(f"{name}_at", "text_phases" if texts else "phases", *arguments)
+        if texts:
+            return self.made(name, "Texts", *arguments)
+        return self.made(name, "layout", *arguments, after=".pack")
+
+    def pad(self, align: int) -> str:
+        """Return the table of padding to `align`, by position."""
+        return self.function(f"pad{align}", f"PAD{align}")
+
+    def gap(self, size: int) -> str:
+        """Return an expression for `size` zero bytes."""
+        return 'b"' + "\\x00" * size + '"'
+
+    def block_writer(self, step: plan.Block) -> str:
+        """Return the function that turns a fixed-size array into bytes."""
+        if step.primitive in plan.LIST_PRIMITIVES:
+            kind = plan.LIST_PRIMITIVES[step.primitive]
+            name = f"{kind}_{step.count}"
+            return self.define(name, name, f"_idlc.{kind}_writer({step.count})")
+        return self._array("bytes_of", "array_writer", step)
+
+    def buffer_writer(self, step: plan.Block) -> str:
+        """Return the function that turns a fixed-size array into any kind of buffer."""
+        if step.primitive in plan.LIST_PRIMITIVES:
+            return self.block_writer(step)
+        return self._array("buffer_of", "buffer_writer", step)
+
+    def block_reader(self, step: plan.Block) -> str:
+        """Return the function that turns bytes into a fixed-size array."""
+        if step.primitive in plan.LIST_PRIMITIVES:
+            kind = plan.LIST_PRIMITIVES[step.primitive]
+            return self.function(f"read_{kind}", f"read_{kind}")
+        return self._array("array_of", "array_reader", step, "reading")
+
+    def _array(self, stem: str, function: str, step: plan.Block, *more: str) -> str:
+        dtype = ir.PRIMITIVES[step.primitive].dtype
+        expression = call(f"_arrays.{function}", "order", json.dumps(dtype), str(step.count), *more)
+        return self.define(f"{stem}_{dtype}_{step.count}", expression.flat(), expression)
+
+    def sequence_writer(self, step: plan.Numbers) -> str:
+        """Return the function that makes an array of another sequence of numbers."""
+        expression = f'_idlc.sequence_writer(order, "{step.code}")'
+        return self.define(f"array_of_{step.numpy}", expression, expression)
+
+    def sequence_copier(self, step: plan.Numbers) -> str:
+        """Return the function that turns a sequence of numbers into bytes."""
+        expression = f'_idlc.sequence_copier(order, "{step.code}")'
+        return self.define(f"bytes_of_{step.numpy}", expression, expression)
+
+    def sequence_reader(self, step: plan.Numbers, reading: str) -> str:
+        """Return the function that turns a buffer into a sequence of numbers."""
+        expression = f'_idlc.sequence_reader(order, "{step.code}", {reading})'
+        return self.define(f"read_{step.numpy}", expression, expression)
+
+    def texts_writer(self, step: plan.Texts) -> str:
+        """Return the function that writes an array of strings; one for each field."""
+        local = step.place.local
+        arguments = ["order"]
+        if step.size is not None:
+            arguments.append(f"size={step.size}")
+        elif step.bound is not None:
+            arguments.append(f"bound={step.bound}")
+        expression = call("_idlc.wide_block" if step.wide else "_idlc.text_block", *arguments)
+        return self.define(f"write_{local}", f"write texts {local}", expression)
+
+    def texts_reader(self, step: plan.Texts) -> str:
+        """Return the function that reads an array of strings; one for each field."""
+        local = step.place.local
+        if step.wide:
+            expression = call("_idlc.wide_texts_reader", "order")
+        else:
+            expression = call("_idlc.texts_reader", "order", self.text())
+        return self.define(f"read_{local}", f"texts {local}", expression)
+
+    def text(self) -> str:
+        """Return the name of the function that makes a string of bytes."""
+        return self.define("text", "text", "reading.text")
+
+    def strings(self) -> str:
+        """Return the name of the function that prepares reading many strings."""
+        expression = call("_idlc.strings_reader", "order", "reading.text")
+        return self.define("strings", "strings", expression)
+
+    def small(self) -> str:
+        """Return the name of the size up to which no view is worth its cost."""
+        return self.define("small", "small", "reading.small")
+
+
+def _content(fields: str) -> str:
+    """Return a word for what a layout consists of."""
+    if fields.startswith("4s"):
+        return "head"
+    if "*" in fields:
+        return "text"
+    return "count" if fields == "I" else "values"

@@ -1,0 +1,185 @@
+"""Which packages a run of `idlc gen` writes, and into which folders."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Set as AbstractSet
+from pathlib import Path
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.generate.target import Target
+from idlc.model import catalog, ir
+from idlc.project import inputs
+from idlc.project.files import absolute, is_file, shown
+from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
+from idlc.project.inputs import accept_name, by_home, places, several
+from idlc.project.library import Library
+from idlc.project.lock import FILE
+from idlc.project.package_xml import declared_name, manifest
+from idlc.project.scope import Scope
+
+
+def wanted(
+    paths: Sequence[str],
+    named: Sequence[inputs.Inputs],
+    out: str,
+    scope: Scope,
+    report: Report,
+) -> tuple[inputs.Inputs, ...]:
+    """Return the packages that paths mean, and those that were named; empty after a problem.
+
+    Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
+    """
+    files = find(paths, report, scope.exclude) if paths else ()
+    found = list(named)
+    for one in named:
+        accept_name(one.package, "the command line", report)
+    if files and not report.had_errors:
+        found += _from_files(files, "" if found else out, scope, report)
+    usage = [one for one in report if one.code in codes.USAGE]
+    return () if usage else inputs.without_duplicates(found, report)
+
+
+def _from_files(
+    files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
+) -> tuple[inputs.Inputs, ...]:
+    """Return files by package: as one that is called like `out` if nothing says otherwise."""
+    homes = by_home(files)
+    apart = [] if scope.package else several(homes)
+    if _mixed(apart, report):
+        return ()
+    declared = next((path for home in homes if (path := manifest(home))), None)
+    if apart or not out:
+        found = inputs.packages(files, scope, report)
+        origins = ["package.xml" if manifest(one.home) else "its folder" for one in found]
+    else:
+        name, origins = scope.package, ["--package"]
+        if name is None and declared:
+            name, origins = declared_name(declared, shown(declared), report), ["package.xml"]
+        if name is None:
+            name, origins = absolute(out).name, ["the folder given with -o"]
+            if catalog.is_standard(name) and min(homes).name != name:
+                report.add(
+                    codes.UNIMPORTABLE_PACKAGE.of(
+                        "",
+                        f"`{name}` (from {origins[0]}) would hide the ROS 2 package",
+                        hint=f"choose another folder; add `--package {name}` if they are its files",
+                    )
+                )
+            _tell(name, min(homes), out, report)
+        found = (inputs.load(name, files, min(homes), report),)
+    if out and any(absolute(str(file.path.parent)) == absolute(out) for file in files):
+        report.add(
+            codes.FOREIGN_FILE.of(
+                out,
+                f"`{out}` holds interface files: generated code would lie among them",
+                hint="choose another folder with -o",
+            )
+        )
+    for one, origin in zip(found, origins, strict=True):
+        accept_name(one.package, origin, report)
+    return found
+
+
+def _tell(name: str, home: Path, out: str, report: Report) -> None:
+    """Note a name that other commands cannot know."""
+    if name != home.name and absolute(out).parent not in places(home):
+        report.notes.append(
+            f"the package is called `{name}`, as the folder given with -o; other commands need "
+            f"`--package {name}`, or a package.xml beside the interfaces"
+        )
+
+
+def _mixed(homes: Sequence[Path], report: Report) -> bool:
+    """Report folders of interfaces within each other that no package.xml tells apart."""
+    loose = [home for home in homes if not manifest(home)]
+    if not any(set(home.parents) & set(homes) for home in loose):
+        return False
+    names = first_few((f"`{shown(home)}`" for home in homes), 5)
+    report.add(
+        codes.SEVERAL_PACKAGES.of(
+            shown(homes[0]),
+            f"these may be one package or {len(homes)}: {names}",
+            hint="give --package NAME to compile them as one, or each folder a package.xml",
+        )
+    )
+    return True
+
+
+def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
+    """Return types of one package, found in a library, as its input."""
+    names = sorted(types)
+    home = library.home(names[0].package)
+    return inputs.Inputs(
+        names[0].package,
+        tuple(_borrowed(name, str(name), library) for name in names),
+        (home,) if home else (),
+        borrowed=True,
+    )
+
+
+def completed(
+    given: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
+) -> list[inputs.Inputs]:
+    """Return packages with the interfaces that others need of those given in part; empty for none.
+
+    What is written beside the others is what they import.
+    """
+    found = []
+    for one in given:
+        missing = {name for name in needed if name.package == one.package} - one.names
+        more = (_borrowed(name, str(name), library) for name in missing if one.borrowed)
+        files = sorted((*one.files, *more), key=lambda each: each.file.key)
+        found.append(msgspec.structs.replace(one, files=tuple(files)))
+    return [] if found == [*given] else found
+
+
+def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
+    """Return the .idl files of a package that no .msg, .srv or .action file is beside, sorted."""
+    found = []
+    for folder in folders:
+        for kind in KINDS:
+            inside = folder / kind[1:]
+            try:
+                names = {entry.name for entry in os.scandir(inside)}
+            except OSError:
+                continue
+            own = (name for name in names if name.endswith(".idl"))
+            alone = (name for name in own if f"{name.removesuffix('.idl')}{kind}" not in names)
+            found += [f"{kind[1:]}/{name}" for name in alone if not exclude.has(str(inside / name))]
+    return sorted(found)
+
+
+def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
+    source = library.source(name)
+    assert source is not None, name
+    file = InterfaceFile(Path(source.path), source.path, name.kind, name.name, word, Path())
+    return inputs.Input(file, source.text.encode())
+
+
+def targets(
+    given: Sequence[inputs.Inputs], out: str, report: Report, *, force: bool
+) -> tuple[Target, ...]:
+    """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
+
+    Reports IDL608 where a package of an earlier run is in the way, IDL612 for what is no folder.
+    """
+    top = absolute(out)
+    if len(given) == 1:
+        package = given[0].package
+        beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
+        folder = f"{out}/{package}" if beside_others else out
+        found = [Target(folder, package, report, force=force)]
+    elif is_file(top / FILE):
+        message = f"`{out}` holds one package, and these are {len(given)}"
+        hint = "choose a folder for all of them with -o, each gets one of its name there"
+        report.add(codes.SEVERAL_PACKAGES.of(out, message, hint=hint))
+        return ()
+    else:
+        base = out.rstrip("/") or out
+        found = [Target(f"{base}/{g.package}", g.package, report, force=force) for g in given]
+    return tuple(found) if all(one.usable() for one in found) else ()

@@ -1,0 +1,266 @@
+"""The folder that a generated package is written to."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.model.ir import TypeName
+from idlc.project import prefixes, write
+from idlc.project.atomic import alone
+from idlc.project.files import absolute, is_file, is_folder
+from idlc.project.library import Library
+from idlc.project.lock import FILE, Lock, Obstacle, Tree, digest, encode, load_lock, meaning
+from idlc.project.write import Change, Plan, plan
+from idlc.version import __version__
+
+_PACKAGE = Path(__file__).parents[1]
+#: What makes the output, beside what is given: a change here counts although the version stays.
+_MAKERS = (
+    *(_PACKAGE / part for part in ("diagnostics", "syntax", "model", "checks", "emit", "runtime")),
+    _PACKAGE / "templates",
+    _PACKAGE.parent / "templates",
+)
+#: The support code by digest: packages have the same, and comparing is faster than hashing.
+_support: dict[str, bytes] = {}
+_MOST = 128
+
+
+def unchanged(
+    out: Path,
+    lock: Lock | None,
+    package: str,
+    inputs: Mapping[str, str],
+    library: Library,
+    *,
+    vendor_deps: bool = False,
+) -> bool:
+    """Return whether the package in `out` is what a run would write.
+
+    `inputs` are the digests of the input files by name within the package.
+    """
+    return (
+        lock is not None
+        and (lock.idlc, lock.package, lock.vendor_deps) == (__version__, package, vendor_deps)
+        and bool(lock.converts_values) == library.distro.converts_values
+        and lock.inputs == inputs
+        and _outputs_stand(out, lock)
+        and not _idlc_is_newer(out / FILE)
+        and all(_dependency(name, library) == one for name, one in lock.dependencies.items())
+    )
+
+
+def dependencies(names: Iterable[TypeName], library: Library) -> dict[str, str]:
+    """Return the digests by which interfaces of other packages are recorded."""
+    return {str(name): _dependency(str(name), library) for name in names}
+
+
+def _dependency(name: str, library: Library) -> str:
+    try:
+        parsed = TypeName.parse(name)
+    except ValueError:
+        return ""
+    source = library.source(parsed)
+    return meaning(source.text, parsed.package) if source else ""
+
+
+def _outputs_stand(out: Path, lock: Lock) -> bool:
+    tree = Tree(out)
+    for path, expected in lock.outputs.items():
+        content = tree.read(path)
+        if content is None or isinstance(content, Obstacle) or not _has(content, expected, path):
+            return False
+    return True
+
+
+def _has(content: bytes, expected: str, path: str) -> bool:
+    """Return whether a file's content has a digest."""
+    if _support.get(expected) == content:
+        return True
+    if digest(content) != expected:
+        return False
+    if "_idlc/" in path and len(_support) < _MOST:
+        _support[expected] = content
+    return True
+
+
+def _idlc_is_newer(path: Path) -> bool:
+    """Return whether idlc was changed after a lock was written: by a developer, or installed."""
+    return _newest_maker() > path.stat().st_mtime_ns
+
+
+@lru_cache(maxsize=1)
+def _newest_maker() -> int:
+    return last_change(_MAKERS)
+
+
+def last_change(folders: Iterable[Path]) -> int:
+    """Return when a file in these folders, or in those in them, was changed last."""
+    return max(map(_newest, filter(is_folder, folders)))
+
+
+def _newest(folder: str | Path) -> int:
+    newest = 0
+    for entry in os.scandir(folder):
+        if entry.is_file():
+            newest = max(newest, entry.stat().st_mtime_ns)
+        elif not entry.name.startswith((".", "__")):  # caches
+            newest = max(newest, _newest(entry.path))
+    return newest
+
+
+class Target:
+    """A package folder, existing or not; `name` is how messages call it."""
+
+    #: Where the lock is, below the folder; empty, or with a slash at its end.
+    home = ""
+    #: Where the package's modules are, in the same words.
+    modules = ""
+
+    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+        self.name = name
+        self.package = package
+        self._path = absolute(name)
+        self.report = report
+        self._force = force
+
+    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+        """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
+        return alone(self._path.parent if beside else self._path)
+
+    def beside(self, package: str) -> Target:
+        """Return the folder of another package next to this one."""
+        name = (Path(self.name).parent / package).as_posix()
+        return Target(name, package, self.report, force=self._force)
+
+    @cached_property
+    def lock(self) -> Lock | None:
+        """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
+        report = Report() if self._force else self.report
+        return load_lock(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
+
+    def usable(self) -> bool:
+        """Return whether this is or can become a folder; reports IDL612."""
+        for path in (self._path, *self._path.parents):
+            if is_folder(path):
+                return True
+            if os.path.lexists(path):
+                message = f"cannot write to `{self.name}`: `{path.name}` is not a folder"
+                self.report.add(codes.CANNOT_WRITE.of(self.name, message))
+                return False
+        return False
+
+    def unchanged(
+        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+    ) -> bool:
+        """Return whether what is here is what compiling the inputs would write."""
+        found = unchanged(
+            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
+        )
+        if found:
+            write.sweep(self._path)
+        return found
+
+    def missing(self) -> list[str]:
+        """Return the packages that the generated code needs and this Python cannot import."""
+        modules = [name.split(".") for name in (self.lock.imports if self.lock else ())]
+        return sorted({package for package, kind in modules if not self._finds(package, kind)})
+
+    def is_at_home(self) -> bool:
+        """Return whether this Python is one that the generated code is imported with.
+
+        It is if nodes run in it, or if some package that the code needs is installed.
+        """
+        needed = {name.split(".")[0] for name in (self.lock.imports if self.lock else ())}
+        return prefixes.runs_nodes() or any(map(prefixes.python_folders, needed))
+
+    def _finds(self, package: str, kind: str) -> bool:
+        """Return whether a package lies next to this one or could be imported; imports nothing."""
+        inside = f"{kind}/__init__.py"
+        beside = (self._path / self.modules).parent
+        return is_file(beside / package / inside) or any(
+            is_file(place / inside) for place in prefixes.python_folders(package)
+        )
+
+    def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
+        """Return the changes that make the folder hold `files`; `None` if it must not.
+
+        With `check` the changes are only to be looked at, and edited files are among them.
+        """
+        content = {
+            path: text.encode("utf-8") if isinstance(text, str) else text
+            for path, text in files.items()
+        }
+        owned = write.owned(self._path / self.home, self.lock)
+        force = check or self._force
+        return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
+
+    def apply(self, changes: Plan, record: Lock) -> bool:
+        """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        self.lock = record
+        return write.apply(changes, encode(record), self.name, self.report)
+
+    def drift(self, changes: Plan, record: Lock, again: str) -> None:
+        """Report IDL616 for each file that is not what the command `again` would write."""
+        hint = f"run `{again}`"
+        if self.lock is None:
+            if self.report.had_errors:
+                return
+            message = f"there is no {self.home}{FILE} in `{self.name}`, so nothing can be compared"
+            self.report.add(codes.DRIFT.of(self.name, message, hint=hint))
+            return
+        why = _reasons(self.lock, record) or "idlc itself changed"
+        for change in changes.changes:
+            self.report.add(self._drifted(change, self.lock, why, again))
+        # a dependency found elsewhere that compiles to the same is no drift
+        if not changes.changes and (why := _reasons(self.lock, record, dependencies=False)):
+            path = f"{self.name}/{self.home}{FILE}"
+            self.report.add(codes.DRIFT.of(path, f"`{path}` is out of date: {why}", hint=hint))
+
+    def _drifted(self, change: Change, old: Lock, why: str, again: str) -> Diagnostic:
+        path = f"{self.name}/{change.path}"
+        wrote = old.outputs.get(change.path)
+        hint = f"run `{again}`"
+        if change.new is None:
+            message = f"`{path}` is no longer generated: {why}"
+        elif change.old is None:
+            message = f"`{path}` is missing" + ("" if wrote else f": {why}")
+        elif wrote is not None and digest(change.old) != wrote:
+            message = f"`{path}` was edited since idlc wrote it"
+            hint = f"`{again} --force` replaces it, and keeps a copy"
+        elif wrote is None:
+            message = f"`{path}` was not written by idlc"
+            hint = f"`{again} --force` replaces it, and keeps a copy"
+        else:
+            message = f"`{path}` is out of date: {self.cause(change) or why}"
+        return codes.DRIFT.of(path, message, hint=hint)
+
+    def cause(self, change: Change) -> str:
+        """Say why a file is out of date; empty where only the locks can tell."""
+        del change
+        return ""
+
+
+def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
+    """Say what differs between the last run and one now; empty if nothing does."""
+    pairs = [(old.inputs, new.inputs)]
+    if dependencies:
+        pairs.append((old.dependencies, new.dependencies))
+    found = []
+    if old.idlc != new.idlc:
+        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+    if old.converts_values != new.converts_values:
+        found.append("it was written for another distribution of ROS 2")
+    if old.package != new.package:
+        found.append(f"the package was called `{old.package}`")
+    for before, after in pairs:
+        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        common = sorted(before.keys() & after.keys())
+        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
+    return first_few(found, 3)

@@ -1,1 +1,0 @@
-"""The language server: what editors ask about interface files, over JSON-RPC."""

@@ -1,0 +1,89 @@
+"""Comment lines → condensed comment and unit (language 1.4)."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from itertools import islice
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.language.escapes import EscapeError, through_idl
+
+# a comma makes it a range, not a unit
+_UNIT_END = re.compile(r"[,\]]")
+
+
+class Comment(msgspec.Struct, frozen=True):
+    """A condensed comment: its lines, and the unit that stood in brackets, if one did."""
+
+    lines: tuple[str, ...] = ()
+    unit: str | None = None
+
+
+def condense(lines: Sequence[str]) -> Comment:
+    """Return the comment that rosidl makes of an element's comment lines, `#` already removed."""
+    if not lines:
+        return Comment()
+    unit: str | None = None
+    kept = list(lines)
+    found = (
+        list(islice(brackets("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
+    )
+    if len(found) == 1:
+        whole, unit = found[0]
+        kept = [line.replace(whole, "") for line in kept]
+    filled = [at for at, line in enumerate(kept) if line]
+    kept = kept[filled[0] : filled[-1] + 1] if filled else []
+    kept = [line for at, line in enumerate(kept) if line or kept[at - 1]]
+    if len(kept) == 1:
+        return Comment((kept[0].lstrip(" \t"),), unit)
+    return Comment(tuple(textwrap.dedent("\n".join(kept)).split("\n")) if kept else (), unit)
+
+
+def brackets(text: str) -> Iterator[tuple[str, str]]:
+    r"""Yield what `(\s*\[([^,\]]+)\])` finds in `text`, looking at each character once.
+
+    These may be units: the whole with the blanks before it, and what stands between the brackets.
+    """
+    start = 0
+    at = text.find("[")
+    while at >= 0 and (end := _UNIT_END.search(text, at)):
+        if end[0] == "]" and end.start() > at + 1:
+            head = text[start:at]
+            yield text[start + len(head.rstrip()) : end.end()], text[at + 1 : end.start()]
+            start = end.end()
+        at = text.find("[", end.end())
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """A comment that breaks ROS 2's pipeline; `text` is the guilty piece of it."""
+
+    code: codes.Code
+    text: str
+    message: str
+    hint: str
+
+
+def problem(comment: Comment) -> Problem | None:
+    """Return what is wrong with a comment or its unit (language 1.4, 1.5), or `None`."""
+    if comment.unit is not None and "\n" in comment.unit:
+        return Problem(
+            codes.UNIT_ACROSS_LINES,
+            "[",
+            "this bracket is closed on another line; ROS 2's tools fail on such a unit",
+            "close the bracket on the same line",
+        )
+    for text in (*comment.lines, *filter(None, [comment.unit])):
+        try:
+            through_idl(text)
+        except EscapeError as error:
+            return Problem(
+                codes.BAD_ESCAPE,
+                text[error.start : error.end],
+                f"ROS 2's tools fail on {error} in a comment",
+                "write the path or formula without backslashes",
+            )
+    return None

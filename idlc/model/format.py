@@ -1,0 +1,39 @@
+"""The canonical layout of a file, which means what the file meant."""
+
+from __future__ import annotations
+
+from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.source import Source
+from idlc.language.format import format_file
+from idlc.language.parse import parse
+from idlc.model import ir
+from idlc.model.distros import NEWEST
+from idlc.model.ir import meaning
+from idlc.model.lower import lower
+
+#: How the codes begin of syntax errors, and of files that are too large.
+_UNREADABLE = ("IDL1", "IDL6")
+
+
+def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
+    """Return a text laid out; report and return `None` if it cannot be parsed."""
+    problems, again = Report(), Report()
+    tree = parse(source)
+    before = lower(tree, name, problems, NEWEST)
+    errors = [one for one in problems if one.severity is Severity.ERROR]
+    unreadable = [one for one in errors if one.code.startswith(_UNREADABLE)]
+    if unreadable:
+        report.extend(unreadable)
+        return None
+    new = format_file(tree)
+    if new == source.text:
+        return new
+    after = lower(parse(Source(source.path, new)), name, again, NEWEST)
+    same = [one.code for one in errors] == [
+        one.code for one in again if one.severity is Severity.ERROR
+    ]
+    if same and meaning(after) == meaning(before):
+        return new
+    if errors:  # what a wrong definition means cannot be compared for sure
+        return source.text
+    raise AssertionError("the layout would change the meaning; the file was left alone")

@@ -1,0 +1,215 @@
+"""Type descriptions → messages: `describe` the other way round, for what running programs tell.
+
+A description comes from another program. It is believed only if it is complete and has the type
+hash that the program announces; its names become text in what idlc shows, and nothing else.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import one_line
+from idlc.language.parse import parse
+from idlc.model import ir
+from idlc.model.describe import (
+    ARRAY_OFFSET,
+    STRING_TYPE_IDS,
+    DescriptionDict,
+    FieldDict,
+    IndividualDict,
+    TypeDict,
+)
+from idlc.model.distros import NEWEST
+from idlc.model.ir import spell
+from idlc.model.link import Model, Pool, circles, link
+from idlc.model.lower import lower
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_PRIMITIVES = {
+    info.type_id: ir.Primitive(name) for name, info in ir.PRIMITIVES.items() if name != "char"
+}
+_STRINGS = {type_id: kind for kind, type_id in STRING_TYPE_IDS.items()}
+_DUMMY: FieldDict = {
+    "name": ir.DUMMY_FIELD,
+    "type": {"type_id": 3, "capacity": 0, "string_capacity": 0, "nested_type_name": ""},
+    "default_value": "",
+}
+
+
+class NotBelievedError(ValueError):
+    """A description is not what it should be; the text says why."""
+
+
+def model_of_description(
+    description: DescriptionDict, name: str, type_hash: str, who: str
+) -> Model:
+    """Return what a type of this name and hash is, as `who` describes it.
+
+    Raises NotBelievedError. Each message has a source of its own, for places in it.
+    """
+    parts = (description["type_description"], *description["referenced_type_descriptions"])
+    messages = dict(_messages(parts, who))
+    top = next(iter(messages))
+    if str(top) != name:
+        raise NotBelievedError(f"it describes `{one_line(str(top))}` instead")
+    model = Model(top.package, (messages[top],), messages)
+    if model.describer.hash(name) != type_hash:
+        raise NotBelievedError("its description has another type hash")
+    return model
+
+
+def _messages(
+    parts: Iterable[IndividualDict], who: str
+) -> Iterator[tuple[ir.TypeName, ir.Message]]:
+    """Yield the messages of a description by name, after all of them were looked at."""
+    messages: dict[ir.TypeName, ir.Message] = {}
+    for part in parts:
+        message = _message(part, who)
+        if message.name in messages:
+            raise NotBelievedError(f"it describes `{message.name}` twice")
+        messages[message.name] = message
+    for message in messages.values():
+        for target in message.references:
+            if target not in messages:
+                raise NotBelievedError(f"it does not describe `{target}`")
+    if next(circles(messages, lambda name: messages[name].holders, set()), None):
+        raise NotBelievedError("it describes a message that contains itself")
+    yield from messages.items()
+
+
+def _message(part: IndividualDict, who: str) -> ir.Message:
+    name = _type_name(part["type_name"])
+    fields = part["fields"] if [*map(_bare, part["fields"])] != [_DUMMY] else []
+    names = [field["name"] for field in fields]
+    seen: set[str] = set()
+    for one in names:
+        if not _NAME.fullmatch(one) or one in seen:
+            raise NotBelievedError(f"`{one_line(one)}` is not the name of one field")
+        seen.add(one)
+    types = [_type(field["type"]) for field in fields]
+    lines = [f"{spell(type_, name.package)} " for type_ in types]
+    text = "".join(f"{line}{one}\n" for line, one in zip(lines, names, strict=True))
+    source = Source(f"{name} ({who})", text)
+    return ir.Message(name=name, source=source, fields=tuple(_fields(source, names, types, lines)))
+
+
+def _bare(field: FieldDict) -> FieldDict:
+    return {**field, "default_value": ""}
+
+
+def _fields(
+    source: Source, names: Iterable[str], types: Iterable[ir.FieldType], lines: Iterable[str]
+) -> Iterator[ir.Field]:
+    at = 0
+    for name, type_, line in zip(names, types, lines, strict=True):
+        middle = at + len(line)
+        end = middle + len(name)
+        yield ir.Field(
+            name=name,
+            type=type_,
+            type_span=Span(source, at, middle - 1),
+            name_span=Span(source, middle, end),
+        )
+        at = end + 1
+
+
+def _type_name(text: str) -> ir.TypeName:
+    try:
+        name = ir.TypeName.parse(text)
+    except ValueError:
+        name = ir.TypeName("", "msg", "")
+    if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
+        raise NotBelievedError(f"`{one_line(text)}` is not the name of a type")
+    return name
+
+
+def _type(type_: TypeDict) -> ir.FieldType:
+    shape, element_id = divmod(type_["type_id"], ARRAY_OFFSET)
+    element = _element(element_id, type_)
+    match shape:
+        case 0:
+            return element
+        case 1:
+            return ir.Array(element, type_["capacity"])
+        case 2:
+            return ir.Sequence(element, type_["capacity"])
+        case 3:
+            return ir.Sequence(element)
+    raise NotBelievedError(f"it uses the unknown type {type_['type_id']}")
+
+
+def _element(type_id: int, type_: TypeDict) -> ir.Element:
+    if type_id == 1:
+        return ir.Ref(_type_name(type_["nested_type_name"]))
+    if type_id in _STRINGS:
+        wide, bounded = _STRINGS[type_id]
+        return ir.String(wide, type_["string_capacity"] if bounded else None)
+    if type_id in _PRIMITIVES:
+        return _PRIMITIVES[type_id]
+    raise NotBelievedError(f"it uses type {type_id}, which .msg files do not have")
+
+
+#: Characters of all sources together; more are left alone.
+MAX_TEXT = 1 << 20
+
+
+def reported_model(
+    description: DescriptionDict, sources: Mapping[str, str], name: str, type_hash: str, who: str
+) -> Model:
+    """Return what a type of this name and hash is; raises NotBelievedError.
+
+    The sources have constants, units and comments, so they count if they have that hash. A
+    program need not tell them, and tells none of what services and actions imply.
+    """
+    compiled = _compiled(sources, name, who)
+    if compiled is not None and compiled.describer.hash(name) == type_hash:
+        return compiled
+    return model_of_description(description, name, type_hash, who)
+
+
+def _compiled(sources: Mapping[str, str], name: str, who: str) -> Model | None:
+    """Return the model of a message and of all that it holds, if the sources have it."""
+    library = _Library(sources, who)
+    report = Report()
+    try:
+        top = ir.TypeName.parse(name)
+    except ValueError:
+        return None
+    source = library.source(top)
+    if top.kind != "msg" or source is None or sum(map(len, sources.values())) > MAX_TEXT:
+        return None
+    pool = Pool(library)
+    own = lower(parse(source), top, report, library.distro)
+    pool.add(own, report)
+    model = link(top.package, [own], library, report, pool)
+    return None if report.had_errors else model.only({top})
+
+
+class _Library:
+    """The sources of one program, as `link.Library`; its own ROS 2 has accepted them."""
+
+    distro = NEWEST
+
+    def __init__(self, sources: Mapping[str, str], who: str) -> None:
+        self._sources = sources
+        self._who = who
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if there is none of that name."""
+        text = self._sources.get(str(name))
+        return Source(f"{name} ({self._who})", text) if text is not None else None
+
+    def names(self, _package: str) -> Iterable[str]:
+        """Return nothing: hints at other names are for people who write files."""
+        return ()
+
+    def packages(self) -> Iterable[str]:
+        """Return nothing, for the same reason."""
+        return ()
+
+    def nearby(self, _package: str) -> str | None:
+        """Return nothing, for the same reason."""
+        return None

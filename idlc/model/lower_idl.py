@@ -1,0 +1,320 @@
+"""IDL's syntax → IR: the same meaning as that of the interface file that the .idl was made of.
+
+What the adapter loses on the way stays lost: whether a number was a `char`, the units of
+constants, and how a text was written.
+"""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Span
+from idlc.diagnostics.text import including
+from idlc.language import idl
+from idlc.language.escapes import inside_literal
+from idlc.language.tree import OPTIONAL, Piece
+from idlc.model import ir, lower_types, lower_values, names
+from idlc.model.lower_types import STRINGS, Fault, as_parsed, positive
+from idlc.model.lower_values import MAX_ELEMENTS
+
+#: What ROS 2's adapter annotates with.
+ANNOTATIONS = frozenset({"verbatim", "default", "unit", "optional"})
+#: What the adapter writes between the lines of a comment.
+_LINE_END = '"\\n"'
+
+
+def parameter(annotations: Iterable[idl.Annotation], name: str, key: str) -> idl.Value | None:
+    """Return a parameter of the first annotation of a name, or `None`."""
+    found = (one.parameters for one in annotations if one.name.text == name)
+    return next(found, {}).get(key)
+
+
+def comment(annotations: Iterable[idl.Annotation]) -> tuple[str, ...]:
+    """Return the lines of a comment: a literal for each, and line ends between them."""
+    value = parameter(annotations, "verbatim", "text")
+    if value is None:
+        return ()
+    between = value.pieces[1::2]
+    if len(value.pieces) % 2 and all(piece.text == _LINE_END for piece in between):
+        return tuple(_inside(piece) for piece in value.pieces[::2])
+    return tuple(text(value).split("\n"))
+
+
+def unit(annotations: Iterable[idl.Annotation]) -> str | None:
+    """Return the unit that `@unit` says."""
+    value = parameter(annotations, "unit", "value")
+    return None if value is None else text(value)
+
+
+def text(value: idl.Value) -> str:
+    """Return the texts of a value as one; a number's as it stands."""
+    return "".join(map(_inside, value.pieces)) if value.is_text else value.pieces[0].text
+
+
+def _inside(piece: Piece) -> str:
+    try:
+        return inside_literal(piece.text[1:-1])
+    except ValueError:  # an incomplete escape, which rosidl would not have written
+        return piece.text[1:-1]
+
+
+def scalar(type_: ir.Primitive | ir.String, value: idl.Value) -> ir.Scalar | Fault:
+    """Return the value of a constant, or what is wrong with it."""
+    found = default(type_, value)
+    if isinstance(found, Fault):
+        return found
+    assert not isinstance(found.value, tuple)
+    return found.value
+
+
+def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
+    """Return the value of `@default`, or what is wrong with it."""
+    if isinstance(type_, (ir.Array, ir.Sequence)):
+        return _elements(type_, value)
+    if isinstance(type_, ir.String):
+        words = text(value)
+        if not value.is_text or not _fits(type_, words):
+            return _wrong(value, type_)
+        return ir.Default(words, words)
+    if value.is_text:
+        return _wrong(value, type_)
+    found = lower_values.default(type_, value.pieces[0].text)
+    return found.moved(value.whole.start) if isinstance(found, Fault) else found
+
+
+def _elements(type_: ir.Array | ir.Sequence, value: idl.Value) -> ir.Default | Fault:
+    """Read the text of a Python tuple, as which the defaults of arrays travel."""
+    words = text(value)
+    if not value.is_text or words.count(",") > MAX_ELEMENTS:
+        return _wrong(value, type_)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # unknown escapes
+            found = ast.literal_eval(words)
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return _wrong(value, type_)
+    if not isinstance(found, tuple) or not all(_fits(type_.element, one) for one in found):
+        return _wrong(value, type_)
+    wrong = lower_values.wrong_length(type_, len(found), value.whole.text)
+    return wrong.moved(value.whole.start) if wrong else ir.Default(found, words)
+
+
+def _fits(type_: ir.Element, value: object) -> bool:
+    """Return whether a Python value is one of a scalar type."""
+    match type_:
+        case ir.String():
+            return isinstance(value, str) and (type_.bound is None or len(value) <= type_.bound)
+        case ir.Primitive("bool"):
+            return isinstance(value, bool)
+        case ir.Primitive():
+            low, high = type_.info.low, type_.info.high
+            if low is None or high is None:
+                return isinstance(value, float)
+            is_number = isinstance(value, int) and not isinstance(value, bool)
+            return is_number and low <= value <= high  # type: ignore[operator]
+    return False
+
+
+def _wrong(value: idl.Value, type_: ir.FieldType) -> Fault:
+    from idlc.model.ir import spell
+
+    message = f"this is no value of type `{spell(type_)}`"
+    return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
+
+
+#: What IDL calls primitives; of two that it calls alike, the one that says what it is.
+_PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
+_CONSTANTS = "_Constants"
+
+
+def lower_idl(file: idl.File, wanted: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
+    """Return the wanted structures of a file, which must hold these and no others."""
+    return _Lowering(file, report).structures(wanted)
+
+
+class _Type(NamedTuple):
+    """A type and what names it, for problems with it."""
+
+    type: ir.FieldType
+    piece: Piece
+
+
+class _Lowering:
+    """Lowers one file; holds what its steps share."""
+
+    def __init__(self, file: idl.File, report: Report) -> None:
+        self.file = file
+        self.report = report
+        self.typedefs: dict[str, _Type] = {}
+        self.strange = False
+
+    def structures(self, wanted: Sequence[ir.TypeName]) -> list[ir.Message]:
+        if self.file.broken is not None:
+            what = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
+            self._foreign(self.file.broken, what)
+            return [ir.Message(name=name, source=self.file.source) for name in wanted]
+        self._check_modules(wanted[0])
+        constants: dict[str, list[ir.Constant]] = {}
+        found: dict[str, idl.Structure] = {}
+        known = {name.name for name in wanted}
+        for part in self.file.parts:
+            name = part.name.text.removesuffix(_CONSTANTS)
+            if isinstance(part, idl.Typedef):
+                self._typedef(part)
+            elif name not in known:
+                self._foreign(part.name, f"`{part.name.text}` among the parts of `{wanted[0]}`")
+            elif isinstance(part, idl.Constants):
+                lowered = map(self._constant, part.constants)
+                constants.setdefault(name, []).extend(one for one in lowered if one)
+            elif found.setdefault(name, part) is not part:
+                self._foreign(part.name, f"a second `{name}`")
+        if not self.strange:
+            for name in known - found.keys():
+                self._foreign(self.file.kind, f"a module without `{name}`")
+        return [self._structure(name, found.get(name.name), constants) for name in wanted]
+
+    def _check_modules(self, name: ir.TypeName) -> None:
+        for piece, expected in ((self.file.package, name.package), (self.file.kind, name.kind)):
+            if piece.text != expected:
+                self._foreign(piece, f"module `{piece.text}` for `{name}`")
+
+    def _foreign(self, piece: Piece, what: str) -> None:
+        self.strange = True
+        message = f"{what} is nothing that ROS 2 writes when it makes IDL of a .msg file"
+        hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
+        self.report.add(codes.FOREIGN_IDL.at(self.file.span(piece), message, hint=hint))
+
+    def _fault(self, fault: Fault) -> None:
+        span = Span(self.file.source, fault.start, fault.end)
+        self.report.add(fault.code.at(span, fault.message, hint=fault.hint))
+
+    def _structure(
+        self,
+        name: ir.TypeName,
+        found: idl.Structure | None,
+        constants: dict[str, list[ir.Constant]],
+    ) -> ir.Message:
+        fields = [self._field(member) for member in found.members] if found else []
+        if [(field.name, field.type) for field in fields] == [
+            (ir.DUMMY_FIELD, ir.Primitive("uint8"))
+        ]:
+            fields = []
+        return ir.Message(
+            name=name,
+            fields=tuple(fields),
+            constants=tuple(constants.get(name.name, ())),
+            comment=comment(found.annotations) if found else (),
+            source=self.file.source,
+        )
+
+    def _typedef(self, typedef: idl.Typedef) -> None:
+        target = self._type(typedef.type)
+        type_ = target.type
+        if typedef.size is not None:
+            size = positive(typedef.size, "the array's size")
+            if isinstance(size, Fault):
+                self._fault(size)
+            elif isinstance(type_, (ir.Array, ir.Sequence)):
+                self._foreign(typedef.name, "an array of arrays")
+                type_ = ir.Unknown()
+            else:
+                type_ = ir.Array(type_, size)
+        self.typedefs[typedef.name.text] = _Type(type_, target.piece)
+
+    def _type(self, type_: idl.Element | idl.Sequence) -> _Type:
+        if isinstance(type_, idl.Element):
+            return self._element(type_)
+        element, piece = self._element(type_.element)
+        if isinstance(element, (ir.Array, ir.Sequence)):
+            self._foreign(piece, "a sequence of arrays")
+            return _Type(ir.Unknown(), piece)
+        bound = None if type_.bound is None else positive(type_.bound, "the array's size")
+        if isinstance(bound, Fault):
+            self._fault(bound)
+            return _Type(ir.Unknown(), piece)
+        return _Type(as_parsed(ir.Sequence(element, bound)), piece)
+
+    def _element(self, element: idl.Element) -> _Type:
+        piece = element.name
+        if piece.text in STRINGS:
+            bound = None if element.bound is None else positive(element.bound, "the string's bound")
+            if isinstance(bound, Fault):
+                self._fault(bound)
+                return _Type(ir.Unknown(), piece)
+            return _Type(ir.String(STRINGS[piece.text], bound), piece)
+        if element.bound is None:
+            if piece.text in _PRIMITIVES:
+                return _Type(_PRIMITIVES[piece.text], piece)
+            if piece.text in self.typedefs:
+                return self.typedefs[piece.text]
+            match element.parts:
+                case (package, "msg", name) if names.is_package_name(
+                    package
+                ) and names.is_message_name(name):
+                    return _Type(ir.Ref(ir.TypeName(package, "msg", name)), piece)
+        self._foreign(piece, f"the type `{piece.text}`")
+        return _Type(ir.Unknown(), piece)
+
+    def _field(self, member: idl.Member) -> ir.Field:
+        self._check_annotations(member.annotations)
+        type_, piece = self._type(member.type)
+        span = self.file.span(member.name)
+        wrong = lower_types.field_name(member.name.text, span)
+        self.report.extend([wrong] if wrong else [])
+        return ir.Field(
+            name=member.name.text,
+            type=type_,
+            default=self._default(type_, member.annotations),
+            comment=comment(member.annotations),
+            unit=unit(member.annotations),
+            optional=any(f"@{one.name.text}" == OPTIONAL for one in member.annotations),
+            name_span=span,
+            type_span=self.file.span(piece),
+        )
+
+    def _check_annotations(self, annotations: Sequence[idl.Annotation]) -> None:
+        for one in annotations:
+            if one.name.text not in ANNOTATIONS:
+                self._foreign(one.name, f"the annotation `@{one.name.text}`")
+
+    def _default(
+        self, type_: ir.FieldType, annotations: Sequence[idl.Annotation]
+    ) -> ir.Default | None:
+        value = parameter(annotations, "default", "value")
+        element = ir.element_of(type_)
+        if value is None or isinstance(element, ir.Unknown):
+            return None
+        if isinstance(element, ir.Ref):
+            self._foreign(value.whole, "a default for a message")
+            return None
+        found = default(type_, value)
+        if isinstance(found, Fault):
+            self._fault(found)
+            return None
+        return found
+
+    def _constant(self, constant: idl.Constant) -> ir.Constant | None:
+        self._check_annotations(constant.annotations)
+        span = self.file.span(constant.name)
+        wrong = lower_types.constant_name(constant.name.text, span)
+        self.report.extend([wrong] if wrong else [])
+        type_, piece = self._type(constant.type)
+        if not isinstance(type_, (ir.Primitive, ir.String)):
+            self._foreign(piece, f"a constant of the type `{piece.text}`")
+            return None
+        value = scalar(type_, constant.value)
+        if isinstance(value, Fault):
+            self._fault(value)
+            return None
+        return ir.Constant(
+            name=constant.name.text,
+            type=type_,
+            value=value,
+            comment=comment(constant.annotations),
+            name_span=span,
+        )

@@ -1,0 +1,329 @@
+"""Mistakes of people who think of another language, and how interface files have it.
+
+Only lines and names that are wrong anyway are looked at: what is right is not decided here.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import takewhile
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic
+from idlc.diagnostics.source import Span
+from idlc.diagnostics.text import closest
+from idlc.language import tree
+from idlc.model import ir, names
+
+
+class Fault(msgspec.Struct, frozen=True):
+    """What is wrong with a value; `start` and `end` count from the beginning of its text."""
+
+    code: codes.Code
+    message: str
+    start: int
+    end: int
+    hint: str | None = None
+
+    def moved(self, offset: int) -> Fault:
+        """Return the same fault in a longer text that has `offset` characters before."""
+        return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)
+
+
+#: What other languages call a type, in lower case, and its name here.
+_TYPES = {
+    "boolean": "bool",
+    "double": "float64",
+    "f32": "float32",
+    "f64": "float64",
+    "float": "float32",
+    "int": "int32",
+    "integer": "int32",
+    "long": "int64",
+    "number": "float64",
+    "real": "float64",
+    "short": "int16",
+    "signed": "int32",
+    "size_t": "uint64",
+    "str": "string",
+    "text": "string",
+    "uchar": "uint8",
+    "uint": "uint32",
+    "ulong": "uint64",
+    "unsigned": "uint32",
+    "ushort": "uint16",
+    **{f"{sign}{bits}": f"{sign}nt{bits}" for sign in ("i", "ui") for bits in (8, 16, 32, 64)},
+    **{f"u{bits}": f"uint{bits}" for bits in (8, 16, 32, 64)},
+    **{f"{sign}int{bits}_t": f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)},
+    **dict.fromkeys(("bytes", "bytearray", "buffer", "blob", "octets"), "uint8[]"),
+    **dict.fromkeys(("datetime", "timestamp"), "builtin_interfaces/Time"),
+    "timedelta": "builtin_interfaces/Duration",
+}
+#: Types of several words, without a last `int`.
+_C_TYPES = {
+    "long double": "float64",
+    "long long": "int64",
+    "short": "int16",
+    "signed char": "int8",
+    "unsigned char": "uint8",
+    "unsigned long": "uint64",
+    "unsigned long long": "uint64",
+    "unsigned short": "uint16",
+}
+_C_WORDS = ("char", "double", "int", "long", "short", "signed", "unsigned")
+#: The words of them that people misspell.
+_NUMBERS = ("boolean", "double", "float", "int", "integer", "uint")
+_ANY = ("any", "auto", "var", "variant")
+_LISTS = ("array", "deque", "list", "sequence", "set", "tuple", "vector")
+_MAPS = ("dict", "dictionary", "hashmap", "map", "object", "struct", "union", "unordered_map")
+#: What other languages put before a type.
+_QUALIFIERS = ("const", "constexpr", "final", "optional", "required", "static")
+
+_COMMENTS = ("//", "/*")
+COMMENT_HINT = "a comment begins with `#`"
+_LIST_HINT = "a list of any length is `TYPE[]`, one of at most ten elements `TYPE[<=10]`"
+
+
+def type_hint(name: str) -> str | None:
+    """Return the hint for a name that other languages give to a type."""
+    word = re.split(r"::|\.", name)[-1].lower()
+    if word in (*ir.PRIMITIVES, "string", "wstring"):
+        return f"did you mean `{word}`?" if word != name else None
+    if word in _TYPES:
+        return f"did you mean `{_TYPES[word]}`?"
+    if word in _ANY:
+        return "a field has one type, which a message names: there is none for all values"
+    if word in _LISTS:
+        return _LIST_HINT
+    if word in _MAPS:
+        return "ROS 2 has no maps and no structures within messages; make a message for its fields"
+    if word == "enum":
+        return "ROS 2 has no enums; make a uint8 field, and a constant for each of its values"
+    near = closest(name, (*ir.PRIMITIVES, "string", "wstring")) or closest(name, _NUMBERS)
+    return f"did you mean `{_TYPES.get(near, near)}`?" if near else None
+
+
+def ros_spelling(name: str) -> str | None:
+    """Return `package/Name` for a message's name as Python or C++ write it."""
+    parts = re.split(r"::|\.", name)
+    if len(parts) > 1 and parts[-1] == "msg" and names.is_message_name(parts[-2]):
+        return "/".join((*parts[:-2][:1], parts[-2]))  # as a file is called
+    if parts[0] == "std":
+        return None
+    fits = names.is_package_name(parts[0]) and names.is_message_name(parts[-1])
+    return f"{parts[0]}/{parts[-1]}" if fits and parts[1:-1] in ([], ["msg"]) else None
+
+
+def is_comment(text: str) -> bool:
+    """Return whether a text begins with what begins a comment in other languages."""
+    return text.startswith(_COMMENTS)
+
+
+def has_comment(value: str) -> bool:
+    """Return whether a value is, or ends in, a comment as other languages have it."""
+    return any(map(is_comment, value.split(" ")))
+
+
+def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
+    """Return what is wrong with a line as a whole, so that nothing else need be said about it."""
+    if is_comment(text):
+        message = f"`{text[:2]}` does not begin a comment"
+        return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
+    if isinstance(body, tree.Broken):
+        return _broken(text, body, kind)
+    return _qualified(text, body) or _of_c(text, body) or _other_shape(body)
+
+
+def _broken(text: str, body: tree.Broken, kind: ir.Kind) -> Fault | None:
+    if body.code is codes.MALFORMED_SEPARATOR and kind == "msg":
+        hint = f"a .msg file has no separators; for a line in a comment write `# {text.split()[0]}`"
+        return Fault(body.code, body.message, 0, len(text), hint)
+    word = re.match(r"(?:std::)?(\w+)[<(]", text)
+    if body.code is codes.MALFORMED_TYPE and word and word[1].lower() in (*_LISTS, *_MAPS):
+        piece = body.piece
+        return Fault(body.code, body.message, piece.start, piece.end, type_hint(word[1]))
+    return None
+
+
+def _qualified(text: str, body: tree.Field | tree.Constant) -> Fault | None:
+    word = body.type.whole.text
+    if word not in _QUALIFIERS:
+        return None
+    hint = f"a line begins with its type: `{text[len(word) :].strip()}`"
+    return Fault(codes.INVALID_TYPE_NAME, f"`{word}` cannot be a type name", 0, len(word), hint)
+
+
+def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
+    """Return what is wrong with a type of several words, such as `unsigned int`."""
+    if body.type.whole.text not in _C_WORDS:
+        return None
+    words = list(takewhile(lambda word: word.group() in _C_WORDS, re.finditer(r"\S+", text)))
+    if len(words) == 1 or words[0].group() == "char":
+        return None
+    whole = " ".join(word.group() for word in words)
+    known = whole.removesuffix(" int").removeprefix("signed ")
+    meant = _C_TYPES.get(known) or _TYPES.get(known) or "int32"
+    message = f"unknown type `{whole}`"
+    return Fault(codes.UNKNOWN_TYPE, message, 0, words[-1].end(), f"did you mean `{meant}`?")
+
+
+def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
+    type_, name = body.type.whole.text, body.name
+    if isinstance(body, tree.Constant):
+        return _constant(body)
+    if "," in name.text:
+        listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
+        found = [f"`{type_} {one.strip()}`" for one in listed if one.strip()]
+        hint = f"write each on a line of its own: {', '.join(found[:4])}"
+        return _name_fault(name, "a line defines one field", hint)
+    plain, bracket, size = name.text.partition("[")
+    if bracket and size.endswith("]"):
+        hint = f"the brackets belong to the type: `{type_}[{size} {plain}`"
+        return _name_fault(name, f"`{name.text}` cannot be a field name", hint)
+    if type_.endswith(":"):
+        hint = f"the type comes first: `{name.text} {type_[:-1]}`"
+        return Fault(
+            codes.INVALID_TYPE_NAME, f"`{type_}` cannot be a type name", 0, len(type_), hint
+        )
+    return None
+
+
+def _name_fault(name: tree.Piece, message: str, hint: str) -> Fault:
+    return Fault(codes.INVALID_FIELD_NAME, message, name.start, name.end, hint)
+
+
+def _constant(body: tree.Constant) -> Fault | None:
+    type_, name, value = body.type.whole.text, body.name, body.value.text
+    if not value or len(value) > 40:
+        value = "VALUE"
+    if not name.text:
+        hint = f"write `{type_} NAME={value}`"
+        return Fault(
+            codes.INVALID_CONSTANT_NAME, "a constant has no name", name.start, name.end + 1, hint
+        )
+    if names.is_field_name(name.text):
+        message = f"`{name.text}` cannot be a constant name"
+        hint = f"a default value is written without `=`: `{type_} {name.text} {value}`"
+        if type_ in (*ir.PRIMITIVES, "string", "wstring"):
+            hint += f"; a constant is called `{name.text.upper()}`"
+        return Fault(codes.INVALID_CONSTANT_NAME, message, name.start, name.end, hint)
+    return None
+
+
+def field_name(name: str, span: Span) -> Diagnostic | None:
+    """Return the problem with a field's name, or `None`."""
+    if names.is_field_name(name):
+        return None
+    like = names.field_name_like(name)
+    return codes.INVALID_FIELD_NAME.at(
+        span,
+        f"`{name}` cannot be a field name",
+        hint=f"write `{like}`" if names.is_field_name(like) else names.FIELD_HINT,
+    )
+
+
+def constant_name(name: str, span: Span) -> Diagnostic | None:
+    """Return the problem with a constant's name, or `None`."""
+    if names.is_constant_name(name):
+        return None
+    upper = names.field_name_like(name).upper()
+    return codes.INVALID_CONSTANT_NAME.at(
+        span,
+        f"`{name}` cannot be a constant name",
+        hint=f"write `{upper}`" if names.is_constant_name(upper) else names.CONSTANT_HINT,
+    )
+
+
+STRINGS = {"string": False, "wstring": True}
+ROS1_TYPES = ("time", "duration")
+_NO_FIELDS = {"srv": "services", "action": "actions"}
+
+
+def lower_type(type_: tree.Type, package: str) -> ir.FieldType | Fault:
+    """Return the meaning of a type in a file of `package`; offsets count from the line's start."""
+    element = _element(type_, package)
+    if isinstance(element, Fault) or type_.brackets is None:
+        return element
+    if type_.size is None:
+        return ir.Sequence(element)
+    size = positive(type_.size, "the array's size")
+    if isinstance(size, Fault):
+        return size
+    return ir.Sequence(element, size) if type_.at_most else ir.Array(element, size)
+
+
+def as_parsed(type_: ir.FieldType) -> ir.FieldType:
+    """Return the type that rosidl's parser reads back: `wstring<=N[]` becomes bounded by N."""
+    match type_:
+        case ir.Sequence(ir.String(wide=True, bound=int(bound)) as element, None):
+            return ir.Sequence(element, bound)
+    return type_
+
+
+def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
+    name = type_.name.text
+    if name in STRINGS:
+        bound = None if type_.bound is None else positive(type_.bound, "the string's bound")
+        return bound if isinstance(bound, Fault) else ir.String(STRINGS[name], bound)
+    if type_.bound is not None:
+        piece = tree.Piece("<=" + type_.bound.text, type_.bound.start - 2)
+        hint = f"for at most {type_.bound.text} elements write `{name}[<={type_.bound.text}]`"
+        return _fault(codes.BOUND_ON_NON_STRING, piece, f"`{name}` cannot have a bound", hint)
+    if name in ir.PRIMITIVES:
+        return ir.Primitive(name)
+    if name in ROS1_TYPES:
+        known = "builtin_interfaces/" + name.capitalize()
+        return _fault(codes.ROS1_TYPE, type_.name, f"`{name}` is a ROS 1 type", f"write `{known}`")
+    return _reference(type_.name, package)
+
+
+def _reference(piece: tree.Piece, package: str) -> ir.Element | Fault:
+    parts = piece.text.split("/")
+    if len(parts) > 2:
+        hint = (
+            f"write `{parts[0]}/{parts[-1].removesuffix('.msg')}`"
+            if len(parts) == 3
+            else "write `package/Name`"
+        )
+        if len(parts) == 3 and parts[1] in _NO_FIELDS:
+            hint = f"only messages can be the type of a field, not {_NO_FIELDS[parts[1]]}"
+        return _fault(codes.INVALID_TYPE_NAME, piece, f"`{piece.text}` has too many parts", hint)
+    if len(parts) == 2 and not names.is_package_name(parts[0]):
+        wrong = tree.Piece(parts[0], piece.start)
+        message = f"`{parts[0]}` cannot be a package name"
+        return _fault(codes.INVALID_TYPE_NAME, wrong, message, names.PACKAGE_HINT)
+    name = parts[-1]
+    if not names.is_message_name(name):
+        return _bad_name(tree.Piece(name, piece.end - len(name)), qualified=len(parts) == 2)
+    return ir.Ref(ir.TypeName(parts[0] if len(parts) == 2 else package, "msg", name))
+
+
+def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
+    name = piece.text
+    if not qualified:
+        if dotted := ros_spelling(name):
+            message = f"`{name}` cannot be a type name"
+            return _fault(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
+        if meant := type_hint(name):
+            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
+    like = names.message_name_like(name.removesuffix(".msg"))
+    hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
+    return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
+
+
+def positive(piece: tree.Piece, what: str) -> int | Fault:
+    """Return the size or bound that a piece is."""
+    try:
+        value = int(piece.text)
+    except ValueError:
+        value = 0
+    if value > 0:
+        return value
+    message = f"{what} is not a positive integer"
+    return _fault(codes.BAD_BOUND, piece, message, "write a decimal number above 0")
+
+
+def _fault(code: codes.Code, piece: tree.Piece, message: str, hint: str) -> Fault:
+    return Fault(code, message, piece.start, piece.end, hint)

@@ -1,0 +1,318 @@
+"""Value text + type → the value, or what is wrong with the text (language 3 and 4).
+
+Lives in the model, not in the syntax, because only the type says what a literal means.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import cache
+from typing import TypeAlias
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.language.escapes import EscapeError, read_back, through_idl
+from idlc.language.grammar import terminals
+from idlc.model import ir
+from idlc.model.lower_types import Fault
+
+QUOTES = ('"', "'")
+#: Elements that a default may have; each takes about a kilobyte on its way.
+MAX_ELEMENTS = 200_000
+
+
+def elements(inside: str) -> list[tuple[str, int]] | Fault:
+    """Split at commas; each element with its offset."""
+    found: list[tuple[str, int]] = []
+    at = 0
+    for part in inside.split(",") if inside else []:
+        stripped = part.strip()
+        found.append((stripped, at + len(part) - len(part.lstrip())))
+        if not stripped:
+            end = at + max(len(part), 1)
+            return Fault(codes.ARRAY_VALUE, "an element is missing", at, end, "remove the comma")
+        at += len(part) + 1
+    return found
+
+
+def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
+    """Split as rosidl's scanner does, wrong turns included (language 4)."""
+    found: list[tuple[str, int]] = []
+    ends = {quote: _Ends(inside, quote) for quote in QUOTES}
+    at = 0
+    while at < len(inside) and len(found) <= MAX_ELEMENTS:
+        at = _after_blanks(inside, at)
+        if at == len(inside) or inside[at] == ",":
+            return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")
+        quoted = False
+        for quote in QUOTES:
+            if inside.startswith(quote, at):
+                quoted = True
+                end = ends[quote].after(at)
+                if end == -1:
+                    message = f"no {quote} that ends this element"
+                    hint = (
+                        "an element cannot end with an escaped quote; use the other kind of quote"
+                    )
+                    return Fault(codes.BAD_VALUE, message, at, len(inside), hint)
+                element = inside[at + 1 : at + end + 1].replace(f"\\{quote}", quote)
+                # upstream strips every element, also what stood in quotes
+                found.append((element.strip(), at))
+                at += end + 2
+        if not quoted:
+            comma = inside.find(",", at)
+            end = len(inside) if comma < 0 else comma
+            found.append((inside[at:end].strip(), at))
+            at = end
+        at = _after_blanks(inside, at)
+        at += inside.startswith(",", at)
+    return found
+
+
+def _after_blanks(text: str, at: int) -> int:
+    """Return the first place from `at` on where no blank stands."""
+    found = re.compile("[^ ]").search(text, at)  # compiled once, by re
+    return found.start() if found else len(text)
+
+
+class _Ends:
+    """rosidl's idea of where quoted texts end, without its quadratic search.
+
+    Upstream goes from one escaped quote to the next, and counts from the last of them instead of
+    from the start, so that what follows may be looked at again and again.
+    """
+
+    def __init__(self, text: str, quote: str) -> None:
+        self._text = text
+        self._quote = quote
+        #: place -> the closing quote, the place after the last escaped one, the place before that
+        self._known: dict[int, tuple[int, int, int]] = {}
+
+    def after(self, start: int) -> int:
+        """Return the length of the text quoted at `start`; -1 if nothing ends it."""
+        path = [start]
+        while path[-1] not in self._known:
+            here = path[-1]
+            at = self._text.find(self._quote, here + 1)
+            if at < 0 or self._text[at - 1] != "\\":
+                self._known[here] = (at, here, here)
+            else:
+                path.append(at + 1)
+        following = path.pop()
+        for here in reversed(path):
+            end, last, before = self._known[following]
+            self._known[here] = (end, last, here if last == following else before)
+            following = here
+        end, last, before = self._known[start]
+        return -1 if end < 0 else end - 1 - before
+
+
+FLOAT32_MAX = 3.402823466e38
+#: Characters from which on Python itself judges numbers: patterns take much memory for them.
+LONG = 1000
+
+
+class Text(msgspec.Struct, frozen=True):
+    """A string value: as rosidl's adapter takes it from the file, and after the pipeline."""
+
+    raw: str
+    value: str
+
+
+Number: TypeAlias = bool | int | float
+BACKSLASH_HINT = "write `\\\\\\\\` for each backslash that should stay"
+
+
+def scalar(type_: ir.Primitive | ir.String, text: str) -> Number | Text | Fault:
+    """Return the value that `text` spells for a scalar type."""
+    if isinstance(type_, ir.String):
+        return _text(type_, text)
+    if type_.name == "bool":
+        return _bool(text)
+    if type_.info.low is None:
+        return _float(text)
+    return _integer(type_, text)
+
+
+def default(type_: ir.FieldType, text: str) -> ir.Default | Fault:
+    """Return the declared default of a field whose type is no message."""
+    if isinstance(type_, (ir.Array, ir.Sequence)):
+        return _array_default(type_, text)
+    assert isinstance(type_, (ir.Primitive, ir.String))
+    value = scalar(type_, text)
+    if isinstance(value, Fault):
+        return value
+    if isinstance(value, Text):
+        return ir.Default(value.value, value.value)
+    if isinstance(value, float) and not math.isfinite(value):
+        # the .idl holds the bare word, whose sign its parser loses (language 3)
+        return ir.Default(value, str(abs(value)))
+    return ir.Default(value, str(value))
+
+
+@cache
+def _shape(name: str) -> re.Pattern[str]:
+    return re.compile(terminals()[name])
+
+
+def _fault(code: codes.Code, text: str, message: str, hint: str) -> Fault:
+    return Fault(code, message, 0, len(text), hint)
+
+
+def _shown(text: str) -> str:
+    return f"`{text}`" if len(text) <= 40 else f"`{text[:37]}...`"
+
+
+def _bool(text: str) -> bool | Fault:
+    if _shape("BOOLEAN").fullmatch(text):
+        return text.lower() in ("true", "1")
+    message = f"{_shown(text)} is not a bool" if text else "the value is missing"
+    return _fault(codes.BAD_VALUE, text, message, "write `true`, `false`, `1` or `0`")
+
+
+def _float(text: str) -> float | Fault:
+    value = _real(text) if len(text) > LONG or _shape("REAL").fullmatch(text) else None
+    if value is not None:
+        return value
+    message = f"{_shown(text)} is not a number" if text else "the value is missing"
+    return _fault(codes.BAD_VALUE, text, message, "write a number such as `1`, `-0.5` or `1e-3`")
+
+
+def _integer(type_: ir.Primitive, text: str) -> int | Fault:
+    info = type_.info
+    value = _int(text) if len(text) > LONG or _shape("INTEGER").fullmatch(text) else None
+    if value is None:
+        message = f"{_shown(text)} is not an integer" if text else "the value is missing"
+        hint = "write a number such as `10`, `-3`, `0xff` or `0b101`"
+        return _fault(codes.BAD_VALUE, text, message, hint)
+    if info.low is None or info.high is None or info.low <= value <= info.high:
+        return value
+    hint = f"{type_.name} holds {info.low} to {info.high}"
+    return _fault(codes.OUT_OF_RANGE, text, f"{_shown(text)} is out of range", hint)
+
+
+def _real(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+def _int(text: str) -> int | None:
+    """Read as rosidl does: decimal first, leading zeros allowed, then by prefix."""
+    for base in (10, 0):
+        try:
+            return int(text, base)
+        except ValueError:
+            continue
+    return None
+
+
+def _text(type_: ir.String, text: str) -> Text | Fault:
+    raw = _unquote(type_, text)
+    if isinstance(raw, Fault):
+        return raw
+    try:
+        return Text(raw, through_idl(raw))
+    except EscapeError as error:
+        offset = text.find(raw)
+        start, end = error.start + offset, error.end + offset
+        if offset < 0:  # quotes were un-escaped, so places differ
+            start, end = 0, len(text)
+        message = f"ROS 2's tools fail on {error}"
+        return Fault(codes.BAD_ESCAPE, message, start, end, BACKSLASH_HINT)
+
+
+def _unquote(type_: ir.String, text: str) -> str | Fault:
+    """Return a string value as rosidl's adapter takes it: without its quotes, escapes untouched."""
+    raw = text
+    for quote in QUOTES:
+        if text.startswith(quote) and text.endswith(quote):
+            raw = text[1:-1]
+            inner = re.search(rf"(?<!\\){quote}", raw)
+            if inner:
+                start = 1 + inner.start()
+                message = f"a {quote} inside {quote}...{quote}"
+                hint = f"write `\\{quote}` for a quote inside quotes"
+                return Fault(codes.BAD_VALUE, message, start, start + 1, hint)
+            raw = raw.replace(f"\\{quote}", quote)
+            break
+    if type_.bound is None or len(raw) <= type_.bound:
+        return raw
+    message = f"{len(raw)} characters in a string of at most {type_.bound}"
+    hint = f"shorten it, or raise the bound to {len(raw)}"
+    return _fault(codes.STRING_TOO_LONG, text, message, hint)
+
+
+def _array_default(type_: ir.Array | ir.Sequence, text: str) -> ir.Default | Fault:
+    if not (text.startswith("[") and text.endswith("]")) or text == "[":
+        hint = "write `[1, 2, 3]`"
+        return _fault(codes.ARRAY_VALUE, text, "an array's default must stand in brackets", hint)
+    inside = text[1:-1]
+    if not isinstance(type_.element, ir.String) and inside.count(",") >= MAX_ELEMENTS:
+        return _too_many(text)
+    split = string_elements if isinstance(type_.element, ir.String) else elements
+    pieces = split(inside)
+    if isinstance(pieces, Fault):
+        return pieces.moved(1)
+    if len(pieces) > MAX_ELEMENTS:
+        return _too_many(text)
+    if (wrong := wrong_length(type_, len(pieces), text)) is not None:
+        return wrong
+    assert isinstance(type_.element, (ir.Primitive, ir.String))
+    values: list[Number | str] = []
+    for piece, start in pieces:
+        value = _element(type_.element, piece)
+        if isinstance(value, Fault):
+            # a quoted element's offsets are lost with its escapes; its start is near enough
+            return value.moved(1 + start)
+        values.append(value)
+    return _array_value(tuple(values), text)
+
+
+def _element(type_: ir.Primitive | ir.String, text: str) -> Number | str | Fault:
+    if isinstance(type_, ir.String):
+        return _unquote(type_, text)
+    value = scalar(type_, text)
+    assert not isinstance(value, Text)
+    return value
+
+
+def _array_value(values: tuple[Number | str, ...], text: str) -> ir.Default | Fault:
+    """Take the values through the pipeline, where they travel as the text of a Python tuple."""
+    import ast
+    import warnings
+
+    literal = repr(values).replace("\\", "\\\\").replace('"', '\\"')
+    try:
+        annotation = read_back(literal, text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # unknown escapes, which the text is full of
+            value = ast.literal_eval(annotation)
+    except EscapeError as error:
+        hint = "write the character as an escape such as `\\u20ac`"
+        message = f"ROS 2's tools fail on {error}"
+        return Fault(codes.BAD_ESCAPE, message, error.start, error.end, hint)
+    except (ValueError, SyntaxError):
+        hint = "only finite numbers can be defaults of an array"
+        return _fault(codes.BAD_VALUE, text, "ROS 2's tools cannot read this default", hint)
+    return ir.Default(value, annotation)
+
+
+def _too_many(text: str) -> Fault:
+    message = f"more than {MAX_ELEMENTS:,} elements in a default"
+    return _fault(codes.TOO_LARGE, text, message, "set the value in code")
+
+
+def wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:
+    """Return what is wrong with a default of so many elements, or `None`."""
+    if isinstance(type_, ir.Array):
+        expected, wrong = f"exactly {type_.size}", count != type_.size
+    else:
+        expected, wrong = f"at most {type_.bound}", type_.bound is not None and count > type_.bound
+    if not wrong:
+        return None
+    hint = f"give {expected} elements"
+    return _fault(codes.ARRAY_LENGTH, text, f"{count} elements instead of {expected}", hint)

@@ -1,0 +1,207 @@
+"""One writer at a time: a folder's lock, and signals that wait until a step is complete."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import apply
+from idlc.project.files import is_folder, reason
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Edit, Report
+
+_WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
+
+
+def move_over(path: str, target: str) -> None:
+    """Move a file over another one."""
+    if sys.platform == "win32":
+        from idlc.project import windows
+
+        windows.replace(path, target)
+    else:
+        os.replace(path, target)  # noqa: PTH105 - a Path costs as much as moving
+
+
+def create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
+    """Write a whole file or none; past `open`, which takes as long as the operating system."""
+    handle = os.open(path, _WRITING | how, 0o666)
+    try:
+        try:
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(handle, rest) :]
+        finally:
+            os.close(handle)  # first: Windows removes no file that is open
+    except BaseException:
+        with contextlib.suppress(OSError):
+            Path(path).unlink()
+        raise
+
+
+if sys.platform != "win32":
+    import fcntl
+
+#: What this process has locked, so that it does not wait for itself.
+_held: set[Path] = set()
+
+
+@contextlib.contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Wait until no other idlc writes to a folder, and let none begin meanwhile.
+
+    The lock is the operating system's, on the folder itself, or the nearest above as long as
+    there is none: it leaves no file and ends with the process. Where folders cannot be
+    locked, nothing is; on Windows one lock is for all. A run that holds one folder may only ask
+    for others below it.
+    """
+    place = _nearest(folder)
+    if sys.platform == "win32" and not _held:
+        from idlc.project import windows
+
+        with windows.alone(), _holding(place):
+            yield
+        return
+    if sys.platform == "win32" or place in _held:
+        yield
+        return
+    handle = _lock(place)
+    while (now := _nearest(folder)) != place or not _is(handle, place):
+        _unlock(handle)
+        handle = _lock(place := now)
+    try:
+        with _holding(place):
+            yield
+    finally:
+        _unlock(handle)
+
+
+@contextlib.contextmanager
+def _holding(place: Path) -> Iterator[None]:
+    _held.add(place)
+    try:
+        yield
+    finally:
+        _held.discard(place)
+
+
+def _nearest(folder: Path) -> Path:
+    return next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+
+
+def _lock(place: Path) -> int | None:
+    """Lock a folder, after those who locked one above it because this one was not there yet."""
+    for above in reversed(place.parents):
+        if above not in _held:
+            _unlock(_opened(above, fcntl.LOCK_SH))
+    return _opened(place, fcntl.LOCK_EX)
+
+
+def _opened(place: Path, how: int) -> int | None:
+    """Return a handle that locks a folder, `None` if it cannot be opened."""
+    try:
+        handle = os.open(place, os.O_RDONLY)
+    except OSError:
+        return None
+    with contextlib.suppress(OSError):
+        fcntl.flock(handle, how)
+    return handle
+
+
+def _unlock(handle: int | None) -> None:
+    if handle is not None:
+        os.close(handle)
+
+
+def _is(handle: int | None, place: Path) -> bool:
+    """Return whether a handle is still that of the folder of this name, or there is none."""
+    try:
+        return handle is None or os.path.samestat(os.fstat(handle), place.stat())
+    except OSError:
+        return False
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Let signals that would end the process wait."""
+    if sys.platform == "win32":
+        with _without_ctrl_c():
+            yield
+        return
+    ending = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C wait where signals cannot be blocked; only the main thread hears it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if pressed:
+            signal.raise_signal(signal.SIGINT)
+
+
+def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
+    """Give a file new content; report IDL612 and return `False` if that fails.
+
+    A link stays one, and the file that it leads to is replaced. What somebody else made of the
+    file since it was read stays.
+    """
+    target = path.resolve()
+    try:
+        if target.read_bytes() != old.encode("utf-8"):
+            message = f"`{name}` was changed while idlc was running"
+            report.add(codes.CANNOT_WRITE.of(name, message, hint="run it again"))
+            return False
+        handle, draft = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(new.encode("utf-8"))
+            shutil.copymode(target, draft)
+            move_over(draft, str(target))
+        except BaseException:
+            with contextlib.suppress(OSError):
+                Path(draft).unlink()
+            raise
+    except OSError as error:
+        report.add(codes.CANNOT_WRITE.of(name, f"cannot write `{name}`: {reason(error)}"))
+        return False
+    return True
+
+
+def edit(edits: Iterable[Edit], report: Report, tidied: Callable[[str, str, str], str]) -> int:
+    """Make edits in the files that they are for; return how many were made.
+
+    `tidied` returns what to write, of a file's name, its text and the text after the edits.
+    """
+    by_path: dict[str, list[Edit]] = {}
+    for edit in edits:
+        by_path.setdefault(edit.span.source.path, []).append(edit)
+    done = 0
+    for name, own in by_path.items():
+        old = own[0].span.source.text
+        text, number = apply(old, own)
+        if rewrite(Path(name), name, old, tidied(name, old, text), report):
+            done += number
+    return done

@@ -1,0 +1,381 @@
+"""Finding interface files: which files the paths on the command line mean, in a fixed order."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import closest
+from idlc.project.files import (
+    NOTHING_OPEN,
+    Unsaved,
+    absolute,
+    is_file,
+    is_folder,
+    kind_of,
+    unreadable,
+)
+from idlc.project.package_xml import MANIFEST, manifest
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
+    from idlc.model.ir import Kind
+
+
+class Exclusion(msgspec.Struct, frozen=True):
+    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are seen from.
+
+    `*` and `?` stand for any text within one name, `**` for any number of folders. A pattern may
+    begin at any folder, and one that fits a folder leaves out everything in it.
+    """
+
+    patterns: tuple[tuple[str, ...], ...] = ()
+    base: Path = Path("/")
+
+    def has(self, path: str | Path) -> bool:
+        """Return whether the file of an absolute path is left out."""
+        if not self.patterns:
+            return False
+        whole = Path(path)
+        below = self.base if whole.is_relative_to(self.base) else whole.anchor
+        names = whole.relative_to(below).parts
+        return any(_fits(pattern, names) for pattern in self.patterns)
+
+
+class Exclusions(msgspec.Struct, frozen=True):
+    """All that is left out."""
+
+    parts: tuple[Exclusion, ...] = ()
+
+    def has(self, path: str | Path) -> bool:
+        """Return whether the file of an absolute path is left out."""
+        return any(part.has(path) for part in self.parts)
+
+    def seen_from(self, place: Path, top: Path) -> Exclusions:
+        """Return the same for a copy of the folder `top` that lies in `place`."""
+        return Exclusions(
+            tuple(
+                msgspec.structs.replace(part, base=place / part.base.relative_to(top))
+                if part.base.is_relative_to(top)
+                else part
+                for part in self.parts
+            )
+        )
+
+
+def exclusion(patterns: Iterable[str], base: Path) -> Exclusion:
+    """Return what patterns leave out, as they are written in the folder `base`."""
+    split = (pattern.replace("\\", "/").split("/") for pattern in patterns)
+    named = (tuple(name for name in names if name not in ("", ".")) for names in split)
+    return Exclusion(tuple(filter(None, named)), base)
+
+
+def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
+    """Return whether a pattern fits a file or a folder above it, from any folder on."""
+    reached = _with_none(pattern, {0})
+    for name in names:
+        after = {0}
+        for place in reached:
+            if pattern[place] == "**":
+                after.add(place)
+            elif fnmatchcase(name, pattern[place]):
+                after.add(place + 1)
+        reached = _with_none(pattern, after)
+        if len(pattern) in reached:
+            return True
+    return False
+
+
+def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
+    """Return places in a pattern, with those that are reached where `**` stands for no folder."""
+    for place in sorted(places):
+        while place < len(pattern) and pattern[place] == "**":
+            place += 1
+            places.add(place)
+    return places
+
+
+KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
+KIND_FOLDERS = frozenset(KINDS.values())
+#: Folders that hold copies or no sources: what colcon and Python tools write.
+SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
+#: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
+CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
+#: What may be a type or package, as ROS 2, Python or C++ writes it.
+_NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
+NOTHING = Exclusions()
+
+
+class InterfaceFile(msgspec.Struct, frozen=True):
+    """An interface file.
+
+    `given` is the path on the command line that led to it, `root` the folder that holds the
+    msg/, srv/ and action/ folders, or the file's own.
+    """
+
+    path: Path
+    shown: str
+    kind: Kind
+    name: str
+    given: str
+    root: Path
+
+    @property
+    def key(self) -> str:
+        """The name within the package, such as `msg/RobotCommand.msg`."""
+        return f"{self.kind}/{self.name}.{self.kind}"
+
+
+def is_path(text: str) -> bool:
+    """Return whether a word on the command line means a path rather than a type or package."""
+    named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
+    return not named or os.path.lexists(text)
+
+
+class Found(msgspec.Struct, frozen=True):
+    """What paths mean: interface files, each once, sorted, and the folders of packages.
+
+    `empty` are the given folders without interface files, `folders` all that were looked into,
+    with their status from before that.
+    """
+
+    files: tuple[InterfaceFile, ...]
+    packages: tuple[Path, ...]
+    empty: tuple[str, ...]
+    folders: Mapping[Path, os.stat_result]
+
+
+def find(
+    paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING
+) -> tuple[InterfaceFile, ...]:
+    """Return the interface files that paths mean; reports IDL606 for a path that means none."""
+    found = look(paths, report, exclude)
+    report.extend(nothing_in(given, exclude) for given in found.empty)
+    return found.files
+
+
+def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> Diagnostic:
+    """Return the problem with a folder without interface files; `also` is what else is missing."""
+    if exclude is not NOTHING and look((given,), Report()).files:
+        message = f"every interface file in `{given}` is excluded"
+        return codes.NO_INTERFACES.of(given, message, hint="see `exclude` in [tool.idlc]")
+    return codes.NO_INTERFACES.of(
+        given,
+        f"no {also}.msg, .srv or .action file in `{given}`",
+        hint="interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself",
+    )
+
+
+def look(
+    paths: Iterable[str],
+    report: Report,
+    exclude: Exclusions = NOTHING,
+    unsaved: Unsaved = NOTHING_OPEN,
+) -> Found:
+    """Return what paths mean; a folder means everything below it.
+
+    Reports IDL601, IDL602, IDL605 and IDL622.
+    """
+    manifest.cache_clear()
+    found: dict[str, InterfaceFile] = {}
+    packages: dict[Path, None] = {}
+    empty: dict[str, None] = {}
+    folders: dict[Path, os.stat_result] = {}
+    for given in paths:
+        seen = not is_folder(Path(given))
+        for path in _under(given, report, unsaved, folders):
+            whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
+            if exclude.has(whole):
+                continue
+            if path.name == MANIFEST:
+                packages.setdefault(Path(whole).parent)
+            elif path.suffix not in KINDS:
+                report.add(_unread(path))
+            else:
+                seen = True
+                found.setdefault(whole, _interface(path, whole, given))
+        if not seen:
+            empty.setdefault(given)
+    files = sorted(found.values(), key=lambda file: (file.shown, file.given))
+    return Found(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
+
+
+def _under(
+    given: str, report: Report, unsaved: Unsaved, folders: dict[Path, os.stat_result]
+) -> Iterator[Path]:
+    """Yield the interface and package.xml files that one path means; note folders as `walk`."""
+    path = Path(given)
+    if path.suffix in KINDS and unsaved.is_file(path) and not path.exists():
+        yield path
+        return
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        problem = unreadable(given, error)
+        report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
+        return
+    if stat.S_ISDIR(mode):
+        yield from walk(path, report, folders)
+        whole = absolute(path)
+        for new in unsaved.new_below(whole):
+            inside = new.relative_to(whole)
+            if _is_wanted(new.name) and not _is_closed(whole, inside.parts[:-1]):
+                yield path / inside
+    elif path.suffix not in KINDS or not stat.S_ISREG(mode):
+        what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
+        report.add(
+            codes.NOT_AN_INTERFACE.of(given, f"`{given}` is {what}not a .msg, .srv or .action file")
+        )
+    else:
+        yield path
+
+
+def _unread(path: Path) -> Diagnostic:
+    extension = path.suffix.lower()
+    message = f"`{path.name}` is not read, because ROS 2 knows `{extension}` only"
+    hint = f"rename it to `{path.stem}{extension}`"
+    return codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint)
+
+
+def _interface(path: Path, whole: str, given: str) -> InterfaceFile:
+    kind = KINDS[path.suffix]
+    root = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
+    return InterfaceFile(path, path.as_posix(), kind, path.stem, given, root)
+
+
+@lru_cache(maxsize=1024)
+def root_of(folder: str) -> Path:
+    """Return the folder above `folder` if that is for one kind of interface, or itself."""
+    here = Path(folder)
+    return here.parent if here.name in KIND_FOLDERS else here
+
+
+def _similar(path: Path) -> str | None:
+    try:
+        names = sorted(entry.name for entry in path.parent.iterdir())
+    except (OSError, ValueError):
+        return None
+    close = closest(path.name, names)
+    return f"did you mean `{(path.parent / close).as_posix()}`?" if close else None
+
+
+def walk(
+    folder: Path, report: Report, folders: dict[Path, os.stat_result] | None = None
+) -> Iterator[Path]:
+    """Yield each interface file and package.xml below a folder, in no particular order.
+
+    `folders` gets the status of each folder from before it was listed.
+    Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
+
+    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
+    one excepted; links to folders are followed, each folder once.
+    """
+    waiting = [folder]
+    seen: set[tuple[int, int]] = set()
+    while waiting:
+        here = waiting.pop()
+        try:
+            status = here.stat()
+            if folders is not None:
+                folders[here] = status
+            entries = sorted(os.scandir(here), key=lambda entry: entry.name)
+        except OSError as error:
+            report.add(unreadable(here.as_posix(), error))
+            continue
+        identity = (status.st_dev, status.st_ino)
+        if (identity in seen and status.st_ino) or (
+            here != folder and any(entry.name in CLOSING for entry in entries)
+        ):
+            continue
+        seen.add(identity)
+        for entry in entries:
+            if _is_folder(entry):
+                if not entry.name.startswith(".") and entry.name not in SKIPPED:
+                    waiting.append(here / entry.name)
+            elif not entry.name.startswith(".") and _is_wanted(entry.name):
+                yield here / entry.name
+
+
+def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
+    """Return whether `walk` would not reach a folder that lies in another."""
+    for name in inside:
+        folder /= name
+        if name.startswith(".") or name in SKIPPED or any(is_file(folder / one) for one in CLOSING):
+            return True
+    return False
+
+
+def _is_wanted(name: str) -> bool:
+    suffix = os.path.splitext(name)[1]  # noqa: PTH122 - for every file of a source tree
+    return suffix.lower() in KINDS or name == MANIFEST
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
+
+
+#: When a file was written and last changed, its size and its number: all 0 if there is none.
+Stamp: TypeAlias = tuple[int, int, int, int]
+#: Nanoseconds; changes within a tick of a file system's clock may have the same time.
+TICK = 20_000_000
+_NO_FILE = (0, 0, 0, 0)
+_UNKNOWN = (-1, 0, 0, 0)
+
+
+def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, Stamp]:
+    """Return the stamp of each input file, of its package.xml and of files along -I."""
+    files = [file.path for file in look((*paths, *include), Report()).files]
+    manifests = {path.parent.parent / MANIFEST for path in files}
+    return stamps((*files, *sorted(manifests)))
+
+
+def stamps(paths: Iterable[Path]) -> dict[str, Stamp]:
+    """Return the stamp of each file or folder."""
+    return {path.as_posix(): _stamp(path) for path in paths}
+
+
+class Picture:
+    """What folders were before they were listed, and files when they were read.
+
+    That began at a time in nanoseconds.
+    """
+
+    def __init__(
+        self, folders: Mapping[Path, os.stat_result], files: Iterable[Path], begun: int
+    ) -> None:
+        now = time.time_ns()
+        self._stamps = {absolute(path): _stamp_of(status) for path, status in folders.items()}
+        for path in files:
+            stamp = _stamp(path)
+            # what changed since then was perhaps read before that
+            is_new = any(begun - TICK <= at <= now for at in stamp[:2])
+            self._stamps[path] = _UNKNOWN if is_new else stamp
+
+    def is_true(self) -> bool:
+        """Return whether they surely still are the same."""
+        return all(stamp == _stamp(path) for path, stamp in self._stamps.items())
+
+
+def _stamp(path: Path) -> Stamp:
+    try:
+        return _stamp_of(path.stat())
+    except (OSError, ValueError):
+        return _NO_FILE
+
+
+def _stamp_of(status: os.stat_result) -> Stamp:
+    return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino

@@ -1,0 +1,373 @@
+"""The interface files of a git revision, in a folder of their own.
+
+Repositories are others': what their settings name is not run, and nothing is fetched.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory, TemporaryFile
+from threading import Timer
+from typing import NamedTuple
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import one_line
+from idlc.project.files import absolute, reason
+from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, look
+from idlc.project.package_xml import MANIFEST
+
+#: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
+MOST = 128 << 20
+#: Seconds; how long one answer may take. Settings can include a pipe, names can hold patterns.
+PATIENCE = 120.0
+_HASH = re.compile(rb"[0-9a-f]{40}(?:[0-9a-f]{24})?")
+_ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTALL)
+_LINK, _SUBMODULE = b"120000", b"160000"
+#: What a repository's own settings could otherwise have git run. Older gits know some of it only.
+_SETTINGS = {
+    "safe.bareRepository": "explicit",
+    "core.fsmonitor": "false",
+    "core.hooksPath": os.devnull,
+    "core.pager": "cat",
+}
+#: The first one counts for more than any settings, those for single protocols included.
+_ENVIRONMENT = {
+    "GIT_ALLOW_PROTOCOL": "none",
+    "GIT_NO_LAZY_FETCH": "1",
+    "GIT_TERMINAL_PROMPT": "0",
+    "GIT_OPTIONAL_LOCKS": "0",
+    "LC_ALL": "C",
+}
+#: Variables that name a repository, as hooks of git have them: here, a path does.
+_ELSEWHERE = frozenset(
+    f"GIT_{name}"
+    for name in (
+        "DIR WORK_TREE COMMON_DIR INDEX_FILE OBJECT_DIRECTORY ALTERNATE_OBJECT_DIRECTORIES "
+        "NAMESPACE PREFIX"
+    ).split()
+)
+_SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
+_PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
+_NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
+_DAMAGED = "`git fsck` lists what is missing or damaged"
+#: How git begins the sentences that say what is wrong.
+_BAD = ("fatal: ", "error: ")
+
+
+class GitError(Exception):
+    """Git could not answer; the text says why, and `hint` what to do.
+
+    Without one, something is missing or damaged in the repository; an empty one is for what cannot
+    be repaired there.
+    """
+
+    def __init__(self, message: str, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
+class Revision(NamedTuple):
+    """A revision's interface files below `root`, laid out as in the repository at `top`.
+
+    `submodules` are the paths of those that it has, of which nothing is below `root`. `skipped` are
+    the paths that git does not check out, as in a sparse checkout.
+    """
+
+    name: str
+    top: Path
+    root: Path
+    submodules: tuple[str, ...] = ()
+    skipped: frozenset[str] = frozenset()
+
+    def counterpart(self, path: str) -> str | None:
+        """Return where a path of the working tree is in the revision; `None` outside of it."""
+        try:
+            return (self.root / absolute(path).resolve().relative_to(self.top)).as_posix()
+        except ValueError:
+            return None
+
+    def files(
+        self, paths: Iterable[str], exclude: Exclusions, report: Report
+    ) -> tuple[InterfaceFile, ...]:
+        """Return the interface files that paths of the working tree meant; there may be none."""
+        there = [place for path in paths if (place := self.counterpart(path))]
+        places = [place for place in there if Path(place).exists()]
+        found = look(places, report, exclude.seen_from(self.root, self.top)).files
+        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
+
+    def holds(self, path: Path) -> bool:
+        """Return whether a file of the working tree is in this repository, not in another."""
+        return _top(path) == self.top
+
+    def unknown(self, paths: Iterable[str]) -> Iterator[str]:
+        """Yield the submodules below paths that are none any more: what they held is not known."""
+        places = [Path(place) for path in paths if (place := self.counterpart(path))]
+        for name in self.submodules:
+            now = self.top / name
+            is_meant = any((self.root / name).is_relative_to(place) for place in places)
+            # a folder that is empty was not checked out
+            if is_meant and not os.path.lexists(now / ".git") and not _is_empty(now):
+                yield name
+
+    def is_skipped(self, shown: str) -> bool:
+        """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
+        path = PurePath(shown.removeprefix(self._shown(self.root)[:-1]))
+        names = (one.as_posix() for one in (path, *path.parents))
+        return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
+
+    def _shown(self, path: Path) -> str:
+        """Return how a file of the revision is called in messages."""
+        return f"git:{self.name}:{path.relative_to(self.root).as_posix()}"
+
+
+@contextmanager
+def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | None]:
+    """Provide the revision `name` of the repository that holds `path`, `None` after IDL630.
+
+    Nothing in the repository is touched.
+    """
+    with TemporaryDirectory(prefix="idlc-") as place:
+        root = Path(place).resolve()
+        (root / ".git").mkdir()  # what is above is not part of the repository
+        hint, top = "", Path()
+        try:
+            top = _repository(path)
+            hint = _NAMES
+            identity = _commit(name, top)
+            hint = _DAMAGED
+            entries = _extract(top, identity, root)
+            submodules = tuple(one.path for one in entries if one.mode == _SUBMODULE)
+            skipped = _skipped(top, entries)
+        except GitError as error:
+            message = f"cannot read `git:{name}`: {one_line(str(error))}"
+            if error.hint is None and hint:
+                hint = _completing(top) or hint
+            said = hint if error.hint is None else error.hint
+            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=said or None))
+            revision = None
+        else:
+            revision = Revision(name, top, root, submodules, skipped)
+        yield revision
+
+
+def _completing(top: Path) -> str:
+    """Return how to complete a clone that lacks things on purpose; empty for any other one."""
+    with suppress(GitError):
+        if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
+            return _SHALLOW
+        _git(top, ["config", "--get-regexp", r"^remote\..*\.promisor$", "^true$"])
+        return _PARTIAL
+    return ""
+
+
+def is_revision(name: str, path: str) -> bool:
+    """Return whether a name means a revision of the repository that holds `path`, and no file."""
+    return not os.path.lexists(name) and commit(name, path) is not None
+
+
+def commit(name: str, path: str) -> str | None:
+    """Return which commit a name means in the repository that holds `path`, if it means one."""
+    with suppress(GitError):
+        return _commit(name, _repository(path))
+    return None
+
+
+def places(path: str) -> tuple[Path, ...]:
+    """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
+    with suppress(GitError):
+        top = _repository(path)
+        lines = _git(top, ["rev-parse", "--git-dir", "--git-common-dir"]).splitlines()
+        return tuple(dict.fromkeys(top / os.fsdecode(line) for line in lines))
+    return ()
+
+
+def setting(name: str) -> str:
+    """Return one of the user's settings of git, on one line; empty if there is none."""
+    with suppress(GitError):
+        here = absolute(".")
+        found = _git(_top(here) or here, ["config", "--get", name])
+        return one_line(found.decode("utf-8", errors="replace").strip())
+    return ""
+
+
+def _top(path: Path) -> Path | None:
+    """Return the closest folder around a path that has a `.git`.
+
+    Git would also take a tracked folder for a repository that only looks like the inside of one.
+    """
+    real = path.resolve()
+    return next((one for one in (real, *real.parents) if os.path.lexists(one / ".git")), None)
+
+
+def _repository(path: str) -> Path:
+    """Return the top of the working tree that holds a path."""
+    top = _top(absolute(path))
+    if top is None:
+        raise GitError("not in a git repository")
+    other = os.fsdecode(_git(top, ["rev-parse", "--show-toplevel"]).rstrip(b"\r\n"))
+    if not other or Path(other).resolve() != top:
+        raise GitError(f"`{top.as_posix()}` is not the top of a working tree")
+    return top
+
+
+def _commit(name: str, top: Path) -> str:
+    found = b""
+    if name and not name.startswith("-"):
+        words = ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"]
+        found = _git(top, words, otherwise="no such revision").rstrip()
+    if not _HASH.fullmatch(found):
+        raise GitError("no such revision")
+    return found.decode()
+
+
+def _program() -> str:
+    """Return the git on PATH; what lies in the working folder is not the user's."""
+    name = "git.exe" if os.name == "nt" else "git"
+    for entry in map(Path, os.get_exec_path()):
+        if entry.is_absolute() and os.access(entry / name, os.X_OK) and (entry / name).is_file():
+            return str(entry / name)
+    raise GitError("there is no `git` on PATH", "")
+
+
+def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "") -> bytes:
+    """Return what git prints; raise GitError, with git's own words, if it fails.
+
+    Without words of its own, `otherwise` is the reason.
+    """
+    options = [word for pair in _SETTINGS.items() for word in ("-c", "=".join(pair))]
+    command = [_program(), *options, "-C", str(top), *words]
+    kept = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
+    try:
+        with TemporaryFile() as asked, TemporaryFile() as said:
+            asked.write(given)
+            asked.seek(0)
+            with subprocess.Popen(  # noqa: S603 - no shell, and no option can be smuggled in
+                command, stdin=asked, stdout=subprocess.PIPE, stderr=said, env=kept | _ENVIRONMENT
+            ) as process:
+                assert process.stdout is not None
+                timer = Timer(PATIENCE, process.kill)
+                timer.start()
+                try:
+                    answer = process.stdout.read(MOST + 1)
+                finally:
+                    timer.cancel()
+                if len(answer) > MOST:
+                    process.kill()
+                    raise GitError(f"more than {MOST >> 20} MiB of files", "")
+            said.seek(0)
+            lines = list(filter(None, said.read(10_000).decode("utf-8", "replace").splitlines()))
+    except (OSError, ValueError) as error:
+        raise GitError(f"git cannot be run: {reason(error)}", "") from None
+    if process.returncode:
+        why = otherwise or f"`git {words[0]}` ended with status {process.returncode}"
+        bad = [line[len(_BAD[0]) :] for line in lines if line.startswith(_BAD)]
+        said_to_do = next((line.strip() for line in lines if line.startswith("\tgit ")), "")
+        hint = f"`{one_line(said_to_do)}`" if said_to_do else None
+        raise GitError("; ".join(dict.fromkeys(bad)) or next(iter(lines), why), hint)
+    return answer
+
+
+def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
+    """Write a commit's interface files, package.xml files and links; return all its entries."""
+    listed = _git(top, ["ls-tree", "-r", "-z", "--full-tree", commit])
+    *lines, rest = listed.split(b"\0")
+    entries = [_entry(line) for line in lines]
+    wanted = [one for one in entries if _is_wanted(one)]
+    names = list(dict.fromkeys(one.identity for one in wanted))
+    contents = dict(zip(names, _contents(top, names), strict=True))
+    if rest:
+        raise GitError("git's list of files ends in the middle")
+    try:
+        for mode, identity, path in wanted:
+            target = root / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            if mode != _LINK:
+                target.write_bytes(contents[identity])
+        _link(root, {path: contents[identity] for mode, identity, path in wanted if mode == _LINK})
+    except (OSError, ValueError) as error:
+        raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
+    return entries
+
+
+def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
+    """Return what git leaves out of the working tree, if any file of a commit is not there."""
+    if all(os.path.lexists(top / one.path) for one in entries if _is_wanted(one)):
+        return frozenset()
+    *lines, rest = _git(top, ["ls-files", "-t", "-z"]).split(b"\0")
+    if rest or not all(line[1:2] == b" " for line in lines):
+        raise GitError("git's list of files is damaged")
+    found = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
+    return frozenset(found)
+
+
+def _link(root: Path, links: dict[str, bytes]) -> None:
+    """Make a revision's links, but for those that lead out of it."""
+    made = []
+    for path, content in links.items():
+        target = root / path
+        with suppress(OSError, ValueError):  # not every system has links
+            target.symlink_to(os.fsdecode(content))
+            made.append(target)
+    for target in made:
+        try:
+            target.stat()  # the system follows a few links only, so that few are resolved
+            is_inside = target.resolve().is_relative_to(root)
+        except OSError:
+            is_inside = False
+        if not is_inside:
+            target.unlink()
+
+
+class _Entry(NamedTuple):
+    mode: bytes
+    identity: bytes
+    path: str
+
+
+def _entry(line: bytes) -> _Entry:
+    """Return an entry of a tree."""
+    found = _ENTRY.fullmatch(line)
+    if found is None:
+        raise GitError("git's list of files is damaged")
+    return _Entry(found[1], found[2], found[3].decode("utf-8", "surrogateescape"))
+
+
+def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:
+    """Yield what objects hold, which have to be files."""
+    asked = b"".join(name + b"\n" for name in names)
+    answer = _git(top, ["cat-file", "--batch"], asked) if names else b""
+    at = 0
+    for name in names:
+        end = answer.find(b"\n", at)
+        head = answer[at:end].split(b" ")
+        if end < 0 or len(head) != 3 or head[:2] != [name, b"blob"] or not head[2].isdigit():
+            raise GitError(f"git does not have all of its files: {name.decode()} is missing")
+        at = end + 1 + int(head[2])
+        if answer[at : at + 1] != b"\n":
+            raise GitError(f"git's answer ends in the middle of {name.decode()}")
+        yield answer[end + 1 : at]
+        at += 1
+
+
+def _is_wanted(entry: _Entry) -> bool:
+    pure = PurePath(entry.path)
+    is_inside = not pure.anchor and ".." not in pure.parts
+    if entry.mode == _LINK:
+        return is_inside
+    is_wanted = pure.suffix in KINDS or pure.name in (MANIFEST, *CLOSING)
+    return is_inside and is_wanted and entry.mode.startswith(b"100")
+
+
+def _is_empty(folder: Path) -> bool:
+    try:
+        return not any(folder.iterdir())
+    except OSError:
+        return False

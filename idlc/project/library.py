@@ -1,0 +1,395 @@
+"""Where other packages' interfaces are: along -I, in the ament prefixes, in the catalogue."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report, first_few
+from idlc.diagnostics.text import closest, did_you_mean, including
+from idlc.model import catalog, derive, ir
+from idlc.model.distros import DEFAULT, Distro
+from idlc.project import inputs, prefixes
+from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, is_file, is_folder, shown
+from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
+from idlc.project.package_xml import declared_name, manifest
+from idlc.project.prefixes import installed
+from idlc.project.scope import Scope
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.source import Source
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+class Folder:
+    """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
+
+    def __init__(self, path: str | Path) -> None:
+        self._path = absolute(path)
+
+    def roots(self, package: str) -> Iterator[Path]:
+        """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
+        direct = [
+            root
+            for root in (self._path / package, self._path / "share" / package)
+            if _has_interfaces(root)
+        ]
+        yield from direct or self._packages.get(package, [])
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of the packages found in it."""
+        return self._packages
+
+    @cached_property
+    def _packages(self) -> dict[str, list[Path]]:
+        """Every package at any depth, by name; made only when the direct look-up fails."""
+        ignored = Report()
+        found: dict[str, list[Path]] = {}
+        files = (path for path in walk(self._path, ignored) if path.suffix in KINDS)
+        for root in sorted({root_of(str(file.parent)) for file in files}):
+            declared = manifest(root)
+            name = declared_name(declared, "", ignored) if declared else None
+            found.setdefault(name or root.name, []).append(root)
+        return found
+
+
+class Prefix:
+    """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg.
+
+    Standard interfaces of another distribution than that which files are read for are not seen.
+    """
+
+    def __init__(self, path: Path, distro: Distro) -> None:
+        self._path = path
+        self._share = path / "share"
+        self._distro = distro
+
+    @cached_property
+    def _is_of_another(self) -> bool:
+        found = installed(self._path)
+        return bool(found and found.name and found.name != self._distro.name)
+
+    def roots(self, package: str) -> Iterator[Path]:
+        """Yield the folder of an installed package."""
+        if not (self._is_of_another and catalog.is_standard(package)):
+            yield self._share / package
+
+    def packages(self) -> Iterable[str]:
+        """Return the names of installed packages that have interfaces."""
+        try:
+            found = [path.name for path in self._share.iterdir() if _has_interfaces(path)]
+        except OSError:
+            return []
+        return [name for name in found if any(self.roots(name))]
+
+
+def _has_interfaces(root: Path) -> bool:
+    return any(os.path.isdir(f"{root}/{kind}") for kind in KIND_FOLDERS)  # noqa: PTH112 - for each look
+
+
+class Library:
+    """Interfaces of all packages that can be found, as `link.Library`.
+
+    `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
+    a single file finds its neighbours, unless they are excluded. `texts` come before all others.
+    Files that cannot be read are reported. `distro` is the distribution that files are read for.
+    """
+
+    def __init__(
+        self,
+        folders: Sequence[str],
+        report: Report,
+        *,
+        own: Mapping[str, Sequence[Path]] | None = None,
+        exclude: Exclusions = NOTHING,
+        distro: Distro = DEFAULT,
+        texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
+        unsaved: Unsaved = NOTHING_OPEN,
+    ) -> None:
+        self.distro = distro
+        self.texts = texts
+        places = [Folder(path) for path in folders]
+        self._missing = [path for path in folders if not is_folder(Path(path))]
+        self._places: tuple[Folder | Prefix, ...] = (
+            *places,
+            *(Prefix(path, distro) for path in prefixes.ament_prefixes()),
+        )
+        self._own = own or {}
+        self._exclude = exclude
+        self._unsaved = unsaved
+        self._known: dict[str, list[Path]] = {}
+        self._sources: dict[ir.TypeName, tuple[Source | None, Report]] = {}
+        self._packages: list[str] | None = None
+        self._listed: dict[str, list[tuple[ir.Kind, str]]] = {}
+        self.report_to(report)
+
+    def report_to(self, report: Report) -> None:
+        """Report what is wrong with what is asked for from now on, known or not."""
+        self._report = report
+        for path in self._missing:
+            report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
+
+    def _roots(self, package: str) -> list[Path]:
+        """Return the folders that may hold a package's interfaces, in order of precedence."""
+        known = self._known.get(package)
+        if known is None:
+            found = (root for place in self._places for root in place.roots(package))
+            known = [*self._own.get(package, ()), *(root for root in found if is_folder(root))]
+            self._known[package] = known
+        return known
+
+    def path(self, name: ir.TypeName) -> Path | None:
+        """Return the file of an interface on disk, or `None`."""
+        if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
+            return None
+        file = f"{name.name}.{name.kind}"
+        places = self._roots(name.package)
+        paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
+        exclude = self._excluded(name.package)
+        found = (one for one in paths if self._unsaved.is_file(one) and not exclude.has(one))
+        return next(map(Path, found), None)
+
+    def _excluded(self, package: str) -> Exclusions:
+        """Return what is left out of a package: of others than the compiled ones, nothing."""
+        return self._exclude if package in self._own else NOTHING
+
+    def source(self, name: ir.TypeName) -> Source | None:
+        """Return the text of an interface, or `None` if there is none of that name."""
+        if name in self.texts:
+            return self.texts[name]
+        if name not in self._sources:
+            self._sources[name] = self._read(name)
+        source, problems = self._sources[name]
+        self._report.extend(problems)
+        return source
+
+    def _read(self, name: ir.TypeName) -> tuple[Source | None, Report]:
+        problems = Report()
+        path = self.path(name)
+        if path is None:
+            return self._built_in(name), problems
+        return self._unsaved.read_source(path, shown(path), problems), problems
+
+    def _built_in(self, name: ir.TypeName) -> Source | None:
+        # generated code is the same for all: it has events where ROS 2 has none, too
+        of = DEFAULT if name == derive.SERVICE_EVENT_INFO else self.distro
+        return catalog.source(name, of)
+
+    def names(self, package: str) -> Iterable[str]:
+        """Return the names of a package's messages; empty for an unknown package."""
+        told = [one.name for one in self.texts if (one.package, one.kind) == (package, "msg")]
+        on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
+        return [*told, *(on_disk or catalog.names(package, self.distro))]
+
+    def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
+        """Return every interface of a package, sorted."""
+        on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
+        known = on_disk or (*catalog.interfaces(self.distro), derive.SERVICE_EVENT_INFO)
+        return tuple(sorted({name for name in (*known, *self.texts) if name.package == package}))
+
+    def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
+        """Return kind and name of each file of a package, from the first place that has any.
+
+        What is being compiled is one place, of however many folders.
+        """
+        if not _NAME.fullmatch(package):
+            return []
+        known = self._listed.get(package)
+        if known is None:
+            known = self._listed[package] = self._list(package)
+        return known
+
+    def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
+        exclude = self._excluded(package)
+        folders = self._own.get(package, ())
+        own = {one for root in folders for one in self._interfaces(root, exclude)}
+        if own:
+            return sorted(own)
+        roots = (self._interfaces(root, exclude) for root in self._roots(package))
+        return next(filter(None, roots), [])
+
+    def home(self, package: str) -> Path | None:
+        """Return the folder that a package's interfaces lie in; `None` if they are built in."""
+        return next((root for root in self._roots(package) if self._interfaces(root)), None)
+
+    def packages(self) -> Sequence[str]:
+        """Return the names of all packages, sorted."""
+        if self._packages is None:
+            found = set(catalog.packages(self.distro)) | set(self._own)
+            found |= {name.package for name in self.texts}
+            self._packages = sorted(found.union(*(place.packages() for place in self._places)))
+        return self._packages
+
+    def nearby(self, package: str) -> str | None:
+        """Return what finds a package that lies beside one of those being compiled."""
+        for root in (root for roots in self._own.values() for root in roots):
+            declared = manifest(root)
+            beside = (declared.parent if declared else root).parent
+            if _NAME.fullmatch(package) and _has_interfaces(beside / package):
+                folder = os.path.relpath(beside)
+                return f"it is in `{Path(folder, package).as_posix()}`: {including(folder)}"
+        return None
+
+    def _interfaces(self, root: Path, exclude: Exclusions = NOTHING) -> list[tuple[ir.Kind, str]]:
+        """Return kind and name of each interface file of a folder and of its folders for kinds."""
+        return sorted(
+            {
+                (KINDS[path.suffix], path.stem)
+                for folder in (root, *(root / kind for kind in KIND_FOLDERS))
+                for path in self._files(folder)
+                if path.suffix in KINDS and not exclude.has(path)
+            }
+        )
+
+    def _files(self, folder: Path) -> list[Path]:
+        new = [path for path in self._unsaved.new_below(folder) if path.parent == folder]
+        try:
+            return new + [path for path in folder.iterdir() if is_file(path)]
+        except OSError:
+            return new
+
+
+_DIVIDER = re.compile(r"/|\.|::")
+_LISTED = 5
+
+
+class Package(NamedTuple):
+    """A package that is known here; `path` is `None` if it is built in."""
+
+    name: str
+    interfaces: int
+    path: str | None
+
+
+class Meant(NamedTuple):
+    """A type that a text means, and the interface whose file defines it."""
+
+    name: ir.TypeName
+    interface: ir.TypeName
+
+
+def packages(scope: Scope, report: Report) -> list[Package]:
+    """Return all packages that are known here, those below the working folder included."""
+    library = _wide(scope, report)
+    return [_package(name, library) for name in library.packages()]
+
+
+def _package(name: str, library: Library) -> Package:
+    home = library.home(name)
+    return Package(name, len(library.interfaces(name)), shown(home) if home else None)
+
+
+def interfaces(wanted: Sequence[str], scope: Scope, report: Report) -> list[str]:
+    """Return the names of all interfaces of packages; reports IDL618."""
+    library = _wide(scope, report)
+    found = []
+    for package in wanted:
+        names = [str(one) for one in library.interfaces(package)]
+        if not names:
+            hint = did_you_mean(package, library.packages()) or "`idlc list` names the packages"
+            message = f"no package `{package}` is known here"
+            report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
+        found += names
+    return found
+
+
+def _near(scope: Scope, report: Report) -> Library:
+    return Library(scope.include, report, own=inputs.near(), distro=scope.distro)
+
+
+def _wide(scope: Scope, report: Report) -> Library:
+    own = {**inputs.below(), **inputs.near()}
+    return Library(scope.include, report, own=own, distro=scope.distro)
+
+
+def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Meant, ...]]:
+    """Return the types that a text means, and where they are found; reports IDL618.
+
+    `package/kind/Name`, `package/Name` and `Name` mean one type, also with dots or `::`, and
+    `package` means all of its interfaces. Folders below are searched for what is not found else.
+    """
+    library = _near(scope, report)
+    meant = _meant(text, library)
+    if not meant:
+        library = _wide(scope, Report())
+        meant = _meant(text, library)
+    if len(meant) == 1 or text in library.packages():
+        return library, meant
+    report.add(_several(text, meant) if meant else _nothing(text, library))
+    return library, ()
+
+
+def _meant(text: str, library: Library) -> tuple[Meant, ...]:
+    """Return every type that a text may mean."""
+    match _DIVIDER.split(text):
+        case [package, kind, name]:
+            places = [(package, one) for one in ir.KINDS if one == kind]
+        case [package, name]:
+            # as in interface files, it is a message if there is one
+            if found := _found(ir.TypeName(package, "msg", name), library):
+                return (found,)
+            places = [(package, kind) for kind in ir.KINDS]
+        case [package] if package in library.packages():
+            return tuple(Meant(one, one) for one in library.interfaces(package))
+        case [name]:
+            places = [(package, kind) for package in library.packages() for kind in ir.KINDS]
+        case _:
+            return ()
+    names = (ir.TypeName(package, kind, name) for package, kind in places)
+    return tuple(found for one in names if (found := _found(one, library)))
+
+
+def _found(name: ir.TypeName, library: Library) -> Meant | None:
+    """Return a type and its interface, which for a derived type has a shorter name."""
+    interface = name
+    while library.source(interface) is None:
+        shorter, _, rest = interface.name.rpartition("_")
+        if not shorter or not rest or name.kind == "msg":
+            return None
+        interface = interface._replace(name=shorter)
+    return Meant(name, interface)
+
+
+def _several(text: str, meant: Sequence[Meant]) -> Diagnostic:
+    names = first_few((f"`{one.name}`" for one in meant), _LISTED)
+    message = f"`{text}` may be {len(meant)} types"
+    return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}")
+
+
+def _nothing(text: str, library: Library) -> Diagnostic:
+    if not _DIVIDER.search(text):
+        message = f"`{text}` is no file or folder, and no type or package that is known here"
+    else:
+        message = f"no such type: `{text}`"
+    hint = _similar(_DIVIDER.split(text), library) or "`idlc list` shows what is known here"
+    return codes.NO_SUCH_TYPE.of("", message, hint=hint)
+
+
+def _similar(parts: Sequence[str], library: Library) -> str | None:
+    """Return the hint that names what is nearest to a type's or package's name."""
+    if len(parts) == 1:
+        named = {one.name: str(one) for one in _all(library)}
+        near = closest(parts[0], [*inputs.names(), *named, *library.packages()])
+        return f"did you mean `{named.get(near, near)}`?" if near else None
+    package = closest(parts[0], library.packages()) or ""
+    named = {one.name: str(one) for one in library.interfaces(package)}
+    if package == parts[0]:
+        near = closest(parts[-1], named)
+        return (
+            f"did you mean `{named[near]}`?" if near else f"`idlc list {package}` names its types"
+        )
+    if parts[-1] in named:
+        return f"did you mean `{named[parts[-1]]}`?"
+    return f"package `{parts[0]}` is not known: point -I to it, or source its workspace"
+
+
+def _all(library: Library) -> Iterator[ir.TypeName]:
+    for package in library.packages():
+        yield from library.interfaces(package)

@@ -1,0 +1,284 @@
+"""What a package.xml says, and where: every element with its place in the file, in bytes.
+
+The positions are expat's, so that a file can be edited without being written anew.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+from xml.parsers import expat
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source, Span
+from idlc.project.files import NOTHING_OPEN, Unsaved, is_file, read_bytes, read_source
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
+
+
+class Statement(msgspec.Struct, frozen=True):
+    """An element directly below <package>, or below its <export>; `span` is its start tag."""
+
+    tag: str
+    text: str
+    span: Span
+    attributes: Mapping[str, str] = {}
+
+
+class GeneratedOutput(msgspec.Struct, frozen=True):
+    """Code that idlc generated within the package: its lock, and the inputs recorded in it."""
+
+    path: str
+    package: str
+    inputs: Mapping[str, str]
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """A package with a package.xml.
+
+    `modules` are its Python files by dotted name, tests excluded. `inputs` are the digests of its
+    interface files by name within the package, empty without `outputs`; `whole` is whether these
+    files are all that it has. `generates` is whether its CMakeLists.txt
+    generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
+    whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    `files` are the paths of interface files in the package's folder by name within the package.
+    `folders` are those with files by dotted name, and whether they are Python packages.
+    """
+
+    name: str
+    manifest: Source
+    statements: tuple[Statement, ...]
+    inputs: Mapping[str, str]
+    modules: Mapping[str, Source]
+    setup_py: Source | None = None
+    setup_cfg: Source | None = None
+    pyproject: Source | None = None
+    cmake: Source | None = None
+    generates: bool = False
+    native: bool = False
+    marker: bool = False
+    whole: bool = False
+    outputs: tuple[GeneratedOutput, ...] = ()
+    known: frozenset[str] = frozenset()
+    files: Mapping[str, str] = {}
+    folders: Mapping[str, bool] = {}
+
+    def declared(self, *tags: str) -> dict[str, Statement]:
+        """Return the statements with one of these tags by their text, the first of each."""
+        found: dict[str, Statement] = {}
+        for statement in self.statements:
+            if statement.tag in tags:
+                found.setdefault(statement.text, statement)
+        return found
+
+    @property
+    def build_type(self) -> str:
+        """What builds it; CMake unless it says otherwise."""
+        return next(iter(self.declared("build_type")), "ament_cmake")
+
+    @property
+    def place(self) -> Span:
+        """Where problems with the whole package.xml are shown: at its name."""
+        named = self.declared("name")
+        return next(iter(named.values())).span if named else Span(self.manifest, 0, 0)
+
+
+#: The elements whose children matter.
+_PARENTS = (("package",), ("package", "export"))
+_DEPTHS = tuple(len(parents) + 1 for parents in _PARENTS)
+
+
+#: The elements of a package.xml in the order of the schema: dependencies come after the head.
+HEAD = ("name", "version", "description", "maintainer", "license", "url", "author")
+DEPENDENCIES = (
+    *("build_depend", "build_export_depend", "buildtool_depend", "buildtool_export_depend"),
+    *("exec_depend", "run_depend", "depend", "doc_depend", "test_depend"),
+    *("conflict", "replace", "group_depend", "member_of_group"),
+)
+RANK = {tag: at for at, tag in enumerate((*HEAD, *DEPENDENCIES))}
+
+
+class NotXmlError(ValueError):
+    """The text is not XML; `line`, from 1, and `column`, from 0, are known unless `line` is 0."""
+
+    def __init__(self, message: str, line: int = 0, column: int = 0) -> None:
+        super().__init__(message)
+        self.line = line
+        self.column = column
+
+
+class Element(NamedTuple):
+    """An element with its parents and all text in it; `start` and `end` are offsets of bytes."""
+
+    parents: tuple[str, ...]
+    tag: str
+    text: str
+    start: int
+    end: int
+    attributes: Mapping[str, str]
+
+
+class Manifest(NamedTuple):
+    """The elements of a package.xml in order, those of its `<export>` included."""
+
+    format: str
+    elements: tuple[Element, ...]
+
+    @property
+    def children(self) -> tuple[Element, ...]:
+        """The elements directly within `<package>`."""
+        return tuple(element for element in self.elements if element.parents == ("package",))
+
+    def texts(self, *tags: str) -> list[str]:
+        """Return the texts of the children with one of these tags."""
+        return [element.text for element in self.children if element.tag in tags]
+
+
+def read(data: bytes, encoding: str | None = None) -> Manifest:
+    """Return what the bytes of a file say; raises NotXmlError.
+
+    `encoding` is for bytes that are not as the file's own declaration says.
+    """
+    reader = _Reader(data, encoding)
+    try:
+        reader.parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise NotXmlError(str(error).partition(":")[0], error.lineno, error.offset) from error
+    except (ValueError, LookupError) as error:  # an unknown encoding
+        raise NotXmlError(str(error).partition(":")[0]) from error
+    return Manifest(reader.format, tuple(sorted(reader.found, key=lambda one: one.start)))
+
+
+class _Reader:
+    """Collects elements while expat reads.
+
+    `open` are the tags of the open elements, `begun` start, attributes and texts of those that may.
+    """
+
+    def __init__(self, data: bytes, encoding: str | None) -> None:
+        self.data = data
+        self.format = ""
+        self.found: list[Element] = []
+        self.open: list[str] = []
+        self.begun: list[tuple[int, dict[str, str], list[str]]] = []
+        self.parser = expat.ParserCreate(encoding)
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        if not self.open and tag == "package":
+            self.format = attributes.get("format", "1")
+        self.open.append(tag)
+        if len(self.open) in _DEPTHS:
+            self.begun.append((self.parser.CurrentByteIndex, attributes, []))
+
+    def _end(self, tag: str) -> None:
+        depth = len(self.open)
+        self.open.pop()
+        if depth in _DEPTHS:
+            start, attributes, texts = self.begun.pop()
+            if (parents := tuple(self.open)) in _PARENTS:
+                end = self.data.find(b">", self.parser.CurrentByteIndex) + 1
+                text = "".join(texts).strip()
+                self.found.append(Element(parents, tag, text, start, end, attributes))
+
+    def _text(self, text: str) -> None:
+        for _, _, texts in self.begun:
+            texts.append(text)
+
+
+def statements(source: Source) -> tuple[Statement, ...]:
+    """Return what the text of a package.xml says, in order; empty if it is not XML."""
+    data = source.text.encode("utf-8")
+    try:
+        manifest = read(data, "utf-8")
+    except NotXmlError:
+        return ()
+    return tuple(_placed(manifest.elements, source, data))
+
+
+def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterator[Statement]:
+    at = characters = 0
+    for element in elements:
+        characters += len(data[at : element.start].decode("utf-8"))
+        at = element.start
+        span = Span(source, characters, characters + len(element.tag) + 2)
+        yield Statement(element.tag, element.text, span, element.attributes)
+
+
+MANIFEST = "package.xml"
+
+
+@lru_cache(maxsize=1024)
+def manifest(folder: Path) -> Path | None:
+    """Return the nearest package.xml at or above an absolute folder, within its repository."""
+    for here in map(str, (folder, *folder.parents)):
+        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
+        if is_file(path):
+            return Path(path)
+        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
+            break
+    return None
+
+
+def declared_name(
+    path: Path, name: str, report: Report, unsaved: Unsaved = NOTHING_OPEN
+) -> str | None:
+    """Return the package name in a package.xml; report IDL610 and return `None` without one."""
+    data = unsaved.read_bytes(path, name, report)
+    if data is None:
+        return None
+    try:
+        declared = next(iter(read(data).texts("name")), "")
+    except NotXmlError as error:
+        report.add(_broken(data, name, error))
+        return None
+    if not declared:
+        report.add(
+            codes.BAD_PACKAGE_XML.of(
+                name,
+                "no package name in this file",
+                hint="add `<name>my_package</name>` within `<package>`, or give --package NAME",
+            )
+        )
+        return None
+    return declared
+
+
+def declared_version(path: Path) -> str:
+    """Return the version in a package.xml; empty if it has none or cannot be read."""
+    return _version(read_bytes(path, path.as_posix(), Report()) or b"")
+
+
+@lru_cache(maxsize=64)
+def _version(data: bytes) -> str:
+    with contextlib.suppress(NotXmlError):
+        return next(iter(read(data).texts("version")), "")
+    return ""
+
+
+def _broken(data: bytes, name: str, error: NotXmlError) -> Diagnostic:
+    message = f"not well-formed XML: {error}"
+    hint = "fix the file, or give --package NAME"
+    if not error.line:
+        return codes.BAD_PACKAGE_XML.of(name, message, hint=hint)
+    source = Source(name, data.decode("utf-8", errors="replace"))
+    line = min(error.line, len(source.line_starts))
+    start = min(source.line_starts[line - 1] + error.column, len(source.text))
+    return codes.BAD_PACKAGE_XML.at(Span(source, start, start + 1), message, hint=hint)
+
+
+def read_statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
+    """Return what a package.xml says, in order; empty for a file that cannot be read as XML."""
+    source = read_source(path, name, report)
+    return () if source is None else statements(source)

@@ -1,0 +1,188 @@
+"""What is installed in a prefix: the packages with interfaces, and their libraries."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from importlib.machinery import PathFinder
+from pathlib import Path
+from typing import NamedTuple
+
+from idlc.diagnostics.report import Report, first_few
+from idlc.model import distros
+from idlc.model.names import is_package_name
+from idlc.project.files import is_file, is_folder, read_bytes, shown
+from idlc.project.package_xml import declared_version
+
+#: Where a prefix lists what is installed in it, by kind and name.
+INDEX = "share/ament_index/resource_index"
+
+
+def ament_prefixes() -> tuple[Path, ...]:
+    """Return the folders that ROS packages are installed in, in order of precedence."""
+    listed = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return tuple(dict.fromkeys(Path(prefix) for prefix in (*listed, sys.prefix) if prefix))
+
+
+def modules_folder() -> str:
+    """Return the folder of a prefix in which the Python of ROS 2 here looks for modules."""
+    found = (
+        path.parent.relative_to(prefix).as_posix()
+        for prefix in ament_prefixes()
+        for path in sorted(prefix.glob("lib/python3*/site-packages/rclpy"))
+    )
+    own = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+    return next(found, own)
+
+
+def runs_nodes() -> bool:
+    """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
+    return bool(python_folders("rclpy"))
+
+
+def python_folders(package: str) -> list[Path]:
+    """Return the folders that importing a package would use, without importing it."""
+    spec = PathFinder.find_spec(package, sys.path)
+    return [Path(place) for place in (spec and spec.submodule_search_locations) or ()]
+
+
+def machine() -> str:
+    """Return the processor that programs here are for, such as `x86_64`; empty if not on Linux."""
+    whole = sys.maxsize > 1 << 32  # a 32-bit Python on a 64-bit kernel
+    if sys.platform != "linux" or not whole:
+        return ""
+    import platform  # slow to import, for what few runs ask
+
+    return platform.machine()
+
+
+def wheel_platform() -> str:
+    """Return the platform tag of wheels with libraries for this machine.
+
+    The libraries need none of the system's, so they run wherever the generated code does: the tags
+    are those of the oldest systems that have a Python for it.
+    """
+    import platform
+
+    libc = "manylinux_2_17" if platform.libc_ver()[0] == "glibc" else "musllinux_1_1"
+    return f"{libc}_{machine()}"
+
+
+#: What is taken where nothing of ROS 2 is installed.
+DEFAULT = distros.DEFAULT.name
+#: The distribution of each release of rosidl, which is in every installation of ROS 2.
+_BY_VERSION = {
+    "3.1": "humble",
+    "4.0": "iron",
+    "4.6": "jazzy",
+    "4.9": "kilted",
+    "5.2": "lyrical",
+    "5.3": "rolling",
+}
+_TELLING = "share/rosidl_runtime_c/package.xml"
+
+
+class Distribution(NamedTuple):
+    """A distribution, by the name that ROS_DISTRO has for it; `why` says by what it is known.
+
+    One that this idlc does not know has an empty name.
+    """
+
+    name: str
+    why: str
+
+
+def distribution(prefixes: Iterable[Path] | None = None) -> Distribution:
+    """Return the distribution that is installed in prefixes, by default in those of ROS 2.
+
+    The first that tells is right, or the one that ROS_DISTRO names if there are several. Where
+    nothing is installed, ROS_DISTRO alone counts: it is often set wrongly.
+    """
+    places = ament_prefixes() if prefixes is None else prefixes
+    found = list(filter(None, map(installed, places)))
+    wanted = os.environ.get("ROS_DISTRO", "")
+    if not found and wanted:
+        return Distribution(
+            wanted if wanted in _BY_VERSION.values() else "", f"ROS_DISTRO={wanted}"
+        )
+    chosen = [one for one in found if one.name == wanted] or found
+    return chosen[0] if chosen else Distribution(DEFAULT, "no ROS 2 is installed here")
+
+
+def installed(prefix: Path) -> Distribution | None:
+    """Return the distribution that a prefix itself holds; `None` for one that does not tell."""
+    version = declared_version(prefix / _TELLING)
+    if not version:
+        return None
+    name = _BY_VERSION.get(".".join(version.split(".")[:2]), "")
+    return Distribution(name, f"rosidl {version} in {prefix.as_posix()}")
+
+
+class InstalledPackage(NamedTuple):
+    """A package with interfaces that is in a prefix's index, by which C++ tools find it."""
+
+    prefix: Path
+    package: str
+
+    @property
+    def share(self) -> str:
+        """The folder of its interfaces."""
+        return shown(self.prefix / "share" / self.package)
+
+    def library(self, name: str) -> str:
+        """Return the path of one of its libraries, as people know it."""
+        return shown(self.prefix / "lib" / name)
+
+    def content(self, name: str) -> bytes | None:
+        """Return the content of one of its libraries, `None` where there is none to be read."""
+        path = self.prefix / "lib" / name
+        return read_bytes(path, shown(path), Report()) if is_file(path) else None
+
+
+def prefixes(folder: Path) -> list[Path]:
+    """Return the prefixes that a folder is or holds: colcon makes one for each package."""
+    if is_folder(folder / INDEX):
+        return [folder]
+    try:
+        inner = sorted(folder.iterdir())
+    except OSError:
+        return []
+    return [path for path in inner if is_folder(path / INDEX)]
+
+
+def installed_packages(prefix: Path) -> Iterator[InstalledPackage]:
+    """Yield the packages of a prefix that are registered as packages with interfaces."""
+    for name in _registered(prefix, "rosidl_interfaces"):
+        if is_file(prefix / INDEX / "packages" / name):
+            yield InstalledPackage(prefix, name)
+
+
+def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
+    """Yield each package whose entries in the index and files do not match, and what is wrong."""
+    interfaces = _registered(prefix, "rosidl_interfaces")
+    packages = set(_registered(prefix, "packages"))
+    for name in interfaces:
+        if name not in packages:
+            yield name, "has interfaces and is not a package there: `ros2 interface list` fails"
+            continue
+        path = prefix / INDEX / "rosidl_interfaces" / name
+        listed = (read_bytes(path, shown(path), Report()) or b"").decode("utf-8", "replace")
+        share = prefix / "share" / name
+        missing = [line for line in listed.split() if not is_file(share / line)]
+        if missing:
+            files = first_few((f"`{file[:80]}`" for file in missing), 3)
+            yield name, f"lists {files} there, and not all of it is installed"
+    for name in sorted(packages.difference(interfaces)):
+        share = prefix / "share" / name
+        if any(any((share / kind).glob(f"*.{kind}")) for kind in ("msg", "srv", "action")):
+            yield name, "has interfaces that are not listed there: `ros2 interface` misses them"
+
+
+def _registered(prefix: Path, kind: str) -> list[str]:
+    """Return the packages that have an entry of a kind in a prefix's index."""
+    try:
+        names = sorted(path.name for path in (prefix / INDEX / kind).iterdir())
+    except OSError:
+        return []
+    return [name for name in names if is_package_name(name)]

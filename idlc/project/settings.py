@@ -1,0 +1,266 @@
+"""`[tool.idlc]` of the nearest pyproject.toml: what would otherwise be typed each time.
+
+Paths in it are relative to the file's folder. A mistake is reported as IDL611.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
+
+import msgspec
+from msgspec import Meta
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.codes import BAD_CONFIG
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import did_you_mean
+from idlc.model.distros import BY_NAME, listed, unknown_distro
+from idlc.project.files import NOTHING_OPEN, Unsaved, decode, shown
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.report import Diagnostic
+
+Text = Annotated[str, Meta(title="a string")]
+Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
+TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
+Switch = Annotated[bool, Meta(title="true or false")]
+Table = Annotated[dict[str, Any], Meta(title="a table")]
+Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
+
+_Shape = TypeVar("_Shape", bound=msgspec.Struct)
+
+
+class Place(NamedTuple):
+    """A table of a file: its name, how messages call it, and its number among those of one name."""
+
+    source: Source
+    table: str
+    shown: str
+    number: int = 0
+
+    def wrong(self, key: str, message: str, report: Report, hint: str | None = None) -> None:
+        """Report what is wrong with a setting, where it stands."""
+        span = self._span(key)
+        report.add(
+            BAD_CONFIG.of(self.source.path, message, hint=hint)
+            if span is None
+            else BAD_CONFIG.at(span, message, hint=hint)
+        )
+
+    def no_url(self, key: str, value: str, report: Report) -> None:
+        """Report a URL: what a file of somebody else names is not fetched."""
+        if "://" in value:
+            message = f"`{key}` in {self.shown} is a URL"
+            self.wrong(key, message, report, "URLs are opened if they are typed")
+
+    def _span(self, key: str) -> Span | None:
+        """Return where a key of the table stands, else the table's header, else any such key."""
+        text = self.source.text
+        name = r"[ \t]*\.[ \t]*".join(map(re.escape, self.table.split(".")))
+        headers = [*re.finditer(rf"(?m)^[ \t]*\[+[ \t]*({name})[ \t]*\]", text)]
+        if self.number < len(headers):
+            header = headers[self.number]
+            after = re.compile(r"(?m)^[ \t]*\[").search(text, header.end())
+            found = _key(key).search(text, header.end(), after.start() if after else len(text))
+            return Span(self.source, *(found or header).span(1))
+        found = _key(key).search(text)
+        return Span(self.source, *found.span(1)) if found else None
+
+
+def _key(name: str) -> re.Pattern[str]:
+    return re.compile(rf"(?m)(?:^|[{{,])[ \t]*(?:[\w-]+\.)*[\"']?({re.escape(name)})[\"']?[ \t]*=")
+
+
+def read_table(
+    table: Mapping[str, Any], shape: type[_Shape], place: Place, report: Report
+) -> _Shape | None:
+    """Return a table as a Struct; what is wrong is reported and left out.
+
+    `None` means that something without a default is missing.
+    """
+    fields = {field.encode_name: field for field in msgspec.structs.fields(shape)}
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if key not in fields:
+            listed = ", ".join(f"`{known}`" for known in fields)
+            hint = did_you_mean(key, fields) or f"the settings are {listed}"
+            place.wrong(key, f"unknown setting `{key}` in {place.shown}", report, hint)
+            continue
+        read = read_value(value, fields[key].type, key, place, report)
+        if read is not None:
+            found[fields[key].name] = read
+    missing = [key for key, field in fields.items() if field.required and key not in table]
+    for key in missing:
+        what = _meta(fields[key].type).description
+        place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
+    required = {field.name for field in fields.values() if field.required}
+    return shape(**found) if required <= found.keys() else None
+
+
+def read_value(value: object, type_: Any, key: str, place: Place, report: Report) -> Any:
+    """Return a value as one of the types above; report one that is of another, return `None`."""
+    try:
+        return msgspec.convert(value, type_)
+    except msgspec.ValidationError:
+        what = _meta(type_).title
+        place.wrong(key, f"`{key}` in {place.shown} must be {what}", report)
+        return None
+
+
+def _meta(type_: Any) -> Meta:
+    return next(one for one in get_args(type_) if isinstance(one, Meta))
+
+
+FILE = "pyproject.toml"
+#: The square of the dots in each line, added up, from which on reading takes a second.
+_COSTLY = 10_000_000
+
+
+class Settings(msgspec.Struct, frozen=True, rename="kebab"):
+    """`[tool.idlc]` as it is written; `command_table` reads the tables of commands."""
+
+    paths: Texts = ()
+    include: Texts = ()
+    exclude: Texts = ()
+    out: Text = ""
+    package: Text = ""
+    vendor_deps: Switch = False
+    distro: TextOrTexts = ()
+    templates: Text = ""
+    breaking: Table = {}
+    check: Table = {}
+
+
+class Config(msgspec.Struct, frozen=True):
+    """The settings found; what is absent is empty or `None`. Paths are as one would type them.
+
+    `tables` holds the tables of single commands; `source` is the file, `folder` where it lies;
+    `exclude` is relative to that.
+    """
+
+    paths: tuple[str, ...] = ()
+    out: str | None = None
+    package: str | None = None
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    vendor_deps: bool = False
+    distro: tuple[str, ...] = ()
+    templates: str | None = None
+    tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
+    source: Source | None = None
+    folder: Path | None = None
+
+
+def load_settings(report: Report, unsaved: Unsaved = NOTHING_OPEN) -> Config:
+    """Return the settings that hold in the working folder."""
+    for folder in (here := Path.cwd(), *here.parents):
+        path = folder / FILE
+        if unsaved.is_file(path):
+            return _read(path, report, unsaved)
+    return Config()
+
+
+def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
+    name = shown(path)
+    data = unsaved.read_bytes(path, name, report)
+    if data is None or b"idlc" not in data:
+        return Config()
+    source = decode(data, name, report)
+    if source is None:
+        return Config()
+    if _has_costly_keys(source):
+        whole = Span(source, 0, len(source.text))
+        report.add(codes.BAD_CONFIG.at(whole, "a line has too many dots"))
+        return Config()
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    try:
+        document: dict[str, Any] = tomllib.loads(source.text)
+    except tomllib.TOMLDecodeError as error:
+        report.add(_broken(source, str(error)))
+        return Config()
+    tool = document.get("tool", {})
+    table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
+    return _checked(table, source, path.parent, report)
+
+
+def _has_costly_keys(source: Source) -> bool:
+    """Return whether reading a file as TOML might take long: quadratic in the parts of a key."""
+    return sum(line.count(".") ** 2 for line in source.text.splitlines()) > _COSTLY
+
+
+def _broken(source: Source, message: str) -> Diagnostic:
+    text, _, place = message.partition(" (at ")
+    numbers = [int(number) for number in re.findall(r"\d+", place)]
+    if len(numbers) == 2 and numbers[0] <= len(source.line_starts):
+        start = source.line_starts[numbers[0] - 1] + numbers[1] - 1
+    else:
+        start = len(source.text)
+    return codes.BAD_CONFIG.at(
+        Span(source, start, start + 1), f"not valid TOML: {text[:1].lower()}{text[1:]}"
+    )
+
+
+def _checked(table: object, source: Source, folder: Path, report: Report) -> Config:
+    """Return the settings in a table; report each that is unknown or of the wrong type."""
+    place = Place(source, "tool.idlc", "[tool.idlc]")
+    if not isinstance(table, dict):
+        place.wrong("idlc", "`tool.idlc` must be a table", report)
+        return Config()
+    found = read_table(table, Settings, place, report)
+    assert found is not None
+    for path in found.paths:
+        place.no_url("paths", path, report)
+    return Config(
+        paths=tuple(_typed(folder, path) for path in found.paths),
+        out=_typed(folder, found.out) if found.out else None,
+        package=found.package or None,
+        include=tuple(_typed(folder, path) for path in found.include),
+        exclude=found.exclude,
+        vendor_deps=found.vendor_deps,
+        distro=_distros(found.distro, place, report),
+        templates=_typed(folder, found.templates) if found.templates else None,
+        tables={"breaking": found.breaking, "check": found.check},
+        source=source,
+        folder=folder,
+    )
+
+
+def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tuple[str, ...]:
+    """Return the names of distributions; report those that are unknown."""
+    names = listed(value) if isinstance(value, str) else value
+    for name in names:
+        if name and name not in BY_NAME:
+            message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
+            place.wrong("distro", message, report, unknown_distro(name))
+    return tuple(name for name in names if name in BY_NAME)
+
+
+def _typed(folder: Path, path: str) -> str:
+    """Return a path in the file as one would type it in the working folder."""
+    whole = folder / path
+    try:
+        return Path(os.path.relpath(whole)).as_posix() if folder != Path.cwd() else path
+    except ValueError:
+        return whole.as_posix()
+
+
+def command_table(
+    config: Config, name: str, shape: type[_Shape], report: Report
+) -> tuple[_Shape, Place | None]:
+    """Return the table of a command and its place, without one where there is no file."""
+    if config.source is None:
+        return shape(), None
+    place = Place(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
+    found = read_table(config.tables.get(name, {}), shape, place, report)
+    assert found is not None
+    return found, place

@@ -1,0 +1,363 @@
+"""Classes without files of one's own: compiled when a program asks, and kept in a cache."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from importlib import import_module, invalidate_caches
+from pathlib import Path
+from shutil import rmtree
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from idlc.check.compiler import Compiler, library_for, sources_of
+from idlc.diagnostics.report import Report, Severity
+from idlc.generate.requested import wanted
+from idlc.generate.target import last_change
+from idlc.model import ir
+from idlc.model.python_names import class_
+from idlc.project.find import is_path
+from idlc.project.library import resolve
+from idlc.project.scope import Scope, scope
+from idlc.project.settings import Config
+from idlc.project.templates import RenderedFile
+from idlc.project.templates import folder as caches
+from idlc.recordings.containers.source import RecordingError
+from idlc.recordings.definitions import recorded
+from idlc.recordings.find import is_recording
+from idlc.recordings.types import Around, RecordedTypes, recorded_types
+from idlc.recordings.versions import read, versions
+from idlc.version import __version__
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+    from idlc.recordings.containers.container import Topic
+
+
+@cache
+def folder() -> Path:
+    """Return where packages are kept, by default with idlc's other caches.
+
+    Where nothing can be kept, it is a folder that lives as long as this process.
+    """
+    chosen = os.environ.get("IDLC_CACHE")
+    base = Path(chosen) if chosen else caches()
+    try:
+        if base is not None:
+            place = base / "loaded"
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=place):
+                return place
+    except OSError:
+        pass
+    import atexit
+
+    made = tempfile.mkdtemp(prefix="idlc-")
+    atexit.register(rmtree, made, ignore_errors=True)
+    return Path(made)
+
+
+def has(name: str) -> bool:
+    """Return whether packages are there under a name."""
+    return (folder() / name).is_dir()
+
+
+def keep(name: str, files: Iterable[RenderedFile]) -> None:
+    """Write packages under a name, whole or not at all; what another process wrote stays."""
+    target = folder() / name
+    made = Path(tempfile.mkdtemp(dir=folder(), prefix=".new-"))
+    try:
+        for file in files:
+            path = made / file.path
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(file.text, encoding="utf-8")
+        try:
+            made.rename(target)
+        except OSError:
+            if not target.is_dir():
+                raise
+    finally:
+        rmtree(made, ignore_errors=True)
+
+
+@cache
+def newest() -> int:
+    """Return when idlc itself was changed last: its version does not change with each edit."""
+    package = Path(__file__).parents[1]
+    return last_change((package, package.parent / "templates"))
+
+
+Models = dict[str, "Model"]
+
+
+def asked_models(
+    what: str, include: tuple[str, ...], distro: str | None, report: Report
+) -> tuple[Models, list[ir.TypeName]]:
+    """Return the models of packages, and which interfaces in them were asked for."""
+    where = scope(Config(), None, include, distro=distro)
+    if is_recording(what):
+        return _of_recording(what, where, report)
+    if is_path(what):
+        given = wanted([what], [], "", where, report)
+        library = library_for(given, where, report)
+        names = [name for one in given for name in one.names]
+        compiler = Compiler(library)
+        for one in given:
+            compiler.add(sources_of(one, report), report)
+    else:
+        library, meant = resolve(what, where, report)
+        names = [one.interface for one in meant]
+        compiler = Compiler(library)
+    return ({}, []) if report.had_errors else (_models(compiler, names, report), names)
+
+
+def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) -> Models:
+    """Return the models of interfaces and of all that these need, by package."""
+    found: dict[str, list[ir.Interface]] = {}
+    for name, interface in sorted(compiler.reached(names).items()):
+        found.setdefault(name.package, []).append(interface)
+    every = Report()
+    models = {package: compiler.model(package, own, every) for package, own in found.items()}
+    report.extend(one for one in every if one.severity is Severity.ERROR)
+    return models
+
+
+def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
+    recording = read(path, report)
+    found = versions(recording.topics) if recording else []
+    if len(found) != 1:
+        from idlc.recordings.packages import check_versions
+
+        check_versions(found, report)
+        return {}, []
+    types = recorded_types(found[0], Around(where, report), where, Report())
+    models = types.models
+    report.extend(types.errors)
+    return models, sorted({one.interface for one in types.topics})
+
+
+def topic_models(topic: Topic, include: tuple[str, ...]) -> tuple[Models, Report]:
+    """Return the models of a topic's type, and what there is to say if not all was recorded."""
+    types, told = _types(topic, include)
+    if not types.topics or types.errors or told.had_errors:
+        first = min([*types.errors, *told], key=lambda one: one.severity, default=None)
+        why = first.message if first else "its type is not known"
+        why = why.removeprefix(f"`{topic.name}` is left out: ")
+        raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
+    return types.models, told
+
+
+def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
+    """Return the hash of a topic's type by its definition, or `None` if there is none."""
+    types, _ = _types(topic, include)
+    return next((types.hash(one) for one in types.topics), None)
+
+
+def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
+    where, told = Scope(include=include), Report()
+    (version,) = versions([recorded(topic, topic.name)])
+    types = recorded_types(version, Around(where, told), where, told)
+    return types, told
+
+
+#: The package that all loaded ones are in.
+LOADED = "idlc.loaded"
+#: The support package of each: idlc's own modules under another name, with data of its own.
+SUPPORT = '''\
+"""The support code of idlc, for this package."""
+
+from importlib.machinery import PathFinder
+
+import idlc
+
+_spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
+__path__ += _spec.submodule_search_locations
+exec(_spec.loader.get_code(_spec.name))
+
+from . import objects
+
+# messages show names as those of generated packages do
+objects.HIDDEN = __name__.rsplit(".", 2)[0] + "."
+'''
+
+
+class CompileError(ValueError):
+    """What was to be loaded has errors, or does not exist; its text is that of the problems."""
+
+
+class Loaded(ModuleType):
+    """Packages that were compiled together, and by their own names the interfaces asked for."""
+
+    def __init__(
+        self, name: str, models: Mapping[str, Model], asked: Iterable[ir.TypeName]
+    ) -> None:
+        super().__init__(name, "What `idlc.load` compiled.")
+        self._packages = {
+            package: sorted({own.name.kind for own in model.own})
+            for package, model in sorted(models.items())
+        }
+        self._asked = {str(class_(one)): one for one in asked}
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._packages:
+            for kind in self._packages[name]:
+                import_module(f"{self.__name__}.{name}.{kind}")
+            return import_module(f"{self.__name__}.{name}")
+        if name in self._asked:
+            return self[str(self._asked[name])]
+        raise AttributeError(f"no `{name}` was loaded, but {', '.join(dir(self))}")
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a class by its full name, such as "std_msgs/msg/Header"."""
+        return _class(self.__name__, name)
+
+    def __dir__(self) -> list[str]:
+        return [*self._packages, *sorted(self._asked)]
+
+    def __repr__(self) -> str:
+        return f"<loaded: {', '.join(dir(self))}>"
+
+
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> Loaded:
+    """Compile interfaces, and return their classes.
+
+    `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
+    package that is known here. `include` are folders in which other packages are looked for first.
+    The classes can be pickled, where the same cache is seen; type checkers do not know them, so
+    programs are better off with `idlc gen`.
+    """
+    report = Report()
+    models, asked = asked_models(str(what), tuple(include), distro, report)
+    _raise_for(report)
+    name = _kept(models)
+    return Loaded(f"{LOADED}.{name}", models, asked)
+
+
+def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
+    """Return the class of a topic's messages, compiled from what was recorded.
+
+    Warns if something else had to be used, or if it is not what the topic's publisher said it is.
+    """
+    schema, key = topic.schema, ""
+    if schema and not schema.is_blank:
+        converts = Scope(include=include).distro.converts_values
+        texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
+        key = _key(texts, converts=converts)
+    if not (key and has(key)):
+        models, told = topic_models(topic, include)
+        for one in told:
+            warnings.warn(MissingDefinitionWarning(topic.name, one.message), stacklevel=2)
+        # what was borrowed from around here may be another thing tomorrow
+        key = _kept(models, "" if list(told) else key)
+    kind = _class(f"{LOADED}.{key}", topic.type)
+    if topic.hash not in (None, _type_of(kind).hash):
+        message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
+        warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
+    return kind
+
+
+class OtherDefinitionWarning(UserWarning):
+    """The definition in a recording has another hash than that which the publisher announced."""
+
+
+class MissingDefinitionWarning(UserWarning):
+    """A recording does not define a type in it; what is known here by its name is used."""
+
+    def __init__(self, topic: str, message: str) -> None:
+        super().__init__(topic, message)
+        self.topic = topic
+        self.message = message
+
+    def __str__(self) -> str:
+        return f"`{self.topic}`: {self.message}"
+
+
+def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
+    """Return a class that a program gave; raise RecordingError if messages are of another type."""
+    try:
+        given = _type_of(kind)
+    except (AttributeError, ImportError, KeyError, TypeError):
+        hint = "leave it out, or give one that `idlc gen` made"
+        raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
+    if given.name != topic.type:
+        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {given.name}")
+    if given.hash != topic.hash:
+        found = recorded_hash(topic, include)
+        if given.hash != found:
+            raise RecordingError(
+                f"{given.name} was another type when `{topic.name}` was recorded: its hash is "
+                f"{found or topic.hash or 'not known'}, that of the class is {given.hash}",
+                "leave the class out to read what was recorded",
+            )
+    return kind
+
+
+class _Type(NamedTuple):
+    name: str
+    hash: str
+
+
+def _type_of(kind: Any) -> _Type:
+    """Return the full name and the hash of a generated class."""
+    home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
+    info = import_module(f"{home}._idlc.on_demand.typeinfo")
+    name = info.type_name(kind)
+    return _Type(name, info.types()["hashes"][name])
+
+
+def _class(home: str, name: str) -> Any:
+    package, kind, short = name.split("/")
+    found: Any = import_module(f"{home}.{package}.{kind}")
+    return getattr(found, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
+
+
+def _kept(models: Mapping[str, Model], key: str = "") -> str:
+    """Return the name under which the packages are kept, after they are written if need be."""
+    if not key:
+        texts = [
+            text
+            for model in models.values()
+            for own in model.own
+            for text in (str(own.name), own.source.text if own.source else "")
+        ]
+        converts = any(model.distro.converts_values for model in models.values())
+        key = _key(texts, converts=converts)
+    if not has(key):
+        keep(key, _files(models, f"{LOADED}.{key}"))
+        invalidate_caches()
+    return key
+
+
+def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
+    """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.generate.python.render import render_package
+
+    for package, model in models.items():
+        yield RenderedFile(f"{package}/_idlc/__init__.py", SUPPORT)
+        for file in render_package(model, around):
+            if not file.path.startswith("_idlc/") or file.path == "_idlc/type_data.py":
+                yield RenderedFile(f"{package}/{file.path}", file.text)
+
+
+def _key(texts: Iterable[str], *, converts: bool) -> str:
+    """Return a name for packages that are compiled from these texts by this idlc.
+
+    `converts` is whether their classes convert values as those of Lyrical do.
+    """
+    from hashlib import sha256
+
+    digest = sha256(f"{__version__} {newest()} {converts}".encode())
+    for text in texts:
+        raw = text.encode("utf-8", "surrogatepass")
+        digest.update(b"%d " % len(raw) + raw)
+    return f"h{digest.hexdigest()[:12]}"
+
+
+def _raise_for(report: Report) -> None:
+    if report.had_errors:
+        from idlc.diagnostics import terminal
+
+        raise CompileError("\n" + "\n".join(terminal.text(report)))

@@ -1,0 +1,131 @@
+"""Recorded types as models, and as the packages that `idlc gen` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from idlc.check.compiler import derived_names
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
+from idlc.diagnostics.source import Source, Span
+from idlc.diagnostics.text import including
+from idlc.generate.requested import borrowed
+from idlc.model import ir
+from idlc.project import inputs, prefixes
+from idlc.project.files import absolute
+from idlc.project.library import Library
+from idlc.project.scope import Scope
+from idlc.recordings.types import NAMED, Around, RecordedTypes, recorded_types
+
+if TYPE_CHECKING:
+    from idlc.model.link import Model
+from idlc.recordings.versions import Version, contradictions, read, topics_of, versions
+
+
+def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
+    """Report what is wrong with what recordings say of their types."""
+    around = Around(scope, report)
+    for path in paths:
+        recording = read(path, report, look=True)
+        found = versions(recording.topics) if recording else []
+        for message, hint in recording.unread if recording else ():
+            problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
+            report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
+        check_versions(found, report)
+        for version in found:
+            types = recorded_types(version, around, scope, report)
+            report.extend(contradicted(types))
+            report.extend(types.errors)
+
+
+def check_versions(found: Sequence[Version], report: Report) -> None:
+    """Report IDL653 for each name with several definitions."""
+    for name, first, second in contradictions(found):
+        report.add(
+            codes.SEVERAL_DEFINITIONS.at(
+                Span(second, 0, 0),
+                f"this defines `{name}` in another way",
+                labels=(Label(Span(first, 0, 0), "this is the other"),),
+                hint="choose topics that agree, or one recording after the other",
+            )
+        )
+
+
+def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
+    """Yield IDL654 for each topic whose definition is not that of what was recorded."""
+    for one in types.topics:
+        topic, hash_ = one.recorded.topic, types.hash(one)
+        if topic.hash and hash_ and topic.hash != hash_:
+            yield codes.RECORDED_HASH_DIFFERS.of(
+                f"{one.recorded.recording}: topic {topic.name}",
+                f"the definition of `{one.name}` is not that of what was recorded",
+                hint=f"{including('DIR')} with the files that the publisher used",
+                place=one.recorded.recording,
+                detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
+            )
+
+
+def recorded_models(
+    paths: Sequence[str], scope: Scope, report: Report
+) -> Iterator[tuple[Model, list[str]]]:
+    """Yield the models of recordings, without what has errors, and the names of all in them."""
+    around = Around(scope, report)
+    for path in paths:
+        recording = read(path, report)
+        for version in versions(recording.topics) if recording else ():
+            types = recorded_types(version, around, scope, report)
+            for model in types.models.values():
+                yield model, [name for one in model.own for name in derived_names(one)]
+            report.extend(types.errors)
+
+
+def recorded_packages(
+    paths: Sequence[str], topics_wanted: Sequence[str], scope: Scope, report: Report, *, whole: bool
+) -> tuple[list[inputs.Inputs], Mapping[ir.TypeName, Source]]:
+    """Return the packages of recorded types with all that these need, and their definitions.
+
+    `whole` packages are for a prefix, where they hide those of the same name in others.
+    """
+    topics = topics_of(paths, topics_wanted, report)
+    if topics is None:
+        return [], {}
+    found = versions(topics)
+    check_versions(found, report)
+    if report.had_errors or not found:
+        return [], {}
+    types = recorded_types(found[0], Around(scope, report), scope, report)
+    report.extend(contradicted(types))
+    names = types.names
+    if whole:
+        names = {package: set(types.library.interfaces(package)) for package in names}
+    if not names:
+        message = (
+            f"no topic of {' or '.join(f'`{path}`' for path in paths)} has a type that is known"
+        )
+        report.add(codes.NO_INTERFACES.of(paths[0], message))
+    if not whole:
+        _tell_hidden(names, types.library, report)
+    packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
+    home = absolute(paths[0])
+    return [msgspec.structs.replace(one, home=home) for one in packages], types.texts
+
+
+def _tell_hidden(
+    names: Mapping[str, AbstractSet[ir.TypeName]], library: Library, report: Report
+) -> None:
+    """Note the packages that are installed here with more than was recorded."""
+    hidden = [
+        package
+        for package, mine in names.items()
+        if prefixes.python_folders(package) and set(library.interfaces(package)) - mine
+    ]
+    if hidden:
+        listed = first_few((f"`{package}`" for package in sorted(hidden)), NAMED)
+        report.notes.append(
+            f"{listed}: installed here with more than was recorded, which programs do not see "
+            "where what is written comes first on Python's path"
+        )

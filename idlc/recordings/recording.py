@@ -1,0 +1,396 @@
+"""Recordings for programs: `with idlc.Recording("rec.mcap") as rec: rec["/imu"].to_arrow()`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
+
+from idlc.recordings.containers.compression import missing
+from idlc.recordings.containers.container import (
+    Container,
+    Db3File,
+    McapFile,
+    Topic,
+    open_pieces,
+    open_recording,
+)
+from idlc.recordings.containers.db3 import Rows
+from idlc.recordings.containers.mcap import Chunk
+from idlc.recordings.containers.messages import ALWAYS, Messages, Raw, Window, joined
+from idlc.recordings.containers.source import CDR, START, RecordingError, unread
+from idlc.recordings.times import moment
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Kind = TypeVar("Kind")
+#: How errors name a message of many, and what is in it.
+_INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
+#: What is known of a message besides its fields.
+TIMES = ("log_time", "publish_time")
+
+
+if TYPE_CHECKING:
+
+    class Stamped(tuple[int, Kind]):
+        """What type checkers see: named tuples can be generic from Python 3.11 on."""
+
+        log_time: int
+        message: Kind
+
+        def __new__(cls, log_time: int, message: Kind) -> Stamped[Kind]: ...  # noqa: D102
+
+else:
+
+    class Stamped(NamedTuple):
+        """A message, and when it was recorded, in nanoseconds."""
+
+        log_time: int
+        message: Any
+
+
+class Selection:
+    """Messages of one topic.
+
+    They are of the type that was recorded, compiled when it is first needed, unless a class that
+    idlc generated is given; that must be of the same type as the recorded one. `include` are
+    folders in which types are looked for that the recording does not define.
+    """
+
+    def __init__(self, topic: Topic, include: tuple[str, ...] = ()) -> None:
+        self.topic = topic
+        self.include = include
+
+    def batches(self) -> Iterator[Messages]:
+        """Yield the messages as they are recorded, many at a time."""
+        raise NotImplementedError
+
+    @cached_property
+    def kind(self) -> Any:
+        """The class of the messages, compiled from what was recorded."""
+        from idlc.recordings.load import class_of
+
+        return class_of(self.topic, self.include)
+
+    def _kind(self, given: Any) -> Any:
+        """Return the class to read with: what was recorded, or one of the same type."""
+        if self.topic.encoding != CDR:
+            what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
+            raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
+        if given is None:
+            return self.kind
+        from idlc.recordings.load import accepted
+
+        return accepted(given, self.topic, self.include)
+
+    def __iter__(self) -> Iterator[Stamped[Any]]:
+        return self.messages()
+
+    @overload
+    def messages(self, kind: None = None) -> Iterator[Stamped[Any]]: ...
+
+    @overload
+    def messages(self, kind: type[Kind]) -> Iterator[Stamped[Kind]]: ...
+
+    def messages(self, kind: Any = None) -> Iterator[Stamped[Any]]:
+        """Yield each message with its time, in the order in which they were recorded."""
+        kind, done = self._kind(kind), 0
+        for batch in self.batches():
+            for time, view in zip(batch.log_times.tolist(), batch.views(), strict=True):
+                with _at(self.topic, lambda: [view], done):  # noqa: B023 # called at once
+                    message = kind.deserialize(view)
+                yield Stamped(time, message)
+                done += 1
+
+    def to_columns(
+        self, kind: Any = None, *, fields: Iterable[str] | None = None, datetimes: bool = False
+    ) -> Any:
+        """Return columns of numpy: log_time, publish_time and those of the messages.
+
+        `fields` are those that are wanted, such as "header.stamp". With `datetimes`, times are
+        datetime64, log_time and publish_time included, which are nanoseconds otherwise.
+        """
+        kind = self._kind(kind)
+        batch = joined(list(self.batches()))
+        with _at(self.topic, batch.views):
+            made = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
+        times = zip(_names(made.keys()), (batch.log_times, batch.publish_times), strict=True)
+        columns = {
+            name: values.view("M8[ns]") if datetimes else values
+            for name, values in times
+            if values is not None
+        }
+        return type(made)({**columns, **{name: made[name] for name in made.keys()}}, len(made))  # noqa: SIM118
+
+    def to_arrow(self, kind: Any = None, **options: Any) -> pa.Table:
+        """Return a table of Arrow: log_time, publish_time and the fields of the messages.
+
+        Options are those of `to_arrow` of messages: `fields`, `flat`, `datetimes`, `dictionary`.
+        """
+        pa = arrow()
+        kind = self._kind(kind)
+        found = list(self._tables(kind, options))
+        return pa.concat_tables(found) if found else _empty(kind, options)
+
+    def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
+        """Return the same piece by piece, for what need not be in memory as a whole."""
+        pa = arrow()
+        kind = self._kind(kind)
+        batches = (batch for one in self._tables(kind, options) for batch in one.to_batches())
+        return pa.RecordBatchReader.from_batches(_empty(kind, options).schema, batches)
+
+    def _tables(self, kind: Any, options: Any) -> Iterator[pa.Table]:
+        done = 0
+        for batch in self.batches():
+            with _at(self.topic, batch.views, done):
+                made = kind.to_arrow(batch, **options)
+            yield _with_times(made, batch)
+            done += len(batch)
+
+
+def _names(taken: Iterable[str]) -> list[str]:
+    """Return names for the times of messages that no field has: none begins with an underscore."""
+    fields = set(taken)
+    return [f"_{name}" if name in fields else name for name in TIMES]
+
+
+def _empty(kind: Any, options: Any) -> pa.Table:
+    """Return the table of no messages."""
+    return _with_times(kind.to_arrow([], **options), joined([]))
+
+
+def _with_times(table: pa.Table, batch: Messages) -> pa.Table:
+    """Return a table with the times of its messages in front."""
+    pa = arrow()
+    kind = pa.timestamp("ns")
+    names = _names(table.column_names)
+    for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
+        if times is None:
+            made = pa.nulls(len(batch), kind)
+        else:
+            made = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
+        table = table.add_column(0, pa.field(name, kind), made)
+    return table
+
+
+def arrow() -> Any:
+    """Return pyarrow, or say how to install it."""
+    try:
+        import pyarrow
+    except ImportError:
+        raise missing("pyarrow", "tables are made by Arrow") from None
+    return pyarrow
+
+
+@contextmanager
+def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
+    """Have errors in messages say which message of the recording it is."""
+    try:
+        yield
+    except ValueError as caught:
+        error: Any = caught
+        if not hasattr(error, "problem"):  # each package has a DecodeError of its own
+            raise
+        found = _INDEXED.match(error.path)
+        number, path = (int(found[1]), found[2]) if found else (0, error.path)
+        why = unread(topic.name, bytes(views()[number][:START]))
+        if why:
+            raise RecordingError(*why) from error
+        where = f"{path}: " if path else ""
+        raise RecordingError(
+            f"message {done + number} of `{topic.name}` is broken: "
+            f"{where}{error.problem} at byte {error.offset}"
+        ) from error
+
+
+class Part(Selection):
+    """Some of the messages of a topic, to be read wherever the file can be opened.
+
+    A part can be pickled. `pieces` are chunks of an MCAP file, or rows of a .db3 file.
+    """
+
+    def __init__(
+        self,
+        topic: Topic,
+        place: Any,
+        ids: tuple[int, ...],
+        pieces: tuple[Any, ...],
+        window: Window,
+        include: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(topic, include)
+        self.place = place
+        self.ids = ids
+        self.pieces = pieces
+        self.window = window
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Part, (self.topic, self.place, self.ids, self.pieces, self.window, self.include)
+
+    def __repr__(self) -> str:
+        return f"<Part of {self.topic.name} in {self.place}, {len(self.pieces)} pieces>"
+
+    def batches(self) -> Iterator[Messages]:
+        """Yield the messages as they are recorded, many at a time."""
+        with open_pieces(self.place) as file:
+            yield from file.messages(self.ids, self.pieces, self.window)
+
+
+def divided(
+    container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
+) -> Iterator[Part]:
+    """Yield the parts of a topic, each of about `size` bytes of a file."""
+    for file, ids, _ in container.ids_of(topic):
+        if isinstance(file, McapFile):
+            found: Iterator[tuple[Any, ...]] = _chunks(file, ids, window, size)
+        else:
+            found = _rows(file, size)
+        for pieces in found:
+            yield Part(topic, file.place, tuple(ids), pieces, window, include)
+
+
+def _chunks(file: McapFile, ids: list[int], window: Window, size: int) -> Iterator[tuple[Any, ...]]:
+    """Yield neighbours of about `size` bytes."""
+    pieces: list[Chunk] = []
+    total = 0
+    for chunk in file.pieces(ids, window):
+        if pieces and total + chunk.size > size:
+            yield tuple(pieces)
+            pieces, total = [], 0
+        pieces.append(chunk)
+        total += chunk.size
+    if pieces:
+        yield tuple(pieces)
+
+
+def _rows(file: Db3File, size: int) -> Iterator[tuple[Any, ...]]:
+    """Yield rows that take about `size` bytes of the file, as if all were of the same size."""
+    for first, last in file.database.rows_of_messages():
+        count = last - first + 1
+        step = max(1, count * size // max(file.database.size, 1))
+        for start in range(first, last + 1, step):
+            yield (Rows(start, min(start + step - 1, last)),)
+
+
+#: A part reads about so many bytes of a recording.
+PART = 1 << 25
+
+
+class Recording(Mapping[str, "RecordedTopic"]):
+    """An open recording: a mapping from names of topics to their messages.
+
+    `path` is an .mcap or .db3 file, the folder of a bag, a list of these which are then one
+    recording, a URL of an .mcap file that fsspec can open, or a file object. `notes` says what is
+    unusual about it. Without `index`, summary and indexes of MCAP files are not used. `check`
+    compares checksums. `include` are folders in which types are looked for that the recording does
+    not define, as those of ROS 2 Humble do not.
+    """
+
+    def __init__(
+        self,
+        path: Any,
+        *,
+        index: bool = True,
+        check: bool = False,
+        include: Iterable[str] = (),
+    ) -> None:
+        self._include = tuple(map(str, include))
+        self._container: Container = open_recording(path, index=index, check=check)
+        self._topics: dict[str, list[Topic]] = {}
+        for topic in self.topics:
+            self._topics.setdefault(topic.name, []).append(topic)
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """What was recorded: name, type, count, hash, encoding and definition of each topic."""
+        return self._container.topics
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is unusual about the recording, such as that it was not closed."""
+        return self._container.notes
+
+    def __getitem__(self, name: str) -> RecordedTopic:
+        found = self._topics.get(name)
+        if not found:
+            from idlc.diagnostics.text import did_you_mean
+
+            hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
+            raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
+        if len(found) > 1:
+            kinds = ", ".join(sorted({one.type for one in found}))
+            raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
+        return RecordedTopic(self._container, found[0], include=self._include)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._topics)
+
+    def __len__(self) -> int:
+        return len(self._topics)
+
+    def __repr__(self) -> str:
+        rows = [(one.name, one.type, f"{one.count:,}") for one in self.topics]
+        name, kind, count = (max((len(row[at]) for row in rows), default=0) for at in range(3))
+        lines = [f"{row[0]:{name}}  {row[1]:{kind}}  {row[2]:>{count}}" for row in rows]
+        return "\n".join([f"<Recording {self._container.name}>", *lines])
+
+    def close(self) -> None:
+        """Close the files. Columns and messages that were made stay as they are."""
+        self._container.close()
+
+    def __enter__(self) -> Recording:  # noqa: PYI034 # Self came with Python 3.11
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class UnknownTopicError(RecordingError, KeyError):
+    """A recording has no topic of that name."""
+
+    __str__ = RecordingError.__str__
+
+
+class RecordedTopic(Selection):
+    """The messages of one topic of an open recording."""
+
+    def __init__(
+        self,
+        container: Container,
+        topic: Topic,
+        window: Window = ALWAYS,
+        include: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(topic, include)
+        self._container = container
+        self._window = window
+
+    def __repr__(self) -> str:
+        return f"<{self.topic.name} of {self._container.name}, {self.topic.type}>"
+
+    def between(self, start: Any = None, end: Any = None) -> RecordedTopic:
+        """Return those of a time: from `start`, until before `end`.
+
+        A time is an int in nanoseconds, a datetime, or a text: `10` and `1m30s` count from the
+        start of the recording, `1700000000.5` is a time of ROS in seconds, `2026-11-22T07:30` is
+        in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
+        """
+        first, last = (
+            None if one is None else moment(one, self._container.start) for one in (start, end)
+        )
+        window = self._window.narrowed(first, last)
+        return RecordedTopic(self._container, self.topic, window, self.include)
+
+    def batches(self) -> Iterator[Messages]:
+        """Yield the messages as they are recorded, many at a time."""
+        return self._container.messages(self.topic, self._window)
+
+    def parts(self, size: int = PART) -> list[Part]:
+        """Return pieces for others to read, each of about `size` bytes of the recording.
+
+        They can be pickled, and read in other processes and on other machines that see the file.
+        """
+        return list(divided(self._container, self.topic, self._window, size, self.include))

@@ -1,0 +1,241 @@
+"""What the commands of `idlc scaffold` share: the package around, then all changes or none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from idlc.check.compiler import stage
+from idlc.check.package.facts import home_of
+from idlc.check.package.setup_edits import wrapped
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import did_you_mean
+from idlc.model import ir
+from idlc.project.edits import Edited, Outcome
+from idlc.project.files import absolute, shown
+from idlc.project.library import Library
+from idlc.project.package_xml import declared_name, manifest
+from idlc.project.scope import scope
+from idlc.project.settings import load_settings
+from idlc.project.templates import keep
+from idlc.scaffold.project import Done, Project
+from idlc.scaffold.roles import ROLES
+from idlc.scaffold.roles.role import Endpoint, Role
+from idlc.scaffold.templates import (
+    ENDING,
+    BrokenTemplateError,
+    Templates,
+    copy,
+    folders,
+    names,
+    read,
+)
+
+
+class Settings(NamedTuple):
+    """What every scaffold command can be told."""
+
+    dry_run: bool = False
+    force: bool = False
+    include: tuple[str, ...] = ()
+    launch: bool = True
+    templates: str | None = None
+
+
+class Result(NamedTuple):
+    """What a command did, or would do: its files, and a diff where nothing was written.
+
+    `notes` say what is left to do by hand, `following` which arguments of `idlc` come next.
+    """
+
+    folder: str
+    done: tuple[Done, ...]
+    diff: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    following: tuple[str, ...] = ()
+
+
+def templates(settings: Settings, report: Report) -> Templates:
+    """Return idlc's templates, and those of the user's folder instead of them."""
+    folder = settings.templates or load_settings(report).templates
+    if folder is None:
+        return Templates()
+    found = Templates(read(folder, folders(), ENDING, report))
+    found.check(report)
+    return found
+
+
+@contextmanager
+def rendering(subject: str, report: Report) -> Iterator[None]:
+    """Report what is wrong with a user's template within; anything else is idlc's own fault."""
+    keep()
+    with stage("scaffold", subject):
+        try:
+            yield
+        except BrokenTemplateError as error:
+            report.add(error.problem)
+
+
+def find_package(settings: Settings, report: Report) -> tuple[Project, str] | None:
+    """Return the package that the working folder belongs to, and its name."""
+    manifest.cache_clear()
+    path = manifest(absolute("."))
+    if path is None:
+        message = "this folder belongs to no package: there is no package.xml here or above"
+        hint = "run `idlc scaffold package NAME`, then `cd NAME`"
+        report.add(codes.NO_SUCH_PATH.of("package.xml", message, hint=hint))
+        return None
+    name = declared_name(path, shown(path), report)
+    folder = shown(path.parent) if path.parent != absolute(".") else "."
+    return None if name is None else (Project(folder, report, force=settings.force), name)
+
+
+def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
+    """Return the library that has a package and what is used in it."""
+    distro = scope(load_settings(Report())).distro
+    own = {package: (project.path,)}
+    return Library(settings.include, report, own=own, distro=distro)
+
+
+def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...]:
+    """Return the words of the command that compiles the package's interfaces."""
+    included = (word for folder in settings.include for word in ("-I", folder))
+    if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
+        return ("gen", *included)
+    home = home_of(project.path, own).relative_to(project.path).as_posix()
+    return ("gen", project.name, "-o", project.shown(home), *included)
+
+
+def keys_of(project: Project) -> set[str]:
+    """Return the interfaces of a package as `kind/Name.kind`."""
+    return {f"{k}/{name}" for k in ir.KINDS for name in project.names(k) if name.endswith(f".{k}")}
+
+
+def accepted(
+    project: Project, edits: Mapping[str, Outcome], report: Report
+) -> dict[str, str] | None:
+    """Return the edited texts; report IDL621 for each refusal and return `None`."""
+    edited = {}
+    for path, outcome in edits.items():
+        if isinstance(outcome, Edited):
+            edited[path] = outcome.text
+            if path == "setup.py":
+                edited[path] = wrapped(project.text(path) or "", outcome.text)
+            continue
+        shown_path = project.shown(path)
+        report.add(
+            codes.CANNOT_EDIT.of(
+                shown_path,
+                f"cannot edit `{shown_path}`: {outcome.why}",
+                hint=f"add this line by hand {outcome.where}, then run the command again",
+                detail=outcome.line,
+            )
+        )
+    return None if report.had_errors else edited
+
+
+def write(
+    project: Project,
+    added: Mapping[str, str],
+    edited: Mapping[str, str],
+    settings: Settings,
+    report: Report,
+) -> Result | None:
+    """Write all files or none, or show what that would change; `None` after a problem."""
+    found = project.plan(added, edited)
+    if found is None or report.had_errors:
+        return None
+    changes, done = found
+    if settings.dry_run:
+        return Result(project.name, tuple(done), tuple(project.diff(changes)))
+    if not project.apply(changes):
+        return None
+    return Result(project.name, tuple(done))
+
+
+#: Where copies go unless that is set.
+FOLDER = "templates"
+
+
+class Listed(NamedTuple):
+    """A template that can be replaced, and the user's file that does so, if any."""
+
+    name: str
+    replaced_by: str
+
+
+def listed(settings: Settings, report: Report) -> list[Listed]:
+    """Return the templates that a user can replace."""
+    folder = settings.templates or load_settings(report).templates
+    found = read(folder, folders(), ENDING, report) if folder else {}
+    return [Listed(name, found[name].path if name in found else "") for name in names()]
+
+
+def copied(wanted: Sequence[str], settings: Settings, report: Report) -> Result | None:
+    """Copy templates into the user's folder, to be changed there."""
+    set_already = settings.templates or load_settings(report).templates
+    if report.had_errors:
+        return None
+    folder = set_already or FOLDER
+    project = Project(folder, report, force=settings.force)
+    result = write(project, {name: copy(name) for name in wanted}, {}, settings, report)
+    if result is None or set_already:
+        return result
+    note = f'set `templates = "{folder}"` in [tool.idlc] of pyproject.toml, or use --templates'
+    return result._replace(notes=(note,))
+
+
+def check(role: Role, type_: str, settings: Settings) -> None:
+    """Raise ValueError if there is no such interface for the package of the working folder."""
+    report = Report()
+    found = find_package(settings, report)
+    if found is None or role.kind is None:
+        return  # which is said when the node is written
+    library = library_around(found[1], found[0], settings, report)
+    type_name(Endpoint(role, type_, ""), found[1], library, report)
+    for problem in report:
+        raise ValueError("; ".join(filter(None, (problem.message, problem.hint))))
+
+
+def type_name(endpoint: Endpoint, own: str, library: Library, report: Report) -> ir.TypeName | None:
+    """Return the interface that `Name`, `package/Name` or `package/kind/Name` means here."""
+    kind = endpoint.role.kind
+    if kind is None:
+        return None
+    parts = endpoint.type.split("/")
+    name = ir.TypeName(parts[0] if len(parts) > 1 else own, kind, parts[-1])
+    fits = len(parts) <= 2 or (len(parts) == 3 and parts[1] == kind)
+    if fits and library.source(name) is not None:
+        return name
+    message = f"no such {_ARTICLES[kind]}: `{endpoint.type}`"
+    report.add(codes.NO_SUCH_TYPE.of("", message, hint=_hint(name, own, library)))
+    return None
+
+
+_ARTICLES: dict[ir.Kind, str] = {"msg": "message", "srv": "service", "action": "action"}
+
+
+def _hint(name: ir.TypeName, own: str, library: Library) -> str | None:
+    """Return what may have been meant by an interface that there is not."""
+    for kind, what in _ARTICLES.items():
+        if kind != name.kind and library.source(name._replace(kind=kind)) is not None:
+            options = " or ".join(role.option for role in ROLES if role.kind == kind)
+            return f"it is {'an' if what == 'action' else 'a'} {what}: use {options}"
+    if name.package == own:
+        elsewhere = [
+            f"`{package}/{name.name}`"
+            for package in library.packages()
+            if ir.TypeName(package, name.kind, name.name) in library.interfaces(package)
+        ]
+        if elsewhere:
+            return f"did you mean {' or '.join(elsewhere)}?"
+    known = [str(one) for one in library.interfaces(name.package) if one.kind == name.kind]
+    hint = did_you_mean(str(name), known)
+    if name.package == own:
+        return hint or f"write it with `idlc scaffold interface {name.kind} {name.name} FIELD...`"
+    if hint or name.package in library.packages():
+        return hint
+    near = did_you_mean(name.package, library.packages())
+    return near or f"there is no package `{name.package}` here: name its folder with -I"

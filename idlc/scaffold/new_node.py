@@ -1,0 +1,235 @@
+"""Entering a node in its package: the files that a node needs beside it, and those that list it.
+
+Everything is a function of the texts of the package's files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from idlc.check.compiler import compile_package
+from idlc.check.package.facts import folders
+from idlc.diagnostics.report import Report
+from idlc.model import ir
+from idlc.model.distros import BY_NAME, DEFAULT
+from idlc.project.edits import Edited, Outcome, Script
+from idlc.project.prefixes import distribution, python_folders
+from idlc.scaffold import node_tests, spec
+from idlc.scaffold.changes import (
+    Result,
+    Settings,
+    accepted,
+    find_package,
+    generation,
+    keys_of,
+    library_around,
+    rendering,
+    templates,
+    type_name,
+    write,
+)
+from idlc.scaffold.edits import data_files, launch_py, package_xml, setup_py
+from idlc.scaffold.node import MAIN_MODULE, render
+from idlc.scaffold.package import package_view, rendered
+from idlc.scaffold.project import Project
+from idlc.scaffold.spec import Plan, plan
+from idlc.scaffold.templates import Templates
+
+MANIFEST = "package.xml"
+SETUP = "setup.py"
+CONFTEST = "test/conftest.py"
+LAUNCH_ENDING = "launch.py"
+
+
+class Entry(NamedTuple):
+    """What entering a node makes of a package: files to add, files to edit, things to do by hand.
+
+    `notes` name the file that each is about.
+    """
+
+    added: Mapping[str, str]
+    edits: Mapping[str, Outcome]
+    notes: tuple[tuple[str, str], ...] = ()
+
+
+def paths(package: str, launch_files: Iterable[str]) -> list[str]:
+    """Return the files of a package whose texts decide; `launch_files` are names in `launch/`."""
+    return [
+        *("pyproject.toml", "setup.cfg", SETUP, MANIFEST, CONFTEST),
+        *(f"{package}/__init__.py", _main_module(package), _launch_file(package, launch_files)),
+    ]
+
+
+def enter_node(
+    planned: Plan,
+    texts: Mapping[str, str],
+    files: Mapping[str, str],
+    templates: Templates,
+    *,
+    keys: Iterable[str] = (),
+    folders: Mapping[str, bool] = MappingProxyType({}),
+) -> Entry:
+    """Return how a node, whose own files are `files`, is entered, but for the launch file.
+
+    `texts` are those of the package's files that exist. A package with interfaces,
+    whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
+    """
+    node = planned.node
+    script = Script(node.name, f"{node.package}.{node.name}:main")
+    described = {one: texts[one] for one in ("pyproject.toml", "setup.cfg", SETUP) if one in texts}
+    if (own := tuple(keys)) and SETUP in described:
+        text = described[SETUP]
+        described[SETUP] = data_files.add_interfaces(text, node.package, own, folders)
+    path, outcome = setup_py.add_console_script(described, script)
+    tests = node_tests.packages(planned)
+    manifest = package_xml.add(texts.get(MANIFEST, ""), depends=planned.packages, tests=tests)
+    support = _support(node.package, texts, files, templates)
+    return Entry(support, {path: outcome, MANIFEST: manifest})
+
+
+def enter_launch(
+    planned: Plan, texts: Mapping[str, str], entry: Entry, templates: Templates
+) -> Entry:
+    """Return an entry that lists the node in the launch file, too, which may be new.
+
+    A node that does one thing and ends is for the command line.
+    """
+    if planned.once:
+        return entry
+    node = planned.node
+    manifest = entry.edits.get(MANIFEST)
+    if isinstance(manifest, Edited):  # what launch files import
+        needed = package_xml.add(manifest.text, executes=("launch", "launch_ros"))
+        entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
+    started = launch_py.Started(node.package, node.name, node.lifecycle)
+    path = next((one for one in texts if one.startswith("launch/")), "")
+    if path:
+        outcome = launch_py.add_node(texts[path], started)
+        return _launched(entry, path, outcome)
+    path = _launch_file(node.package, ())
+    plain = package_view(node.package)
+    text = rendered("package/launch.py.jinja", plain, templates)
+    outcome = launch_py.add_node(text, started)
+    if not isinstance(outcome, Edited):
+        return _launched(entry, path, outcome)._replace(added={**entry.added, path: text})
+    edits = dict(entry.edits)
+    before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
+    if SETUP in texts and isinstance(before, Edited):
+        edits[SETUP] = data_files.add_launch(before.text, node.package, path)
+    return entry._replace(added={**entry.added, path: outcome.text}, edits=edits)
+
+
+def _launched(entry: Entry, path: str, outcome: Outcome) -> Entry:
+    """Return an entry with the edited launch file, or with what to do by hand."""
+    if isinstance(outcome, Edited):
+        return entry._replace(edits={**entry.edits, path: outcome})
+    text = f"is not edited: {outcome.why}; add this {outcome.where}: {outcome.line.rstrip(',')}"
+    return entry._replace(notes=(*entry.notes, (path, text)))
+
+
+def _support(
+    package: str, texts: Mapping[str, str], files: Mapping[str, str], templates: Templates
+) -> dict[str, str]:
+    """Return the files that nodes need beside them and that their package lacks."""
+    plain = package_view(package)
+    found = {}
+    if CONFTEST not in texts:
+        found[CONFTEST] = rendered("package/conftest.py.jinja", plain, templates)
+    if f"{package}/__init__.py" not in texts:
+        found[f"{package}/__init__.py"] = ""
+    module = _main_module(package)
+    imported = any(f"{package}.{MAIN_MODULE} " in text for text in files.values())
+    if imported and "def until_shutdown" not in texts.get(module, ""):
+        found[module] = rendered("package/node_main.py.jinja", plain, templates)
+    return found
+
+
+def _main_module(package: str) -> str:
+    return f"{package}/{MAIN_MODULE}.py"
+
+
+def _launch_file(package: str, names: Iterable[str]) -> str:
+    """Return the launch file that lists the package's nodes, of the names in `launch/`."""
+    found = [name for name in names if name.endswith(LAUNCH_ENDING)]
+    preferred = [f"{package}_launch.py", f"{package}.launch.py"]
+    for name in (*preferred, *(found if len(found) == 1 else ())):
+        if name in found:
+            return f"launch/{name}"
+    return f"launch/{preferred[0]}"
+
+
+def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None:
+    """Write a node and its test, and enter it wherever its package lists its nodes."""
+    found = find_package(settings, report)
+    if found is None:
+        return None
+    project, own = found
+    used = templates(settings, report)
+    planned = _planned(wanted._replace(package=own), project, settings, report)
+    if planned is None or report.had_errors:
+        return None
+    entry = Entry({}, {})
+    with rendering(wanted.name, report):
+        entry = _entry(planned, project, used, launch=settings.launch)
+    edited = accepted(project, entry.edits, report)
+    result = None if edited is None else write(project, entry.added, edited, settings, report)
+    if result is None:
+        return None
+    missing = not project.has(f"{own}/_idlc")
+    compiled = any(one.interface and one.interface.name.package == own for one in planned.endpoints)
+    after = generation(project, own, settings) if missing and compiled else ()
+    notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
+    return result._replace(notes=(*notes, *_absent(planned)), following=after)
+
+
+def _planned(
+    wanted: spec.Node, project: Project, settings: Settings, report: Report
+) -> Plan | None:
+    """Return the node with the interfaces of its endpoints; report those that there are not."""
+    library = library_around(wanted.package, project, settings, report)
+    interfaces: list[ir.Interface | None] = []
+    messages: dict[ir.TypeName, ir.Message] = {}
+    for endpoint in wanted.endpoints:
+        name = type_name(endpoint, wanted.package, library, report)
+        source = name and library.source(name)
+        if not name or source is None:
+            interfaces.append(None)
+            continue
+        problems = Report()
+        model = compile_package(name.package, [(name, source)], library, problems)
+        if problems.had_errors:
+            report.extend(problems)  # warnings were shown when the interface was written
+        else:
+            interfaces.append(model.interfaces[name])
+            messages.update(model.messages)
+    return None if report.had_errors else plan(wanted, interfaces, messages)
+
+
+def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) -> Entry:
+    """Return the files of a node, and how its package lists it."""
+    own, name = planned.node.package, planned.node.name
+    files = {
+        f"{own}/{name}.py": render(planned, used),
+        f"test/test_{name}.py": node_tests.render(planned, used),
+    }
+    for path, text in files.items():
+        compile(text, path, "exec", dont_inherit=True)
+    read = {path: project.text(path) for path in paths(own, project.names("launch"))}
+    texts = {path: text for path, text in read.items() if text is not None}
+    keys, there = keys_of(project), folders(project.path)
+    entry = enter_node(planned, texts, files, used, keys=keys, folders=there)
+    if launch:
+        entry = enter_launch(planned, texts, entry, used)
+    return entry._replace(added={**files, **entry.added})
+
+
+def _absent(planned: Plan) -> list[str]:
+    """Return what to install, where there is ROS 2 but not all that the node imports."""
+    absent = [name for name in planned.packages if not python_folders(name)]
+    if not absent or not python_folders("rclpy"):
+        return []
+    names = ", ".join(f"`{name}`" for name in absent)
+    here = BY_NAME.get(distribution().name, DEFAULT)
+    return [f"{names} cannot be imported here: {here.installing(absent)}"]

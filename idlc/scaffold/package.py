@@ -1,0 +1,289 @@
+"""The pipeline of `idlc scaffold package`."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+from xml.sax.saxutils import escape, quoteattr
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic, Report
+from idlc.diagnostics.source import Source
+from idlc.model import catalog, ir
+from idlc.model.names import why_not_package
+from idlc.project.package_xml import statements
+from idlc.project.scope import scope
+from idlc.project.settings import load_settings
+from idlc.scaffold.changes import Result, Settings, rendering, templates, write
+from idlc.scaffold.project import Project
+from idlc.scaffold.templates import Templates
+
+VERSION = "0.1.0"
+LICENSES = ("Apache-2.0", "BSD-3-Clause", "MIT")
+_TEXTS = Path(__file__).parent / "licenses"
+
+PYTHON = "ament_python"
+CMAKE = "ament_cmake"
+#: What interfaces need of ROS 2 itself: events of services, goals and states of actions.
+IMPLIED = ("action_msgs", "service_msgs", "unique_identifier_msgs")
+
+
+class Package(NamedTuple):
+    """What the templates of a new package show.
+
+    `depends` are the packages that one of interfaces only depends on.
+    """
+
+    name: str
+    description: str
+    maintainer: str
+    email: str
+    license: str
+    build_type: str = PYTHON
+    version: str = VERSION
+    depends: tuple[str, ...] = IMPLIED
+
+    @property
+    def is_python(self) -> bool:
+        """Whether the package has nodes."""
+        return self.build_type == PYTHON
+
+    @property
+    def xml_description(self) -> str:
+        """The description in XML."""
+        return escape(self.description)
+
+    @property
+    def xml_maintainer(self) -> str:
+        """The maintainer in XML."""
+        return escape(self.maintainer)
+
+    @property
+    def xml_email(self) -> str:
+        """The maintainer's address within an attribute's quotes."""
+        return quoteattr(self.email)[1:-1].replace('"', "&quot;")
+
+    @property
+    def py_maintainer(self) -> str:
+        """The maintainer as a Python literal."""
+        return repr(self.maintainer)
+
+    @property
+    def py_email(self) -> str:
+        """The maintainer's address as a Python literal."""
+        return repr(self.email)
+
+    @property
+    def py_description(self) -> str:
+        """The description as a Python literal."""
+        return repr(self.description)
+
+    @property
+    def xml_depends(self) -> tuple[str, ...]:
+        """The dependencies, as lines of package.xml."""
+        lines = _PYTHON_DEPENDS if self.is_python else _cmake_depends(self.depends)
+        return tuple(f"  <{tag}>{name}</{tag}>" if tag else "" for tag, name in lines)
+
+
+def _cmake_depends(packages: Iterable[str]) -> tuple[tuple[str, str], ...]:
+    return (
+        ("buildtool_depend", "ament_cmake"),
+        ("buildtool_depend", "rosidl_default_generators"),
+        ("", ""),
+        *(("depend", name) for name in packages),
+        ("exec_depend", "rosidl_default_runtime"),
+        ("", ""),
+        ("member_of_group", "rosidl_interface_packages"),
+    )
+
+
+_PYTHON_DEPENDS = (
+    ("depend", "rclpy"),
+    ("exec_depend", "launch"),
+    ("exec_depend", "launch_ros"),
+    ("exec_depend", "python3-numpy"),
+    ("", ""),
+    ("test_depend", "ament_flake8"),
+    ("test_depend", "ament_pep257"),
+    ("test_depend", "python3-pytest"),
+)
+
+
+#: Files of a package of nodes, each with its template; NAME stands for the package.
+_PYTHON_FILES = {
+    "package.xml": "package/package.xml.jinja",
+    "setup.py": "package/setup.py.jinja",
+    "setup.cfg": "package/setup.cfg.jinja",
+    "pyproject.toml": "package/pyproject.toml.jinja",
+    "launch/NAME_launch.py": "package/launch.py.jinja",
+    "test/conftest.py": "package/conftest.py.jinja",
+    "test/test_style.py": "package/test_style.py.jinja",
+    "README.md": "package/README.md.jinja",
+    ".gitattributes": "package/gitattributes.jinja",
+    ".gitignore": "package/gitignore.jinja",
+}
+_CMAKE_FILES = {
+    "package.xml": "package/package.xml.jinja",
+    "CMakeLists.txt": "package/CMakeLists.txt.jinja",
+    "pyproject.toml": "package/interfaces_pyproject.toml.jinja",
+    "README.md": "package/README.md.jinja",
+    ".gitignore": "package/gitignore.jinja",
+}
+#: Files of a new package that are edited later on.
+GROWING = (
+    *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
+    *("README.md", ".gitattributes", ".gitignore"),
+)
+#: What would not be found any more next to a package of such a name.
+_TAKEN = frozenset(
+    "action idlc launch launch_ros msg pytest rclpy resource setuptools srv test".split()
+)
+
+
+def check_package_name(name: str) -> str:
+    """Return the name of a new package; one that hides another module is refused."""
+    why = why_not_package(name)
+    if not why and name in _TAKEN:
+        why = "is the name of a folder or a module that it needs"
+    if why:
+        raise ValueError(f"`{name}` {why}")
+    return name
+
+
+def package_view(name: str) -> Package:
+    """Return a package of which only the name matters."""
+    return Package(name, "", "", "", LICENSES[0])
+
+
+def package_files(package: Package, templates: Templates) -> dict[str, str]:
+    """Return the texts of a new package's files by their paths in its folder."""
+    listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
+    found = {
+        path.replace("NAME", package.name): rendered(template, package, templates)
+        for path, template in listed.items()
+    }
+    found["LICENSE"] = license_text(package)
+    if package.build_type == PYTHON:
+        found[f"resource/{package.name}"] = ""
+        found[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
+    return found
+
+
+def rendered(template: str, package: Package, templates: Templates) -> str:
+    """Return the text of one of a package's files."""
+    return templates.render(template, package=package)
+
+
+def license_text(package: Package) -> str:
+    """Return the text of a licence, with the maintainer as the holder where it names one."""
+    text = (_TEXTS / f"{package.license}.txt").read_text(encoding="utf-8")
+    return text.replace("(c) HOLDER", f"(c) {package.maintainer}")
+
+
+#: Where the choices of a package are: in elements of package.xml, and arguments of setup().
+_TAGS = {
+    **{field: field for field in ("description", "maintainer", "license", "build_type")},
+    "email": "maintainer",
+}
+_ARGUMENTS = {
+    **{field: field for field in ("description", "maintainer", "license")},
+    "email": "maintainer_email",
+}
+
+
+def package(
+    wanted: Package,
+    folder: str,
+    settings: Settings,
+    report: Report,
+    starters: Mapping[str, str] | None = None,
+    given: Collection[str] = (),
+) -> Result | None:
+    """Write a new package below `folder`, with interfaces if it has none yet.
+
+    `given` are the fields of `wanted`, and `starters`, that the user chose. Reports IDL620 where
+    files that stay as they are say otherwise.
+    """
+    name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
+    project = Project(name, report, force=settings.force)
+    used = templates(settings, report)
+    if report.had_errors:
+        return None
+    files: dict[str, str] = {}
+    with rendering(wanted.name, report):
+        there = catalog.packages(scope(load_settings(report)).distro)
+        depends = tuple(name for name in wanted.depends if name in there)  # Humble lacks one
+        files = package_files(wanted._replace(depends=depends), used)
+    if not any(project.names(kind) for kind in ir.KINDS):
+        files |= starters or {}
+    elif "starters" in given:
+        report.extend(_absent(project, starters or {}))
+    # what later commands add to stays as it is
+    growing = (*GROWING, f"launch/{wanted.name}_launch.py")
+    new = {
+        path: text
+        for path, text in files.items()
+        if path not in growing or settings.force or not project.has(path)
+    }
+    for path, look in (("package.xml", _other_manifest), ("setup.py", _other_setup)):
+        text = project.text(path) if path in files and path not in new else None
+        if text is not None:
+            report.extend(look(Source(project.shown(path), text), wanted, {*given, "build_type"}))
+    return write(project, new, {}, settings, report)
+
+
+def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnostic]:
+    """Yield a problem for each interface that the package, which has others, lacks."""
+    for path in starters:
+        if not project.has(path):
+            kind, name = path.rpartition(".")[0].split("/")
+            yield codes.EXISTING_FILE.of(
+                project.shown(path),
+                f"`{project.name}` has interfaces already, and `{path}` is not one of them",
+                hint=f"run `cd {shlex.quote(project.name)}`, then "
+                f"`idlc scaffold interface {kind} {name}`",
+            )
+
+
+def _other_manifest(
+    source: Source, wanted: Package, given: Collection[str]
+) -> Iterator[Diagnostic]:
+    """Yield where a package.xml says other than what was given."""
+    known = statements(source)
+    for field, tag in _TAGS.items():
+        lines = [one for one in known if one.tag == tag]
+        values = [
+            one.attributes.get("email", "") if field == "email" else one.text for one in lines
+        ]
+        values = [" ".join(text.split()) for text in values]
+        said = getattr(wanted, field)
+        if field in given and lines and said not in values:
+            line = f"<{tag}>{escape(said)}</{tag}>"
+            if tag == "maintainer":
+                name = wanted.maintainer if "maintainer" in given else lines[0].text
+                email = wanted.email if "email" in given else lines[0].attributes.get("email", "")
+                line = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
+            yield codes.EXISTING_FILE.at(
+                lines[0].span,
+                f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{said}`; "
+                "the file was not changed",
+                hint=f"write `{line}`" if field != "build_type" else "choose another name",
+            )
+
+
+def _other_setup(source: Source, wanted: Package, given: Collection[str]) -> Iterator[Diagnostic]:
+    """Yield where a setup.py says other than what was given."""
+    from idlc.check.package.setup_py import Setup, span_of
+
+    setup = Setup(source)
+    for field, argument in _ARGUMENTS.items():
+        node, said = setup.arguments.get(argument), getattr(wanted, field)
+        text = setup.text(node)
+        if node is not None and field in given and text not in (None, said):
+            yield codes.EXISTING_FILE.at(
+                span_of(source, node),
+                f"the {field} is `{text}` here, not `{said}`; the file was not changed",
+                hint=f"write `{argument}={said!r}`",
+            )

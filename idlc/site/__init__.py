@@ -1,1 +1,0 @@
-"""Site: a package's interfaces as static HTML, without anything from elsewhere."""

@@ -1,1 +1,0 @@
-"""Syntax: one file's lossless lines, and the literals in them."""

@@ -1,0 +1,1 @@
+"""Size, alignment and the codec's plan: the only place that knows how bytes lie."""

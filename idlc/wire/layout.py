@@ -1,0 +1,232 @@
+"""Where the fields of a structure stand in its bytes (language 8), as far as that is known.
+
+Offsets count from the end of the four bytes of the header, from where values align.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple, TypeAlias
+
+import msgspec
+
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Diagnostic
+from idlc.model import derive, ir
+from idlc.model.link import Model
+
+
+class Alignment(msgspec.Struct, frozen=True):
+    """A position modulo `modulus` (8, 4, 2 or 1) is `residue`.
+
+    Positions count from the start of the buffer; values align from the end of the header on, at 4.
+    """
+
+    modulus: int = 8
+    residue: int = 0
+
+    def knows(self, align: int) -> bool:
+        """Return whether the padding to a multiple of `align` is known."""
+        return self.modulus >= align
+
+    def padding(self, align: int) -> int:
+        """Return the bytes to the next multiple of an `align` that this knows."""
+        return (4 - self.residue) % align
+
+    def is_at(self, align: int) -> bool:
+        """Return whether this is known to be a multiple of `align`."""
+        return self.knows(align) and self.padding(align) == 0
+
+    def after(self, size: int) -> Alignment:
+        """Return what is known `size` bytes further."""
+        return Alignment(self.modulus, (self.residue + size) % self.modulus)
+
+    def modulo(self, modulus: int) -> Alignment:
+        """Return what is known modulo no more than `modulus`."""
+        modulus = min(self.modulus, modulus)
+        return Alignment(modulus, self.residue % modulus)
+
+    def meet(self, other: Alignment) -> Alignment:
+        """Return only what is true of both."""
+        modulus = min(self.modulus, other.modulus)
+        while self.residue % modulus != other.residue % modulus:
+            modulus //= 2
+        return self.modulo(modulus)
+
+
+def multiple_of(align: int) -> Alignment:
+    """Return what is known of a multiple of `align`."""
+    return Alignment(align, 4 % align)
+
+
+Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
+#: The widest alignment that there is.
+_WIDEST = 8
+_COUNT = 4
+
+
+class Extent(NamedTuple):
+    """A number of bytes: exactly that many, or at least."""
+
+    size: int
+    exact: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.size}" if self.exact else f"≥{self.size}"
+
+    @property
+    def in_bytes(self) -> str:
+        """The number in words, such as `1 byte`."""
+        return f"{self} byte" if self == Extent(1) else f"{self} bytes"
+
+
+class Placed(NamedTuple):
+    """A field with its offset and its size, without the padding before it."""
+
+    field: ir.Field
+    offset: Extent
+    size: Extent
+
+
+def layout(message: ir.Message, messages: Messages) -> tuple[list[Placed], Extent]:
+    """Return the fields of a structure that was linked without errors, and the size of all."""
+    return _Layouts(messages).fields(message.wire_fields, 0)
+
+
+class _Layouts:
+    """Lays structures out; each is laid out once for each alignment that it begins at."""
+
+    def __init__(self, messages: Messages) -> None:
+        self._messages = messages
+        self._known: dict[tuple[ir.TypeName, int], Extent] = {}
+
+    def fields(self, fields: Iterable[ir.Field], start: int) -> tuple[list[Placed], Extent]:
+        """Return fields from an offset on, and the bytes to the end of the last."""
+        placed = []
+        at, exact = start, True
+        for field in fields:
+            at += -at % self._alignment(field.type)
+            size = self._size(field.type, at)
+            placed.append(Placed(field, Extent(at, exact), size._replace(exact=size.exact)))
+            at, exact = at + size.size, exact and size.exact
+        return placed, Extent(at - start, exact)
+
+    def _alignment(self, type_: ir.FieldType) -> int:
+        """Return what the first value of a type aligns to."""
+        match type_:
+            case ir.Primitive():
+                return type_.info.size
+            case ir.Array():
+                return self._alignment(type_.element)
+            case ir.Ref():
+                return self._alignment(self._messages[type_.target].wire_fields[0].type)
+        return _COUNT
+
+    def _size(self, type_: ir.FieldType, at: int) -> Extent:
+        """Return the size of a value at an offset; of what varies, the least."""
+        match type_:
+            case ir.Primitive():
+                return Extent(type_.info.size)
+            case ir.String():
+                # the zero after a string is sent, the one after a wstring is not
+                return Extent(_COUNT + (not type_.wide), exact=False)
+            case ir.Array():
+                return self._repeated(type_.element, type_.size, at)
+            case ir.Ref():
+                return self._structure(type_.target, at % _WIDEST)
+        return Extent(_COUNT, exact=False)
+
+    def _structure(self, name: ir.TypeName, residue: int) -> Extent:
+        known = self._known.get((name, residue))
+        if known is None:
+            known = self.fields(self._messages[name].wire_fields, residue)[1]
+            self._known[name, residue] = known
+        return known
+
+    def _repeated(self, element: ir.Element, count: int, at: int) -> Extent:
+        """Return the size of an array; after eight elements at most, all repeats."""
+        start, exact = at, True
+        seen: dict[int, tuple[int, int]] = {}
+        left = count
+        while left:
+            if (residue := at % _WIDEST) in seen:
+                left_then, at_then = seen[residue]
+                rounds = left // (left_then - left)
+                at += rounds * (at - at_then)
+                left -= rounds * (left_then - left)
+                seen.clear()
+                if not left:
+                    break
+            seen[at % _WIDEST] = left, at
+            at += -at % self._alignment(element)
+            size = self._size(element, at)
+            at, exact, left = at + size.size, exact and size.exact, left - 1
+        return Extent(at - start, exact)
+
+
+MAX_FIELDS = 20_000
+#: Each message imports the next: ten Python frames, of which there are a thousand at most.
+MAX_DEPTH = 50
+#: Of all structures of a package together.
+MAX_PACKAGE_FIELDS = 2_000_000
+
+
+class _Extent(NamedTuple):
+    """The fields of a structure with all that it holds, and how deep they nest."""
+
+    fields: int
+    depth: int
+
+
+Extents: TypeAlias = dict[ir.TypeName, _Extent]
+
+
+def oversized(model: Model, extents: Extents | None = None) -> Iterator[Diagnostic]:
+    """Yield a problem for each of the model's own interfaces that is over a limit, or for all.
+
+    Packages that were compiled together share `extents`, so that each structure is measured once.
+    """
+    extents = {} if extents is None else extents
+    for interface in model.own:
+        _measure(interface, model, extents)
+    total, refused = 0, False
+    for interface in model.own:
+        worst = [extents[message.name] for message in derive.messages(interface)]
+        fields, depth = max(e.fields for e in worst), max(e.depth for e in worst)
+        path = interface.source.path if interface.source else str(interface.name)
+        total += sum(extent.fields for extent in worst)
+        if fields > MAX_FIELDS:
+            number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
+            message = f"`{interface.name}` has {number} fields, nested ones included"
+            hint = f"split it up; code is generated for at most {MAX_FIELDS:,}"
+        elif depth > MAX_DEPTH:
+            message = f"`{interface.name}` nests messages {depth} deep"
+            hint = f"flatten it; code is generated for a depth of at most {MAX_DEPTH}"
+        else:
+            continue
+        refused = True
+        yield codes.STRUCTURE_TOO_LARGE.of(path, message, hint=hint)
+    if total > MAX_PACKAGE_FIELDS and not refused:
+        message = f"`{model.package}` has {total:,} fields, nested ones included"
+        hint = f"split it into packages; code is generated for at most {MAX_PACKAGE_FIELDS:,}"
+        yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
+
+
+def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
+    """Measure structures after those that they hold; with a stack, so depth is no limit."""
+    parts = {message.name: message for message in derive.messages(interface)}
+    waiting = list(parts)
+    while waiting:
+        name = waiting[-1]
+        message = parts[name] if name in parts else model.interfaces[name]
+        assert isinstance(message, ir.Message)
+        held = message.references
+        missing = [one for one in held if one not in found]
+        if missing:
+            waiting += missing
+            continue
+        del waiting[-1]
+        found[name] = _Extent(
+            len(message.wire_fields) + sum(found[one].fields for one in held),
+            1 + max((found[one].depth for one in held), default=0),
+        )

@@ -1,0 +1,285 @@
+"""The layout of a structure on the wire, nested structures inlined (language 8).
+
+In: a structure and all others by name. Out: a tuple of steps in wire order, each with the local
+variable that holds its owner. Knows sizes and alignments; knows no Python text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TypeAlias
+
+import msgspec
+
+from idlc.model import ir, python_names
+
+Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where a value lives: a slot of the object in a local variable, of the structure `type`."""
+
+    owner: str
+    slot: str
+    local: str
+    type: ir.TypeName
+
+    @property
+    def text(self) -> str:
+        """The attribute expression."""
+        return f"{self.owner}.{self.slot}"
+
+
+class Number(msgspec.Struct, frozen=True):
+    """A bool, byte, integer or float; `code` as in `struct`."""
+
+    place: Place
+    code: str
+    size: int
+
+
+class Dummy(msgspec.Struct, frozen=True):
+    """The zero byte of a structure without fields."""
+
+    size: int = 1
+
+
+class Block(msgspec.Struct, frozen=True):
+    """A fixed-size array of bools, bytes or numbers, moved as bytes."""
+
+    place: Place
+    primitive: str
+    count: int
+
+    @property
+    def unit(self) -> int:
+        """Bytes of one element."""
+        return ir.PRIMITIVES[self.primitive].size
+
+    @property
+    def token(self) -> str:
+        """The array in the layout of a Struct, where it is a number of bytes or numbers."""
+        lists = self.primitive in LIST_PRIMITIVES
+        return f"{self.count}{'B' if lists else ir.PRIMITIVES[self.primitive].code}"
+
+    @property
+    def size(self) -> int:
+        """Bytes of all."""
+        return self.unit * self.count
+
+    @property
+    def is_large(self) -> bool:
+        """Whether moving the bytes once more would be noticed: it is a buffer of its own."""
+        return self.size > LARGE
+
+
+class Text(msgspec.Struct, frozen=True):
+    """A string or wstring."""
+
+    place: Place
+    wide: bool
+
+
+class Numbers(msgspec.Struct, frozen=True):
+    """A sequence of numbers, moved as one buffer."""
+
+    place: Place
+    primitive: str
+    bound: int | None
+
+    @property
+    def unit(self) -> int:
+        """Bytes of one element."""
+        return ir.PRIMITIVES[self.primitive].size
+
+    @property
+    def numpy(self) -> str:
+        """What numpy calls an element."""
+        return ir.PRIMITIVES[self.primitive].dtype
+
+    @property
+    def code(self) -> str:
+        """The array type code."""
+        return ir.PRIMITIVES[self.primitive].code
+
+
+class Bytes(msgspec.Struct, frozen=True):
+    """A sequence of bools or bytes, a list in Python."""
+
+    place: Place
+    primitive: str
+    bound: int | None
+
+
+class Texts(msgspec.Struct, frozen=True):
+    """An array (`size`) or sequence of strings."""
+
+    place: Place
+    wide: bool
+    size: int | None
+    bound: int | None
+
+
+class Enter(msgspec.Struct, frozen=True):
+    """A nested structure begins; the steps after it use its variable `place.local`."""
+
+    place: Place
+    type: ir.TypeName
+    empty: bool
+
+
+class Items(msgspec.Struct, frozen=True):
+    """An array (`size`) or sequence of structures; `body` has the steps of one, in `item`."""
+
+    place: Place
+    type: ir.TypeName
+    item: str
+    body: tuple[Step, ...]
+    size: int | None
+    bound: int | None
+
+
+Step: TypeAlias = Number | Dummy | Block | Text | Numbers | Bytes | Texts | Enter | Items
+
+#: The struct character where it is not the one of PRIMITIVES.
+CODES = {"bool": "?", "byte": "c"}
+#: What is a list in Python, and the runtime's word for it.
+LIST_PRIMITIVES = {"bool": "flags", "byte": "octets"}
+#: From more than so many bytes on, a fixed-size array is not part of a Struct.
+LARGE = 1024
+#: Up to so many elements, what is done once for all of them costs more than it saves.
+FEW = 4
+
+
+def steps(message: ir.Message, messages: Messages, names: python_names.Locals) -> tuple[Step, ...]:
+    """Return the steps of a structure whose object is in the variable `message`."""
+    return tuple(_steps(message, messages, names, "message", ()))
+
+
+def _steps(
+    message: ir.Message,
+    messages: Messages,
+    names: python_names.Locals,
+    owner: str,
+    path: tuple[str, ...],
+) -> list[Step]:
+    if not message.fields:
+        return [Dummy()]
+    found: list[Step] = []
+    for field in message.fields:
+        inner = (*path, field.name)
+        place = Place(owner, python_names.slot(field.name), names.shortest(inner), message.name)
+        if isinstance(field.type, ir.Ref):
+            nested = messages[field.type.target]
+            found.append(Enter(place, field.type.target, not nested.fields))
+            found += _steps(nested, messages, names, place.local, inner)
+        else:
+            found.append(_step(field.type, place, messages, names))
+    return found
+
+
+def _step(
+    type_: ir.FieldType, place: Place, messages: Messages, names: python_names.Locals
+) -> Step:
+    match type_:
+        case ir.Primitive(name):
+            return Number(place, CODES.get(name, type_.info.code), type_.info.size)
+        case ir.String(wide):
+            return Text(place, wide)
+        case ir.Array(ir.Primitive(name), size):
+            return Block(place, name, size)
+        case ir.Sequence(ir.Primitive(name), bound):
+            kind = Bytes if name in LIST_PRIMITIVES else Numbers
+            return kind(place, name, bound)
+        case ir.Array(element) | ir.Sequence(element):
+            length = type_.size if isinstance(type_, ir.Array) else None
+            bound = type_.bound if isinstance(type_, ir.Sequence) else None
+            if isinstance(element, ir.String):
+                return Texts(place, element.wide, length, bound)
+            if isinstance(element, ir.Ref):
+                item = names.new(f"{place.local}_item")
+                body = _steps(messages[element.target], messages, names, item, (item,))
+                return Items(place, element.target, item, tuple(body), length, bound)
+    raise ValueError(f"a type that cannot be emitted: {type_!r}")
+
+
+def alignment(step: Step) -> int:
+    """Return the alignment at which a step begins; 1 for what takes no bytes itself."""
+    match step:
+        case Number() | Dummy():
+            return step.size
+        case Block():
+            return step.unit
+        case Items(size=int()):
+            return next((a for a in map(alignment, step.body) if a > 1), 1)
+        case Enter():
+            return 1
+        case _:
+            return 4
+
+
+def smallest(body: tuple[Step, ...]) -> int:
+    """Return the least number of bytes that steps can take, padding not counted."""
+    total = 0
+    for step in body:
+        match step:
+            case Number() | Dummy() | Block():
+                total += step.size
+            case Text(wide=False):
+                total += 4
+            case Texts(size=int(size)):
+                total += 4 * size
+            case Items(size=int(size)):
+                total += size * smallest(step.body)
+            case Enter():
+                pass
+            case _:
+                total += 4
+    return total
+
+
+def is_many(step: Items) -> bool:
+    """Return whether there may be so many elements that preparing for them is worth its cost."""
+    most = step.bound if step.size is None else step.size
+    return most is None or most > FEW
+
+
+def is_text(body: tuple[Step, ...]) -> bool:
+    """Return whether steps are strings, and structures of them, with only single bytes between."""
+    for step in body:
+        match step:
+            case Text(wide=False) | Number(size=1) | Enter():
+                pass
+            case Items() if is_text(step.body):
+                pass
+            case _:
+                return False
+    return any(isinstance(step, (Text, Items)) for step in body)
+
+
+class Fixed(msgspec.Struct, frozen=True):
+    """Elements that repeat at a constant distance.
+
+    `size` is what one takes, `stride` what it takes with the padding before the next.
+    """
+
+    align: int
+    size: int
+    stride: int
+
+
+def fixed(body: tuple[Step, ...]) -> Fixed | None:
+    """Return how elements of these steps repeat, or None if that depends on their values."""
+    at = 0
+    align = 1
+    first = 0
+    for step in body:
+        if isinstance(step, Enter):
+            continue
+        if not isinstance(step, (Number, Dummy, Block)):
+            return None
+        unit = alignment(step)
+        first = first or unit
+        align = max(align, unit)
+        at += -at % unit + step.size
+    return Fixed(align, at, at + -at % align) if first == align else None
