@@ -24,7 +24,7 @@ def gen(package: Path, out: Path) -> None:
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions
     from idlc.generate.gen import gen as gen_gen
-    from idlc.project.scope import Scope
+    from idlc.project.settings import Scope
 
     paths, include = (str(package),), (str(package.parent),)
     options = GenOptions(paths, str(out / package.name), Scope(package.name, include))

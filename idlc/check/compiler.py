@@ -17,7 +17,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import derive, ir
 from idlc.project import inputs
 from idlc.project.library import Library
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.check.registry import Memory

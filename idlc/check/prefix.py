@@ -25,10 +25,8 @@ from idlc.project.prefixes import (
     installed_packages,
     prefixes,
 )
-from idlc.project.prefixes import (
-    machine as this_machine,
-)
-from idlc.project.scope import Scope
+from idlc.project.prefixes import machine as this_machine
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.model.link import Model

@@ -14,7 +14,7 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import inputs
 from idlc.project.files import absolute
 from idlc.project.find import KINDS, look, nothing_in
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.check.registry import Memory

@@ -18,8 +18,7 @@ from idlc.compare.distribution import is_distro
 from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
     from idlc.compare.recording import RecordedVerdict

@@ -9,8 +9,7 @@ from idlc.model import ir
 from idlc.model.distros import BY_NAME
 from idlc.project import inputs
 from idlc.project.library import Library
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 
 
 def packages(word: str, include: Sequence[str], distro: str | None = None) -> list[str]:

@@ -33,8 +33,7 @@ def command(wanted: str, package: str | None, include: tuple[str, ...], distro: 
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.documents.query import describe
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)

@@ -10,8 +10,7 @@ from idlc.check import select
 from idlc.check.run import Checked, CheckOptions, check
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 
 
 class Wishes(msgspec.Struct, frozen=True):

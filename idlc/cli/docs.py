@@ -41,8 +41,7 @@ def command(
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import counted
     from idlc.documents.docs import docs
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)

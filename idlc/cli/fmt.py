@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 import click
 
 from idlc.check.compiler import stage
+from idlc.check.format import laid_out
 from idlc.cli import options, output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line, visible
 from idlc.model import ir
-from idlc.model.format import laid_out
 from idlc.project.atomic import rewrite
 from idlc.project.files import read_source
 from idlc.project.find import Exclusions, InterfaceFile, find
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source

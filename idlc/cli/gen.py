@@ -179,8 +179,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     it from.
     """
     from idlc.generate.gen import in_package, with_settings
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)

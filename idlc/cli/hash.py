@@ -43,8 +43,7 @@ def command(
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.documents.query import hashes
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)

@@ -34,8 +34,7 @@ def command(
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.project import library
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     where = scope(load_settings(report), include=include, distro=distro)

@@ -120,8 +120,7 @@ def _problems(path: Path) -> list[Diagnostic]:
     from idlc.check import select
     from idlc.check.run import CheckOptions, check
     from idlc.diagnostics.report import Report
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)

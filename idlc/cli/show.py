@@ -10,7 +10,7 @@ import click
 from idlc.cli import completion, options, output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import display_width, one_line
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.show import TopicFacts, definitions, topics
 
 #: Characters of a hash that people compare.
@@ -103,8 +103,7 @@ def command(
     TOPIC, the definitions of their types.
     """
     from idlc.documents.show import show
-    from idlc.project.scope import scope
-    from idlc.project.settings import load_settings
+    from idlc.project.settings import load_settings, scope
     from idlc.recordings.find import is_recording
 
     report = Report()

@@ -36,8 +36,7 @@ from idlc.project.git import Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import manifest, read_statements
-from idlc.project.scope import Scope, working_in
-from idlc.project.settings import Config
+from idlc.project.settings import Config, Scope, working_in
 from idlc.wire.layout import Extents, oversized
 
 if TYPE_CHECKING:

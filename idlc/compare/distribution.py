@@ -14,7 +14,7 @@ from idlc.model.distros import BY_NAME, Distro, unknown_distro
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.library import Library
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 PREFIX = "distro:"
 

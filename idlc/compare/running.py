@@ -40,7 +40,7 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import look, nothing_in
 from idlc.project.library import Library
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from idlc.project.files import absolute
 from idlc.project.find import find
 from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
 from idlc.project.package_xml import manifest, read_statements
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.project.write import Change, Plan, apply_changes, journals, sweep
 
 if TYPE_CHECKING:

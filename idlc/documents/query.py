@@ -14,7 +14,7 @@ from idlc.model.distros import Distro, later
 from idlc.project import inputs
 from idlc.project.find import find, is_path
 from idlc.project.library import resolve
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.find import divided
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
 from idlc.model.ir import spell, spell_value
 from idlc.model.link import Model
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 INDENT = "    "
 GAP = 2

@@ -23,8 +23,7 @@ from idlc.project.files import MAX_SIZE, Unsaved, absolute
 from idlc.project.find import Found, Picture, look, root_of
 from idlc.project.inputs import locks, places
 from idlc.project.package_xml import MANIFEST, manifest
-from idlc.project.scope import scope, working_in
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope, working_in
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
     from idlc.project.package_xml import Facts
 
 #: What a check of a package may read beside its interfaces.
-AROUND = (MANIFEST, settings.FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
+AROUND = (MANIFEST, settings.SETTINGS_FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
 
 
 class Wishes(msgspec.Struct, frozen=True, rename="camel"):
@@ -196,7 +195,9 @@ class Workspace:
 
     def concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change what is known."""
-        if path.name in (settings.FILE, MANIFEST) and self.folder.is_relative_to(path.parent):
+        if path.name in (settings.SETTINGS_FILE, MANIFEST) and self.folder.is_relative_to(
+            path.parent
+        ):
             return True
         folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
         return any(path.is_relative_to(one) for one in (*folders, *prefixes.ament_prefixes()))

@@ -21,8 +21,7 @@ from idlc.project.find import is_path, root_of
 from idlc.project.library import resolve
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import declared_name, manifest
-from idlc.project.scope import Scope, scope, working_in
-from idlc.project.settings import Config, load_settings
+from idlc.project.settings import Config, Scope, load_settings, scope, working_in
 from idlc.recordings.find import divided
 from idlc.version import __version__
 
@@ -251,7 +250,7 @@ def run_for(path: Path, package: str) -> Run | None:
     generated package in the source package, or beside its interfaces.
     """
     for folder in path.parents:
-        if is_file(folder / settings.FILE) and (found := _by_settings(folder, path)):
+        if is_file(folder / settings.SETTINGS_FILE) and (found := _by_settings(folder, path)):
             return found
     return _by_lock(path, package)
 

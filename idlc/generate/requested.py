@@ -20,7 +20,7 @@ from idlc.project.inputs import accept_name, by_home, places, several
 from idlc.project.library import Library
 from idlc.project.lock import FILE
 from idlc.project.package_xml import declared_name, manifest
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 
 def wanted(

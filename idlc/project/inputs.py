@@ -17,8 +17,7 @@ from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, decode, is_file,
 from idlc.project.find import InterfaceFile, find, look
 from idlc.project.lock import digest, load_lock, meaning
 from idlc.project.package_xml import declared_name, manifest
-from idlc.project.scope import Scope, scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import Scope, load_settings, scope
 
 
 def by_home(files: Iterable[InterfaceFile]) -> dict[Path, list[InterfaceFile]]:

@@ -20,7 +20,7 @@ from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, is_file, is_fold
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
 from idlc.project.package_xml import declared_name, manifest
 from idlc.project.prefixes import installed
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source

@@ -5,10 +5,12 @@ Paths in it are relative to the file's folder. A mistake is reported as IDL611.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
@@ -21,8 +23,10 @@ from idlc.diagnostics.codes import BAD_CONFIG
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean
-from idlc.model.distros import BY_NAME, listed, unknown_distro
+from idlc.model.distros import BY_NAME, DEFAULT, Distro, listed, unknown_distro
 from idlc.project.files import NOTHING_OPEN, Unsaved, decode, shown
+from idlc.project.find import Exclusions, exclusion
+from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -118,7 +122,7 @@ def _meta(type_: Any) -> Meta:
     return next(one for one in get_args(type_) if isinstance(one, Meta))
 
 
-FILE = "pyproject.toml"
+SETTINGS_FILE = "pyproject.toml"
 #: The square of the dots in each line, added up, from which on reading takes a second.
 _COSTLY = 10_000_000
 
@@ -161,7 +165,7 @@ class Config(msgspec.Struct, frozen=True):
 def load_settings(report: Report, unsaved: Unsaved = NOTHING_OPEN) -> Config:
     """Return the settings that hold in the working folder."""
     for folder in (here := Path.cwd(), *here.parents):
-        path = folder / FILE
+        path = folder / SETTINGS_FILE
         if unsaved.is_file(path):
             return _read(path, report, unsaved)
     return Config()
@@ -264,3 +268,73 @@ def command_table(
     found = read_table(config.tables.get(name, {}), shape, place, report)
     assert found is not None
     return found, place
+
+
+class Scope(msgspec.Struct, frozen=True):
+    """The package's name if it was given, folders with other packages, files that are left out.
+
+    `out` is the folder that [tool.idlc] compiles `paths` into; its name may be the package's.
+    `distros` are the distributions of ROS 2 that files are read for, one except for `check`;
+    none means the one that is installed. `unsaved` counts instead of what files hold.
+    """
+
+    package: str | None = None
+    include: tuple[str, ...] = ()
+    exclude: Exclusions = Exclusions()
+    paths: tuple[str, ...] = ()
+    out: str | None = None
+    distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros_scope(()))
+    unsaved: Unsaved = NOTHING_OPEN
+
+    @property
+    def distro(self) -> Distro:
+        """The distribution that files are read for where that is one."""
+        return self.distros[0] if self.distros else _installed()
+
+
+def scope(
+    settings: Config,
+    package: str | None = None,
+    include: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    distro: str | None = None,
+) -> Scope:
+    """Return what was typed, with what pyproject.toml says; `distro` is a list with commas."""
+    left_out = [exclusion(exclude, Path.cwd())] if exclude else []
+    if settings.exclude and settings.folder is not None:
+        left_out.append(exclusion(settings.exclude, settings.folder))
+    return Scope(
+        package or settings.package,
+        (*include, *settings.include),
+        Exclusions(tuple(left_out)),
+        settings.paths,
+        settings.out,
+        _distros_scope(listed(distro) if distro else settings.distro),
+    )
+
+
+def _distros_scope(names: Sequence[str]) -> tuple[Distro, ...]:
+    """Return the distributions with these names, each once."""
+    return tuple(dict.fromkeys(BY_NAME[name] for name in names))
+
+
+def _installed() -> Distro:
+    """Return the distribution that is installed here, or the default for an unknown one."""
+    return BY_NAME.get(distribution().name, DEFAULT)
+
+
+@contextmanager
+def working_in(folder: Path) -> Iterator[None]:
+    """Work in a folder, as after `cd`; one that is gone raises OSError.
+
+    If the folder from before is gone, which a server may outlive, the process stays in this one.
+    """
+    before = folder
+    with contextlib.suppress(OSError):
+        before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            os.chdir(before)

@@ -21,8 +21,7 @@ from idlc.model import ir
 from idlc.model.python_names import class_
 from idlc.project.find import is_path
 from idlc.project.library import resolve
-from idlc.project.scope import Scope, scope
-from idlc.project.settings import Config
+from idlc.project.settings import Config, Scope, scope
 from idlc.project.templates import RenderedFile
 from idlc.project.templates import folder as caches
 from idlc.recordings.containers.source import RecordingError

@@ -18,7 +18,7 @@ from idlc.model import ir
 from idlc.project import inputs, prefixes
 from idlc.project.files import absolute
 from idlc.project.library import Library
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, Around, RecordedTypes, recorded_types
 
 if TYPE_CHECKING:

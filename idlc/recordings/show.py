@@ -8,7 +8,7 @@ from typing import NamedTuple
 from idlc.check.compiler import stage
 from idlc.diagnostics.report import Report
 from idlc.documents.show import shown
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.definitions import Recorded
 from idlc.recordings.types import Around, recorded_types
 from idlc.recordings.versions import read, topics_of, versions

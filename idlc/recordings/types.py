@@ -17,7 +17,7 @@ from idlc.model.describe import Describer
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.library import Library
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.definitions import ENCODINGS, Recorded
 from idlc.recordings.versions import Contents, Version
 from idlc.wire.layout import Extents, oversized

@@ -17,8 +17,7 @@ from idlc.project.edits import Edited, Outcome
 from idlc.project.files import absolute, shown
 from idlc.project.library import Library
 from idlc.project.package_xml import declared_name, manifest
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 from idlc.project.templates import keep
 from idlc.scaffold.project import Done, Project
 from idlc.scaffold.roles import ROLES

@@ -11,6 +11,7 @@ from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir, names
 from idlc.model.link import Model
+from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.scaffold import package
 from idlc.scaffold.changes import (
@@ -25,7 +26,7 @@ from idlc.scaffold.changes import (
     templates,
     write,
 )
-from idlc.scaffold.edits import data_files, package_xml
+from idlc.scaffold.edits import data_files
 from idlc.scaffold.project import Project
 from idlc.scaffold.templates import Templates
 
@@ -146,7 +147,9 @@ def enter_interface(
     needed = implied_packages(model)
     tests = ["python3-pytest"] if tested else []
     edits: dict[str, Outcome] = {
-        MANIFEST: package_xml.add(texts.get(MANIFEST, ""), depends=needed, tests=tests, group=True)
+        MANIFEST: package_xml.add_dependencies(
+            texts.get(MANIFEST, ""), depends=needed, tests=tests, group=True
+        )
     }
     if CMAKE in texts:
         edits[CMAKE] = add_cmake_dependencies(texts[CMAKE], needed)

@@ -14,6 +14,7 @@ from idlc.check.package.facts import folders
 from idlc.diagnostics.report import Report
 from idlc.model import ir
 from idlc.model.distros import BY_NAME, DEFAULT
+from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Script
 from idlc.project.prefixes import distribution, python_folders
 from idlc.scaffold import node_tests, spec
@@ -30,7 +31,7 @@ from idlc.scaffold.changes import (
     type_name,
     write,
 )
-from idlc.scaffold.edits import data_files, launch_py, package_xml, setup_py
+from idlc.scaffold.edits import data_files, launch_py, setup_py
 from idlc.scaffold.node import MAIN_MODULE, render
 from idlc.scaffold.package import package_view, rendered
 from idlc.scaffold.project import Project
@@ -84,7 +85,9 @@ def enter_node(
         described[SETUP] = data_files.add_interfaces(text, node.package, own, folders)
     path, outcome = setup_py.add_console_script(described, script)
     tests = node_tests.packages(planned)
-    manifest = package_xml.add(texts.get(MANIFEST, ""), depends=planned.packages, tests=tests)
+    manifest = package_xml.add_dependencies(
+        texts.get(MANIFEST, ""), depends=planned.packages, tests=tests
+    )
     support = _support(node.package, texts, files, templates)
     return Entry(support, {path: outcome, MANIFEST: manifest})
 
@@ -101,7 +104,7 @@ def enter_launch(
     node = planned.node
     manifest = entry.edits.get(MANIFEST)
     if isinstance(manifest, Edited):  # what launch files import
-        needed = package_xml.add(manifest.text, executes=("launch", "launch_ros"))
+        needed = package_xml.add_dependencies(manifest.text, executes=("launch", "launch_ros"))
         entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
     started = launch_py.Started(node.package, node.name, node.lifecycle)
     path = next((one for one in texts if one.startswith("launch/")), "")

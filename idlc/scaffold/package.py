@@ -14,8 +14,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
-from idlc.project.scope import scope
-from idlc.project.settings import load_settings
+from idlc.project.settings import load_settings, scope
 from idlc.scaffold.changes import Result, Settings, rendering, templates, write
 from idlc.scaffold.project import Project
 from idlc.scaffold.templates import Templates

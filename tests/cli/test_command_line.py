@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from idlc import __version__
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
 from idlc.diagnostics import codes
 from idlc.diagnostics.formats import DOCUMENTS
+from idlc.version import __version__
 from tests.support import recordings
 from tests.support.files import write
 from tests.support.paths import ROOT

@@ -11,7 +11,7 @@ from idlc.model.ir import TypeName
 from idlc.project.find import find
 from idlc.project.library import Library
 from idlc.project.lock import meaning
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from tests.support.files import write
 
 MSG = "float64 speed\n"

@@ -15,7 +15,7 @@ from idlc.generate.native.library import MACHINES, libraries
 from idlc.project.find import look
 from idlc.project.inputs import load
 from idlc.project.prefixes import Distribution
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 LIBRARY = "lib/libarm__rosidl_typesupport_cpp.so"
 FIELDS = "lib/libarm__rosidl_typesupport_introspection_cpp.so"

@@ -9,7 +9,7 @@ import pytest
 from idlc.diagnostics.report import Report
 from idlc.generate import target
 from idlc.generate.gen import GenOptions, gen
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 PACKAGE = Path(target.__file__).parents[2]
 MAKERS = [path for path in target._MAKERS if path.is_dir()]

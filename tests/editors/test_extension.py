@@ -6,11 +6,11 @@ import re
 import msgspec
 import pytest
 
-from idlc import __version__
 from idlc.editor.world import Settings
 from idlc.model.ir import PRIMITIVES
 from idlc.model.lower_types import STRINGS
 from idlc.project.find import KINDS
+from idlc.version import __version__
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "editors" / "vscode"

@@ -6,12 +6,12 @@ import stat
 
 import pytest
 
+from idlc.check.format import laid_out
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.language.parse import parse, parse_definition
 from idlc.language.tree import Broken, Constant
-from idlc.model.format import laid_out
 from idlc.model.ir import TypeName
 
 LOOSE = "float64   speed# [m/s]"

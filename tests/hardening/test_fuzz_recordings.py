@@ -20,7 +20,7 @@ import idlc
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.generate.idl import idl
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic, open_recording
 from idlc.recordings.containers.messages import ALWAYS, Ranges
 from idlc.recordings.containers.source import RecordingError

@@ -15,7 +15,7 @@ from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.link import link
 from idlc.model.lower import lower
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import recorded, type_name
 from idlc.recordings.types import Around, recorded_types

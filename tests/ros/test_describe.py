@@ -6,7 +6,7 @@ from pathlib import Path
 
 from idlc.diagnostics.report import Report
 from idlc.documents.query import describe
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 
 INSTALLED = [
     path

@@ -5,9 +5,10 @@ import difflib
 import pytest
 from catkin_pkg.package import parse_package_string
 
+from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.scaffold import interface
-from idlc.scaffold.edits import data_files, launch_py, package_xml
+from idlc.scaffold.edits import data_files, launch_py
 from idlc.scaffold.edits.setup_py import add_console_script
 
 TALKING = launch_py.Started("demo", "talker")
@@ -46,7 +47,7 @@ MANIFEST = """\
 
 
 def test_dependencies_are_added_where_they_are_missing():
-    outcome = package_xml.add(
+    outcome = package_xml.add_dependencies(
         MANIFEST, depends=["rclpy", "std_msgs", "std_srvs", "demo"], tests=["t"], group=True
     )
     after = text_of(outcome)
@@ -57,7 +58,7 @@ def test_dependencies_are_added_where_they_are_missing():
     ]
     package = parse_package_string(after)
     assert {d.name for d in package.exec_depends} >= {"rclpy", "std_msgs", "std_srvs"}
-    again = package_xml.add(
+    again = package_xml.add_dependencies(
         after, depends=["rclpy", "std_msgs", "std_srvs"], tests=["t"], group=True
     )
     assert again == outcome
@@ -65,24 +66,24 @@ def test_dependencies_are_added_where_they_are_missing():
 
 def test_line_ends_and_short_manifests():
     crlf = MANIFEST.replace("\n", "\r\n")
-    after = text_of(package_xml.add(crlf, depends=["x"]))
+    after = text_of(package_xml.add_dependencies(crlf, depends=["x"]))
     assert after.count("\r\n") == after.count("\n") == crlf.count("\n") + 1
     short = '<package format="3"><name>demo</name></package>'
-    after = text_of(package_xml.add(short, depends=["x"], group=True))
+    after = text_of(package_xml.add_dependencies(short, depends=["x"], group=True))
     assert "<depend>x</depend>" in after
-    assert package_xml.add(after, depends=["x"], group=True) == Edited(after)
+    assert package_xml.add_dependencies(after, depends=["x"], group=True) == Edited(after)
 
 
 def test_older_formats():
     old = MANIFEST.replace(' format="3"', "").replace("<depend>", "<run_depend>")
     old = old.replace("</depend>", "</run_depend>")
-    after = text_of(package_xml.add(old, depends=["rclpy", "x"], group=True))
+    after = text_of(package_xml.add_dependencies(old, depends=["rclpy", "x"], group=True))
     assert added(old, after) == ["    <run_depend>x</run_depend>\n"]
 
 
 @pytest.mark.parametrize("text", ["", "<package>", "<robot><name>x</name></robot>"])
 def test_what_is_no_manifest_is_refused(text):
-    assert isinstance(package_xml.add(text, depends=["x"]), Refused)
+    assert isinstance(package_xml.add_dependencies(text, depends=["x"]), Refused)
 
 
 LAUNCH = '''\

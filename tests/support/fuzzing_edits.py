@@ -10,8 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
+from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Script
-from idlc.scaffold.edits import launch_py, package_xml, setup_py
+from idlc.scaffold.edits import launch_py, setup_py
 
 TALKER = Script("talker", "demo.talker:main")
 
@@ -70,7 +71,9 @@ def manifest(data: bytes, _: Path) -> None:
     """A package.xml gets dependencies, and keeps every element and every other character."""
 
     def edit(text: str) -> Outcome:
-        return package_xml.add(text, depends=("rclpy", "b&c"), tests=("pytest",), group=True)
+        return package_xml.add_dependencies(
+            text, depends=("rclpy", "b&c"), tests=("pytest",), group=True
+        )
 
     found = edited(data, edit)
     if found:

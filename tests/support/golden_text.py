@@ -21,8 +21,8 @@ import shlex
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc import __version__
 from idlc.cli.main import main
+from idlc.version import __version__
 from tests.support import recorded_text
 from tests.support.recorded_graph import RecordedGraph, end, take_the_place
 

@@ -8,7 +8,7 @@ from idlc.diagnostics.report import Report
 from idlc.generate.native.library import MACHINES, libraries
 from idlc.project.find import look
 from idlc.project.inputs import packages
-from idlc.project.scope import Scope
+from idlc.project.settings import Scope
 from tests.support.installed import installed_layout
 from tests.support.paths import PROGRAMS
 from tests.support.tools import run, tool

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from idlc.check.format import laid_out
 from idlc.diagnostics.report import Report
 from idlc.editor.edits import differences
 from idlc.editor.protocol.parts import AtPosition, OfDocument, OfRange, TextEdit
 from idlc.editor.world import World
-from idlc.model.format import laid_out
 
 
 def document(world: World, asked: OfDocument) -> list[TextEdit]:

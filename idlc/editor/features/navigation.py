@@ -28,7 +28,7 @@ from idlc.model.distros import BY_NAME
 from idlc.project.files import is_file
 from idlc.project.package_xml import MANIFEST, manifest, statements
 from idlc.project.prefixes import ament_prefixes
-from idlc.project.scope import working_in
+from idlc.project.settings import working_in
 
 _TOP = Range(Position(0, 0), Position(0, 0))
 
