@@ -38,7 +38,7 @@ DEMO_OUT := build/demo
 VSCODE := build/vscode
 TEST_EXTRA := $(if $(filter no,$(ROS)),test,test-ros)
 WITHOUT_ROS := --ignore=tests/ros --ignore=tests/website
-BROWSER_TESTS := tests/cli/test_docs_browser.py tests/website/test_website_browser.py
+BROWSER_TESTS := tests/documents/test_docs_browser.py tests/website/test_website_browser.py
 WITHOUT_BROWSER := $(if $(filter no,$(BROWSER)),$(BROWSER_TESTS:%=--ignore=%))
 WITHOUT_EDITORS := $(if $(filter no,$(EDITORS)),--ignore=tests/editors/test_debian.py)
 SELECTION := $(if $(filter no,$(ROS)),$(WITHOUT_ROS)) $(WITHOUT_BROWSER) $(WITHOUT_EDITORS)
@@ -86,13 +86,13 @@ test-long: $(TEST_ENV)/installed ## run the tests that take long: they build, in
 	$(TEST_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'long$(NOT_ROS)' $(SELECTION) $(ARGS)
 
 test-bare: ## run the commands of the README on a bare Debian: as root and a user, with gcc and without
-	sh tests/project/bare.sh $(WAYS)
+	sh tests/repository/bare.sh $(WAYS)
 
 test-kilted: $(KILTED_ENV)/installed ## run the tests of what works with ROS 2 on the wheels of Kilted
 	$(KILTED_ENV)/bin/python -m pytest -n 2 --dist worksteal -m 'not jazzy' tests/ros $(ARGS)
 
 test-all: ## run the tests on every interpreter in INTERPRETERS that is present
-	@PYTHON=$(PYTHON) sh tests/project/every_python.sh $(INTERPRETERS)
+	@PYTHON=$(PYTHON) sh tests/repository/every_python.sh $(INTERPRETERS)
 
 test-lowest: ## run the tests that need no ROS with the lowest versions that pyproject.toml allows
 	@$(MAKE) --no-print-directory LOCKED=yes EXTRA=test-lowest $(LOWEST_ENV)/installed

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from idlc import backend
-from tests.backend.test_hooks import BUILD
-from tests.backend.test_installs import PIP, run, site
+from tests.build.test_hooks import BUILD
+from tests.build.test_installs import PIP, run, site
 from tests.support.installed import SHARE, interfaces, names_in
 from tests.support.native import FAR, both_ways
 from tests.support.paths import PROGRAMS

@@ -15,7 +15,7 @@ from idlc.language.format import format_file
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.lower import lower
-from tests.front_end.test_format import assert_only_the_layout_changes
+from tests.language.test_format import assert_only_the_layout_changes
 
 SHARE = Path(sys.prefix) / "share"
 FILES = sorted(path for kind in ir.KINDS for path in SHARE.glob(f"*/{kind}/*.{kind}"))

@@ -1,6 +1,6 @@
 """docs/language.md is true: its examples, its tables, and the sections that others cite.
 
-`IDLC_REFRESH=docs/language pytest tests/front_end/test_language.py` writes the arrows anew, and
+`IDLC_REFRESH=docs/language pytest tests/language/test_language.py` writes the arrows anew, and
 fails.
 """
 

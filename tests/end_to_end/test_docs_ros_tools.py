@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.backend.test_hooks import BUILD, FILES, built, read, write
-from tests.backend.test_installs import site
+from tests.build.test_hooks import BUILD, FILES, built, read, write
+from tests.build.test_installs import site
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import ended
 

@@ -1,6 +1,6 @@
 """Each golden/diag/*.txt says what it says; every code has a case and a page with examples.
 
-`IDLC_REFRESH='diag/IDL2*' pytest tests/front_end/test_golden_diag.py` rewrites the cases that
+`IDLC_REFRESH='diag/IDL2*' pytest tests/check/test_golden_diag.py` rewrites the cases that
 match, and fails, so that the changes are looked at.
 """
 

@@ -37,7 +37,7 @@ IDENTIFIER = re.compile(r"__(\w+)\.so$")
 HERE = Path(__file__).parent
 AGAIN = """
 import hashlib, sys
-from tests.native import test_file as t
+from tests.generate.native import test_file as t
 model = t.model_of("demo_msgs", t.ORDINARY)
 for content in t.libraries(model, t.MADE_FOR[sys.argv[1]]).values():
     print(hashlib.sha256(content).hexdigest())

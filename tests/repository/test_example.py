@@ -1,6 +1,6 @@
 """The example is what its README says: its commands and edits, carried out in an empty folder.
 
-`IDLC_REFRESH=example pytest tests/project/test_example.py` writes the result over the example,
+`IDLC_REFRESH=example pytest tests/repository/test_example.py` writes the result over the example,
 and fails.
 """
 

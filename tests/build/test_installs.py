@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.backend.test_hooks import BUILD, FILES, MANIFEST, tree, write
-from tests.project.test_wheel import Environment, distributions, run
+from tests.build.test_hooks import BUILD, FILES, MANIFEST, tree, write
+from tests.repository.test_wheel import Environment, distributions, run
 from tests.support.programs import clean_environment, ended
 
 pytestmark = pytest.mark.long

@@ -1,6 +1,6 @@
 """Each golden/gen/<case>/in compiles to out; out is typed, formatted, clean and works.
 
-`IDLC_REFRESH='gen/*' pytest tests/emit/test_golden_gen.py` rewrites the cases that match, and
+`IDLC_REFRESH='gen/*' pytest tests/generate/test_golden_gen.py` rewrites the cases that match, and
 fails, so that the changes are looked at. The support package is the same in all cases and not
 among them.
 """

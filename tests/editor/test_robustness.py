@@ -11,7 +11,7 @@ from io import BytesIO
 import pytest
 
 from idlc.editor.server import METHODS, Server
-from tests.lsp.test_golden_replay import notification, request
+from tests.editor.test_golden_replay import notification, request
 
 PATIENCE = 30
 

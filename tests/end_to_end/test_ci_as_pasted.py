@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.cli.test_pre_commit import clone, git
+from tests.end_to_end.test_pre_commit import clone, git
 from tests.support.files import write
 from tests.support.github_runner import Runner, plain_environment
 from tests.support.paths import DOCS

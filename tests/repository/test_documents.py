@@ -1,6 +1,6 @@
 """The reference documents say what is: commands, settings, the API of generated classes, links.
 
-`IDLC_REFRESH=docs/command-line pytest tests/project/test_documents.py` writes that page anew,
+`IDLC_REFRESH=docs/command-line pytest tests/repository/test_documents.py` writes that page anew,
 and fails.
 """
 

@@ -1,0 +1,67 @@
+"""What the setup.py of a scaffolded package calls: its interfaces compiled before it is built."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from idlc.build.setup_command import distribution_class
+from idlc.check.compiler import models_of
+from idlc.check.package.facts import home_of
+from idlc.cli import output
+from idlc.diagnostics.report import Report
+from idlc.diagnostics.text import without_options
+from idlc.generate.gen import GenOptions, gen
+from idlc.generate.prefix import libraries_of, shared
+from idlc.generate.python.render import support_packages
+from idlc.project.files import is_file, read_bytes
+from idlc.project.find import look
+from idlc.project.inputs import packages
+from idlc.project.package_xml import MANIFEST
+from idlc.project.settings import load_settings, scope
+
+
+def compile_interfaces(package: str) -> dict[str, type]:
+    """Bring the package's classes up to date, and install what rosidl installs beside them.
+
+    Returns further arguments for setup(), `setup(..., **compiled)`: with them it installs the
+    interfaces, their descriptions, libraries for C++ tools and the entries in ROS 2's index. These
+    replace what `data_files` lists for the same places.
+
+    Works in the folder of the setup.py that is run, and writes only classes there, and only where
+    they changed. A rejected interface ends the build with a report.
+    """
+    if "--dry-run" in sys.argv:
+        return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
+    here, source = Path.cwd(), Path("setup.py").resolve().parent
+    os.chdir(source)
+    try:
+        with without_options():
+            return {"distclass": _compiled(package)}
+    finally:
+        os.chdir(here)
+
+
+def _compiled(package: str) -> type:
+    """Compile the package in the working folder; return a class for setup(distclass=...)."""
+    report = Report()
+    settings = load_settings(report)
+    where = scope(settings, package)
+    given = packages(look((".",), Report(), where.exclude).files, where, report)
+    if not given:
+        return distribution_class(package, {})
+    home = home_of(Path.cwd(), package).relative_to(Path.cwd()).as_posix()
+    gen(GenOptions((".",), home, scope=where, vendor_deps=settings.vendor_deps), report)
+    manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
+    if report.had_errors:
+        output.show(report, "text", sys.stderr)
+        raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
+    ((_, model),) = models_of(given, where, Report())
+    libraries = libraries_of(model)
+    files = shared(model, manifest, libraries, report)
+    output.show(report, "text", sys.stderr)
+    output.notes(report, sys.stderr)
+    parts = {*support_packages(), *(key.partition("/")[0] for key in given[0].digests)}
+    generated = (package, *(f"{package}.{part}" for part in parts))
+    return distribution_class(package, files, generated, libraries.build_tag)

@@ -1,0 +1,119 @@
+"""What is installed for a package: its classes, and what ROS 2's tools look for in a prefix."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from idlc.check.compiler import models_of
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.generate.gen import GenOptions, gen
+from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
+from idlc.project import settings
+from idlc.project.files import is_folder, read_bytes, shown
+from idlc.project.find import look, nothing_in
+from idlc.project.inputs import Inputs, packages
+from idlc.project.lock import load_lock
+from idlc.project.package_xml import MANIFEST
+from idlc.project.prefixes import INDEX, Distribution
+from idlc.project.settings import Place, Scope, load_settings, scope
+
+
+class Options(NamedTuple):
+    """What a frontend says: for which distribution libraries are, and whether there are any."""
+
+    distribution: Distribution | None
+    libraries: bool = True
+
+
+class Content(NamedTuple):
+    """The folder with the classes, and the files of the prefix by their paths in it.
+
+    `libraries` are those among them.
+    """
+
+    classes: Path
+    prefix: Mapping[str, bytes]
+    libraries: Libraries
+
+
+def compiled(name: str, classes: Path, options: Options, report: Report) -> Content | None:
+    """Compile the package in the working folder, its classes into a folder of their own.
+
+    Returns `None` after a problem.
+    """
+    config = load_settings(report)
+    if config.source:
+        place = Place(config.source, "tool.idlc", "[tool.idlc]")
+        if config.vendor_deps:
+            message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
+            hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
+            place.wrong("vendor-deps", message, report, hint)
+        if config.package not in (None, name):
+            message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
+            place.wrong("package", message, report, "remove `package` from [tool.idlc]")
+    settings = scope(config, distro=options.distribution and options.distribution.name)
+    where = msgspec.structs.replace(
+        settings, package=None, include=(*settings.include, *_required_prefixes())
+    )
+    given = _package(name, where, report)
+    if given is None:
+        return None
+    _refuse_code(name, report)
+    made = Report()
+    gen(GenOptions(paths=(".",), out=str(classes), scope=where), made)
+    # who builds a package need not be able to import it
+    report.extend(one for one in made if one.code != codes.DEPENDENCY_NOT_IMPORTABLE.id)
+    manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
+    if report.had_errors or manifest is None:
+        return None
+    ((_, model),) = models_of((given,), where, Report())
+    if options.libraries:
+        libraries = libraries_of(model, options.distribution)
+    else:
+        libraries = Libraries({}, "the build was told `libraries=no`", build_tag(model))
+    return Content(classes, shared(model, manifest, libraries, report), libraries)
+
+
+def _refuse_code(name: str, report: Report) -> None:
+    """Report Python modules beside committed classes: the wheel would not have them."""
+    lock = load_lock(Path(name), name, report)
+    # where classes are committed, people write what the package is for into the first of these
+    generated = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
+    own = sorted({*Path(name).rglob("*.py")} - generated)
+    if own:
+        files = first_few((f"`{shown(path)}`" for path in own), 3)
+        message = f"idlc.backend builds interfaces alone, and here is {files}"
+        hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
+        report.add(codes.BAD_CONFIG.of(settings.SETTINGS_FILE, message, hint=hint))
+
+
+def _required_prefixes() -> list[str]:
+    """Return the folders of packages that frontends installed because pyproject.toml says so.
+
+    They install what `requires` names on sys.path, and not always below sys.prefix.
+    """
+    ends = ("site-packages", "dist-packages")
+    places = dict.fromkeys(Path(path) for path in sys.path if path.endswith(ends))
+    prefixes = [place.parents[2] for place in places if len(place.parents) > 2]
+    found = [path for path in prefixes if is_folder(path / INDEX)]
+    return [f"{path}/share" for path in found if path != Path(sys.prefix)]
+
+
+def _package(name: str, where: Scope, report: Report) -> Inputs | None:
+    """Return the files of the package in the working folder; report IDL606 or IDL608 for none."""
+    found = look((".",), report, where.exclude)
+    if found.empty:
+        report.add(nothing_in(".", where.exclude))
+    given = () if report.had_errors else packages(found.files, where, report)
+    if given and [one.package for one in given] != [name]:
+        others = ", ".join(f"`{one.package}`" for one in given)
+        message = f"the wheel is of `{name}`, and the interfaces in this folder are of {others}"
+        hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
+        report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
+    return None if report.had_errors else given[0]

@@ -1,0 +1,216 @@
+"""One run of a hook: read what the package declares, compile, have hatchling write the archive.
+
+A problem ends the process with a report, as frontends expect it; they would show an exception with
+its traceback.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from idlc.cli import output
+from idlc.cli.exit_status import ended
+from idlc.diagnostics import codes
+from idlc.diagnostics.report import Report, first_few
+from idlc.diagnostics.text import did_you_mean, without_options
+from idlc.project import prefixes, settings
+from idlc.project.files import reason
+from idlc.project.package_xml import MANIFEST
+from idlc.project.prefixes import Distribution
+from idlc.project.settings import load_settings
+
+if TYPE_CHECKING:
+    from hatchling.builders.plugin.interface import BuilderInterface, IncludedFile
+
+    from idlc.build.content import Content, Options
+
+#: What a workspace or an earlier build left in the folder.
+_NO_SOURCES = ["/build", "/dist", "/install", "/log"]
+#: What is needed even if version control ignores it.
+_SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
+
+
+def finished(build: Callable[[Report], str | None]) -> str:
+    """Return the name of the archive that was built; end the process after a problem."""
+    built: list[str] = []
+
+    def command() -> int:
+        report = Report()
+        if importlib.util.find_spec("hatchling") is None:
+            sys.stderr.write(
+                "Error: hatchling, which writes archives for idlc.backend, is not installed: "
+                "`pip install hatchling`, or build without --no-build-isolation\n"
+            )
+            return 2
+        try:
+            with without_options():
+                built.extend(filter(None, [build(report)]))
+        except OSError as error:
+            message = f"cannot write the archive: {reason(error)}"
+            report.add(codes.CANNOT_WRITE.of(str(error.filename or ""), message))
+        output.show(report, "text", sys.stderr)
+        output.notes(report, sys.stderr)
+        return 0 if built else output.status(report) or 1
+
+    status = ended(command)
+    if status:
+        sys.stderr.write("idlc: nothing was built, see above\n")
+        raise SystemExit(status)
+    return built[0]
+
+
+def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+    """Write the archive of the working folder, without what version control ignores.
+
+    Links that lead out of the folder are left out, and noted: an archive is given to others.
+    """
+    from hatchling.builders.sdist import SdistBuilder, SdistBuilderConfig
+
+    here = Path.cwd().resolve()
+    outside: set[str] = set()
+
+    def leads_out(path: str) -> bool:
+        is_outside = not Path(os.path.realpath(path)).is_relative_to(here)  # of circles, too
+        if is_outside:
+            outside.add(Path(os.path.relpath(path, here)).as_posix())
+        return is_outside
+
+    class Config(SdistBuilderConfig):
+        def directory_is_excluded(self, name: str, relative_path: str) -> bool:
+            left_out: bool = super().directory_is_excluded(name, relative_path)
+            return left_out or leads_out(str(here / relative_path / name))
+
+    class Builder(SdistBuilder):
+        @classmethod
+        def get_config_class(cls) -> type[SdistBuilderConfig]:
+            return Config
+
+        def recurse_included_files(self) -> Iterator[IncludedFile]:
+            files = super().recurse_included_files()
+            yield from (file for file in files if not leads_out(file.path))
+
+    found, _ = _declared(report), _options(settings, report)
+    if found is None or report.had_errors:
+        return None
+    settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
+    name = _written(Builder(str(here), config=settings), directory, report)
+    if outside:
+        names = first_few((f"`{one}`" for one in sorted(outside)), 5)
+        report.notes.append(f"left out, because they lead out of the project: {names}")
+    return name
+
+
+def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
+    """Compile the package in the working folder into a wheel."""
+    from idlc.build.content import compiled
+
+    found, options = _declared(report), _options(settings, report)
+    if found is None or report.had_errors:
+        return None
+    name, project = found
+    with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
+        content = compiled(name, Path(folder) / "classes" / name, options, report)
+        if content is None:
+            return None
+        return _packed(name, project, content, Path(folder) / "prefix", directory, report)
+
+
+def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
+    """Return the package's name and its `[project]` table; `None` after a problem."""
+    from idlc.build import manifest
+    from idlc.build.manifest import completed
+
+    load_settings(report)  # which reports what is no TOML
+    if not Path(MANIFEST).is_file():
+        message = f"there is no {MANIFEST} beside pyproject.toml"
+        hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"
+        report.add(codes.NO_SUCH_PATH.of(MANIFEST, message, hint=hint))
+    if report.had_errors:
+        return None
+    declared = manifest.project(report)
+    project = completed(declared, report) if declared else {}
+    return None if report.had_errors else (declared["name"], project)
+
+
+def _options(settings: Mapping[str, Any], report: Report) -> Options:
+    """Return what a frontend's settings say; report IDL611 for each that is wrong."""
+    from idlc.build.content import Options
+    from idlc.generate.native.layouts import LAYOUTS
+
+    known = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
+    for key, value in settings.items():
+        if key not in known:
+            message = f"unknown setting `{key}` of idlc.backend"
+            hint = did_you_mean(key, known) or f"the settings are {', '.join(known)}"
+            report.add(codes.BAD_CONFIG.of("", message, hint=hint))
+        elif value not in known[key]:
+            message = f"the setting `{key}` is {value!r}, which idlc does not know"
+            report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(known[key])}"))
+    wanted = settings.get("distro")
+    distribution = Distribution(wanted, f"distro={wanted}") if wanted else None
+    return Options(distribution, settings.get("libraries") != "no")
+
+
+def _packed(
+    name: str,
+    project: dict[str, Any],
+    content: Content,
+    prefix: Path,
+    directory: str,
+    report: Report,
+) -> str | None:
+    """Write the wheel of a compiled package."""
+    from hatchling.builders.wheel import WheelBuilder
+
+    class Builder(WheelBuilder):
+        def get_default_build_data(self) -> dict[str, Any]:
+            native = content.libraries.files
+            tag = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
+            return {**super().get_default_build_data(), "tag": tag}
+
+    for path, data in content.prefix.items():
+        (prefix / path).parent.mkdir(parents=True, exist_ok=True)
+        (prefix / path).write_bytes(data)
+    target = _target(
+        "wheel",
+        **{
+            "bypass-selection": True,
+            "exclude": [f"/{name}", f"/src/{name}"],  # committed classes: these are new ones
+            "force-include": {str(content.classes): name},
+            "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
+        },
+    )
+    builder = Builder(str(Path.cwd()), config={"project": project, **target})
+    # hatchling knows no build tags, and its file must not replace a wheel without one
+    Path(directory).mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:
+        built = _written(builder, beside, report)
+        if built is None:
+            return None
+        stem, python, rest = built.partition("-py3-")
+        tag = content.libraries.build_tag
+        name = f"{stem}-{tag}{python}{rest}" if tag else built
+        Path(beside, built).replace(Path(directory, name))
+    return name
+
+
+def _target(name: str, **settings: Any) -> dict[str, Any]:
+    """Return hatchling's settings for one kind of archive."""
+    every = {"core-metadata-version": "2.4"}
+    return {"tool": {"hatch": {"build": {"targets": {name: {**every, **settings}}}}}}
+
+
+def _written(builder: BuilderInterface[Any, Any], directory: str, report: Report) -> str | None:
+    """Return the name of an archive, written; report IDL611 for a `[project]` that is wrong."""
+    try:
+        builder.metadata.validate_fields()
+    except (OSError, TypeError, ValueError) as error:
+        report.add(codes.BAD_CONFIG.of(settings.SETTINGS_FILE, f"{error}"))
+        return None
+    return Path(next(iter(builder.build(directory=directory, versions=["standard"])))).name

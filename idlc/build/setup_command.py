@@ -1,0 +1,148 @@
+"""What a setup.py installs besides what it lists: what ROS 2 installs of interfaces, commands.
+
+All of it is written into the build folder, and is not part of a source distribution.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from importlib import import_module
+from pathlib import Path, PurePath
+from typing import Any, TypeAlias
+
+from idlc.project import prefixes
+from idlc.project.files import is_file, reason
+
+#: How a file is called until it is whole.
+NEW = ".new"
+#: The commands of setup.py by which pip installs.
+_WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
+_BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
+_NOT_INSTALLED = """\
+{package}: setup() is given `packages` without {absent}, so that the classes of the interfaces \
+would not be installed; write `packages=find_packages(exclude=['test'])`, or run \
+`idlc check --fix`"""
+_COMMAND = re.compile(r"\s*([\w.-]+)\s*=")
+_LAUNCHER = """\
+#!/bin/sh
+# pip installs commands into bin, and ROS 2 starts what is here.
+exec "$(dirname "$0")/../../bin/{name}" "$@"
+"""
+#: What setup() takes as `data_files`: files for the prefix itself, or a folder in it and its files.
+_DataFile: TypeAlias = str | tuple[str, Iterable[str]]
+
+
+def distribution_class(
+    package: str, files: Mapping[str, bytes], packages: Iterable[str] = (), build_tag: str = ""
+) -> type:
+    """Return a class for setup(distclass=...) that installs files, by their paths in a prefix.
+
+    They replace what `data_files` lists for the same paths. A package with interfaces whose files
+    have no entries in ROS 2's index gets none from `data_files` either. The build stops unless
+    setup() was given all Python `packages` that were generated. `build_tag` is for the names of
+    wheels.
+    """
+    base = import_module("setuptools").Distribution
+    index = {f"{prefixes.INDEX}/{kind}/{package}" for kind in ("packages", "rosidl_interfaces")}
+
+    def run_commands(self: Any) -> None:
+        getattr(self, "set_defaults", lambda: None)()  # looks for packages that nothing names
+        absent = sorted({*packages}.difference(self.packages or ()))
+        if absent and _BUILDS & {*self.commands}:
+            raise SystemExit(_NOT_INSTALLED.format(package=package, absent=", ".join(absent)))
+        place = Path(self.get_option_dict("build").get("build_base", ("", "build"))[1], "idlc")
+        self.sources = list(self.data_files or ())
+        listed, added = _merged(self.sources, files, index if files else set())
+        if _WHEELS & set(self.commands):
+            added |= _launchers(package, self.entry_points)
+        if any(path.endswith(".so") for path in files):
+            options = self.get_option_dict("bdist_wheel")
+            options.setdefault("plat_name", ("idlc", prefixes.wheel_platform()))
+            if build_tag:
+                options.setdefault("build_number", ("idlc", build_tag))
+        try:
+            made = _made(place, added)
+        except OSError as error:
+            raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
+        self.data_files = made + listed
+        self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
+        base.run_commands(self)
+
+    def run_command(self: Any, command: str) -> None:
+        installed = self.data_files
+        if command == "egg_info" and self.sources is not None:  # lists what is in an sdist
+            self.data_files = self.sources
+        base.run_command(self, command)
+        self.data_files = installed
+
+    # editable installations leave data files out, because they ask for them by this other name
+    added = {"has_data": base.has_data_files, "sources": None}
+    methods = {"run_commands": run_commands, "run_command": run_command}
+    return type("Distribution", (base,), {**methods, **added})
+
+
+def _merged(
+    listed: Iterable[_DataFile], files: Mapping[str, bytes], index: set[str]
+) -> tuple[list[_DataFile], dict[str, bytes]]:
+    """Return `data_files` without those that others replace, and these others.
+
+    A listed file that has the content already stays: colcon's links lead to it. Without a new
+    entry in the index there is no old one either.
+    """
+    kept: list[_DataFile] = []
+    new = dict(files)
+    for entry in listed:
+        if isinstance(entry, str):
+            kept.append(entry)
+            continue
+        others = []
+        for path in entry[1]:
+            target = PurePath(entry[0], PurePath(path).name).as_posix()
+            if target in files and is_file(path) and Path(path).read_bytes() == files[target]:
+                new.pop(target, None)
+            elif target in files or target in index:
+                continue
+            others.append(path)
+        kept.append((entry[0], others))
+    return kept, new
+
+
+def _launchers(package: str, entry_points: Any) -> dict[str, bytes]:
+    """Return a file for each command of a package where `ros2 run` and launch files look for it."""
+    scripts = (entry_points or {}).get("console_scripts", ())
+    lines = scripts.splitlines() if isinstance(scripts, str) else scripts
+    names = [found[1] for found in map(_COMMAND.match, lines) if found]
+    return {f"lib/{package}/{name}": _LAUNCHER.format(name=name).encode() for name in names}
+
+
+def _made(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]]:
+    """Write files below a folder; return what setup() is to install, in its own words."""
+    for path, content in files.items():
+        target = place / path
+        if not target.is_file() or target.read_bytes() != content:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            beside = target.with_name(f"{target.name}{NEW}")
+            beside.write_bytes(content)
+            beside.chmod(0o755 if path.startswith("lib/") else 0o644)
+            beside.replace(target)
+    return [(os.path.dirname(path), [(place / path).as_posix()]) for path in files]  # noqa: PTH120
+
+
+def _whole(copying: Any) -> type:
+    """Return a command that installs each file as a whole or not at all.
+
+    A program that has the old one open goes on with it.
+    """
+
+    def copy_file(self: Any, source: str, folder: str, *rest: Any, **named: Any) -> tuple[str, int]:
+        target = Path(folder, Path(source).name)
+        beside = target.with_name(f"{target.name}{NEW}")
+        beside.unlink(missing_ok=True)
+        done: tuple[str, int] = copying.copy_file(self, source, str(beside), *rest, **named)
+        if beside.exists():
+            beside.replace(target)
+        return str(target), done[1]
+
+    return type("install_data", (copying,), {"copy_file": copy_file})
