@@ -260,7 +260,7 @@ def test_this_document_names_real_modules():
     """A name in a row of the table is of a room in that row, any other is whole."""
     for line in (DOCS / HOUSE_PAGES[0]).read_text(encoding="utf-8").splitlines():
         rooms = [ROOT / path for path in re.findall(r"`(idlc/[\w/]+)/`", line)]
-        for path in re.findall(r"`([\w/]+\.(?:py|lark)|\w+/)`", line):
+        for path in re.findall(r"`([a-z][\w/]*\.(?:py|lark)|[a-z]+/)`", line):
             folders = [*rooms, ROOT] if line.startswith("|") else [ROOT / "idlc", ROOT]
             assert any((folder / path).exists() for folder in folders), path
 
