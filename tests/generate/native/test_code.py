@@ -5,9 +5,9 @@ import re
 import subprocess
 from pathlib import Path
 
-import idlc.native
 import pytest
 
+import idlc.generate.native
 from idlc.generate.native.library import MACHINES as MADE_FOR
 from tests.support.tools import MACHINES, assemble, run, tool
 
@@ -68,7 +68,7 @@ def test_functions_may_be_entered_through_pointers(machine):
 
 def test_the_writer_is_small():
     count = 0
-    for path in Path(idlc.native.__file__).parent.glob("*.py"):
+    for path in Path(idlc.generate.native.__file__).parent.glob("*.py"):
         lines = path.read_text(encoding="utf-8").splitlines()
         for node in reversed(ast.parse("\n".join(lines)).body):
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in OF_A_MACHINE:

@@ -6,7 +6,7 @@ import json
 import re
 from typing import NamedTuple
 
-from release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
+from maintenance.release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
 
 #: The paragraphs that say what to do as long as there is no repository and no index.
 _UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
