@@ -90,13 +90,13 @@ class Kernel:
 
 @pytest.fixture
 def kernel(monkeypatch):
-    """A Windows for `idlc.project`."""
+    """A Windows for the writer."""
     if WINDOWS:
         pytest.skip("Windows itself is here, and other tests use it")
     made = Kernel(running={5})
     monkeypatch.setattr(ctypes, "WinDLL", lambda *_, **__: made, raising=False)
     monkeypatch.setattr(ctypes, "get_last_error", lambda: 87, raising=False)
-    for module in (atomic, transaction):
+    for module in (atomic, transaction, atomic):
         monkeypatch.setattr(module, "sys", SimpleNamespace(platform="win32"))
     return made
 

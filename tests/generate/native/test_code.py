@@ -5,9 +5,9 @@ import re
 import subprocess
 from pathlib import Path
 
-import idlc.generate.native
 import pytest
 
+import idlc.generate.native
 from idlc.generate.native.library import MACHINES as MADE_FOR
 from tests.support.tools import MACHINES, assemble, run, tool
 

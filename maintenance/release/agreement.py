@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 
-from release.project import EXTENSION_FILES, FailedError, Project
+from maintenance.release.project import EXTENSION_FILES, FailedError, Project
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13", "3.14")
 

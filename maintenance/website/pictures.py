@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import NamedTuple
 
-_ROOT = Path(__file__).parents[1]
+_ROOT = Path(__file__).parents[2]
 _SIZE, _WIDTH, _HEIGHT, _EDGE = 14, 8.43, 20, 18
 #: What the codes of a terminal mean, in the style sheet of a picture.
 _CLASSES = {"1": "b", "2": "d", "31": "r", "32": "g", "33": "y", "34": "u", "35": "m", "36": "c"}

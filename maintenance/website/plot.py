@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-_ROOT = Path(__file__).parents[1]
+_ROOT = Path(__file__).parents[2]
 PAGE = _ROOT / "docs/recordings.md"
 #: matplotlib's settings of the folder that it runs in: the colours of the pictures of a terminal.
 _STYLE = """\

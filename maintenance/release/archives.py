@@ -12,7 +12,7 @@ import zipfile
 from email.parser import HeaderParser
 from pathlib import Path
 
-from release.project import BESIDE, FailedError, Project, run
+from maintenance.release.project import BESIDE, FailedError, Project, run
 
 #: What setuptools adds to a source distribution.
 ADDED = (

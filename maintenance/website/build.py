@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from website import dialect, interfaces, rules, sources
+from maintenance.website import dialect, interfaces, rules, sources
 
 HERE = Path(__file__).parent
 #: The head of a page that the search leaves out.

@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 
 from idlc.diagnostics import explain
-from idlc.diagnostics.explain import page
 from idlc.diagnostics.codes import CODES
+from idlc.diagnostics.explain import page
 
 _SECTION = re.compile(r"### (IDL\d+) (\S+) \((.*)\)\n\n((?:.+\n)+)")
 

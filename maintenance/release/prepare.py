@@ -6,7 +6,7 @@ import json
 import re
 from typing import NamedTuple
 
-from release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
+from maintenance.release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
 
 #: The paragraphs that say what to do as long as there is no repository and no index.
 _UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
@@ -112,7 +112,7 @@ def version_is(project: Project, version: str, day: str) -> None:
     edits = _Edits(project, {})
     for path, pattern, new, missing in (
         ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", f"## {version} ({day})", _NO_CHANGES),
-        ("idlc/__init__.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
+        ("idlc/version.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
         ("CITATION.cff", "version: .*", f"version: {version}", _NO_VERSION),
     ):
         edits.substitute(path, f"(?m)^{pattern}$", new, missing.format(path=path, version=version))

@@ -6,7 +6,7 @@ import re
 import sys
 from pathlib import Path
 
-from release.project import FailedError, Project, run
+from maintenance.release.project import FailedError, Project, run
 
 #: Patterns of files, and the schema of check-jsonschema that each is held to.
 SCHEMAS = {

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 START = "docs/index.md"
 #: Where documents outside of docs/ are on the site; the others keep their names, in lower case.
 PLACES = {"README.md": "about.md", "examples/my_robot_controller/README.md": "tutorial.md"}

@@ -1,4 +1,4 @@
-"""`python -m release`: prepare a release, or rehearse it. RELEASING.md says when to do what."""
+"""`python -m maintenance.release`: prepare a release, or rehearse it. RELEASING.md says when to do what."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from release import agreement, archives, forms, prepare
-from release.archives import Archives
-from release.project import FailedError, Project
+from maintenance.release import agreement, archives, forms, prepare
+from maintenance.release.archives import Archives
+from maintenance.release.project import FailedError, Project
 
-HERE = Project(Path(__file__).parents[1])
+HERE = Project(Path(__file__).parents[2])
 
 
 #: What has to be so of the project, and of its archives; the first failure ends it.
@@ -57,7 +57,7 @@ def _passed(step: Callable[..., None]) -> None:
 
 def main() -> int:
     """Run one of the commands and return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m release", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m maintenance.release", description=__doc__)
     commands = parser.add_subparsers(required=True, dest="command")
     checking = commands.add_parser("check", help="rehearse a release")
     checking.add_argument("--tag", help="what is about to be uploaded: nothing may be left to do")

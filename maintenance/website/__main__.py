@@ -1,9 +1,9 @@
-"""`python -m website OUT`: write the site."""
+"""`python -m maintenance.website OUT`: write the site."""
 
 import sys
 from pathlib import Path
 
-from website.build import build
+from maintenance.website.build import build
 
 if __name__ == "__main__":
     build(Path(sys.argv[1]))
