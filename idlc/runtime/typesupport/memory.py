@@ -57,7 +57,7 @@ def functions(size: int, content: int, converter: object) -> Functions:
             "size": size,
         },
     )
-    return Functions(**made)
+    return Functions(*(made[name] for name in Functions._fields))
 
 
 class _Allocator(ctypes.Structure):
