@@ -1,4 +1,4 @@
-"""Reading many serialized messages of one type: the whole of it, up to a table."""
+"""Reading many serialized messages of one type into a table, columns or a structured array."""
 
 from __future__ import annotations
 
@@ -11,13 +11,10 @@ from ...errors import DecodeError
 from ..batches import failed
 from ..field_reader import check
 from ..typeinfo import type_name
-from .alike import alike
-from .build import plan_of
-from .gather import Flat, Pieces, Source
-from .lanes import Found, Lanes, UnreadableError
-from .plan import Level
-from .scan import Scan
-from .table import Elements, Table
+from .plan import Level, plan_of
+from .scan import Cursors, ScanResult, UnreadableError, VectorScan, scan_uniform
+from .source import Flat, Pieces, Source
+from .table import Elements, Table, UnevenError, columns_of, structured
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -71,6 +68,24 @@ def _of_batch(batch: Any) -> Messages:
     return Messages(Flat(array), starts, stops)
 
 
+def to_columns(
+    kind: type,
+    messages: Any,
+    fields: Iterable[str] | None = None,
+    ragged: bool | None = None,
+    datetimes: bool = False,
+) -> Any:
+    """Return a row for each message, as a structured array or as Columns."""
+    table, top = table_of(kind, messages, fields, datetimes)
+    if not ragged:
+        try:
+            return structured(table, top)
+        except UnevenError as error:
+            if ragged is not None:
+                raise ValueError(f"{error}; ragged=True takes it") from None
+    return columns_of(table, top)
+
+
 def table_of(
     kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> tuple[Table, Elements]:
@@ -88,23 +103,23 @@ def table_of(
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
     big = big_endian(messages)
     mixed = bool(big.any() and not big.all())
-    source, found = messages.source, Found()
+    source, result = messages.source, ScanResult()
     done: list[Any] = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         starts = messages.starts[rows] + 4
-        lanes = Lanes(starts, messages.stops[rows], starts)
+        cursors = Cursors(starts, messages.stops[rows], starts)
         rest = np.ones(len(rows), bool)
-        for chosen in alike(plan, source, order, lanes, found):
+        for chosen in scan_uniform(plan, source, order, cursors, result):
             done.append(rows[chosen])
             rest[chosen] = False
         if rest.any():
-            first = found.count[plan.key]
-            found.count[plan.key] += int(rest.sum())
-            Scan(source, order, found).level(plan, lanes.some(rest), first)
+            first = result.count[plan.key]
+            result.count[plan.key] += int(rest.sum())
+            VectorScan(source, order, result).level(plan, cursors.select(rest), first)
             done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
     size = int((messages.stops - messages.starts).sum())
-    table = Table(source, size, order, found)
+    table = Table(source, size, order, result)
     order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 

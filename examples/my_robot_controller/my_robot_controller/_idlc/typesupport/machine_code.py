@@ -87,18 +87,13 @@ CODE = {
             "5d415c5d5bc3660f1f440000"
         ),
         "create": "f30f1efabf01000000488b356001000031d2ff2520010000",
-        "destroy": (
-            "f30f1efa534889fb488b3539010000e83cffffff4889df5b31f6ff25"
-            "08010000"
-        ),
+        "destroy": ("f30f1efa534889fb488b3539010000e83cffffff4889df5b31f6ff2508010000"),
         "convert_from_py": (
             "f30f1efa53554883ec084889fb4889f54889f7488b350e010000e811"
             "ffffff488b3dfa0000004889ee4889daff15de00000085c00f94c048"
             "83c4085d5bc36690"
         ),
-        "convert_to_py": (
-            "f30f1efa4889fe488b3dd2000000ff25c40000000f1f4000"
-        ),
+        "convert_to_py": ("f30f1efa4889fe488b3dd2000000ff25c40000000f1f4000"),
         "finish": "f30f1efa488b35c5000000e9c8feffff",
         "resize": (
             "f30f1efa53554883ec084889fb4889f5488b35b1000000e8acfeffff"
@@ -129,9 +124,7 @@ CODE = {
             "e20741a980070058f006005800023fd61f000071e0179f1afd7bc2a8"
             "c0035fd61f2003d5"
         ),
-        "convert_to_py": (
-            "5f2403d5e10300aa40060058f005005800021fd61f2003d5"
-        ),
+        "convert_to_py": ("5f2403d5e10300aa40060058f005005800021fd61f2003d5"),
         "finish": "5f2403d5e1050058acffff171f2003d5",
         "resize": (
             "5f2403d5fd7bbea9fd030091e00701a941050058a5ffff97e00f40f9"
