@@ -17,8 +17,7 @@ from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from ..field_reader import least_element
-from ..typeinfo import FieldInfo, fields_of
+from ..typeinfo import FieldInfo, fields_of, least_element
 
 
 class Leaf(NamedTuple):

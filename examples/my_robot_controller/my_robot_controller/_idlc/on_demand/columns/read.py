@@ -9,8 +9,7 @@ import numpy as np
 
 from ...errors import DecodeError
 from ..batches import failed
-from ..field_reader import check
-from ..typeinfo import type_name
+from ..typeinfo import check_buffer, type_name
 from .plan import Level, plan_of
 from .scan import Cursors, ScanResult, UnreadableError, VectorScan, scan_uniform
 from .source import Flat, Pieces, Source
@@ -146,7 +145,7 @@ def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check(name, messages.raw(first))
+        check_buffer(name, messages.raw(first))
     except DecodeError as error:
         failed(error, first)
     raise AssertionError(f"[{first}] can be read by itself")
