@@ -540,6 +540,7 @@ class Action(metaclass=ActionMeta):
     if not TYPE_CHECKING:
         Impl = OnDemand(_impl)
 
+
 __all__ = [
     "Action",
     "Imported",
