@@ -225,7 +225,7 @@ def rows_writer(order: str) -> Callable[[list[str]], bytes]:
         else:
             raw = [value.encode() for value in rows[1::3]]
             excess = (-len(raw[-1]) - 1) % 4
-            block = b"".join([padded[len(one)](len(one) + 1, one) for one in raw])
+            block = b"".join([padded[len(data)](len(data) + 1, data) for data in raw])
         return block[:-excess] if excess else block
 
     return write
@@ -247,8 +247,8 @@ def text_block(
 
     def write(values: Sequence[str]) -> bytes:
         nonlocal last
-        known, block = last
-        if type(values) is list and values == known:
+        previous, block = last
+        if type(values) is list and values == previous:
             return block
         values = listed(values)
         rows: list[str] = []
@@ -300,12 +300,12 @@ def wide_block(
     order: str, size: int | None = None, bound: int | None = None
 ) -> Callable[[Sequence[str]], bytes]:
     """Return what `text_block` returns, for wstrings."""
-    write_one = wide_text(order)
+    write_text = wide_text(order)
     count = Struct(order + "I").pack
     head = counter(order, size, bound)
 
     def write(values: Sequence[str]) -> bytes:
-        raw = [write_one(value) for value in listed(values)]
+        raw = [write_text(value) for value in listed(values)]
         parts = [part for text in raw for part in (count(len(text) // 4), text)]
         return head(len(raw)) + b"".join(parts)
 
@@ -340,9 +340,9 @@ def texts_reader(order: str, text: Callable[[Any], str]) -> Callable[..., Any]:
 
     def read(data: Any, start: int, count: int) -> tuple[list[str], int]:
         nonlocal last
-        known, raw, values = last
+        previous_count, raw, values = last
         end = start + len(raw)
-        if count == known and data[start:end] == raw:
+        if count == previous_count and data[start:end] == raw:
             return values[:], end
         values = []
         zero = start - 1
@@ -386,7 +386,7 @@ def strings_reader(order: str, text: Callable[[Any], str]) -> Callable[..., Any]
 def wide_texts_reader(order: str) -> Callable[..., Any]:
     """Return the same for arrays of wstrings."""
     size_at = Struct(order + "I").unpack_from
-    read_one = read_wide_text(order)
+    read_text = read_wide_text(order)
 
     def read(data: Any, at: int, count: int) -> tuple[list[str], int]:
         values = []
@@ -395,7 +395,7 @@ def wide_texts_reader(order: str) -> Callable[..., Any]:
             end = at + 4 + 4 * units
             if end > len(data):
                 raise ValueError("too short")
-            values.append(read_one(data[at + 4 : end]))
+            values.append(read_text(data[at + 4 : end]))
             at = end
         return values, at
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from .hints import Join
 
-    #: What turns bytes into a str.
+    #: A function that decodes bytes.
     Text: TypeAlias = Callable[[Any], str]
     #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
     Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
@@ -48,7 +48,7 @@ text_of_view: Text = partial(str, encoding="utf-8")
 
 
 class Reading:
-    """How a decoder makes values: strings by `text`, numeric arrays as copies or as views."""
+    """The values that a decoder makes: strings by `text`, numeric arrays as copies or as views."""
 
     def __init__(self, text: Text, copy: bool) -> None:
         self.text = text
@@ -57,7 +57,7 @@ class Reading:
         self.small = 8192 if copy else 0
 
     def of(self, kind: type) -> Reading:
-        """Return how the sequences of a class of another package are made.
+        """Return the reading for sequences of a class of another package.
 
         Classes of rosidl get copies: their `==` cannot compare views.
         """
@@ -72,7 +72,7 @@ READINGS: dict[tuple[Text, bool], Reading] = {
 COPYING = READINGS[bytes.decode, True]
 
 
-#: What decoding raises when a buffer is not a message.
+#: The exceptions of decoding a buffer that is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 
 
@@ -102,13 +102,13 @@ def codecs_of(kind: type) -> Codecs:
     owner = owner_of(kind)
     module = __import__(f"{owner.__init__.__module__}__codec", fromlist=["CODECS"])
     make = module.CODECS[owner.__name__]
-    made: dict[tuple[str, Reading], Codec] = {}
+    cached: dict[tuple[str, Reading], Codec] = {}
 
     def codecs(order: str, reading: Reading = COPYING) -> Codec:
-        found = made.get((order, reading))
-        if found is None:
-            found = made[order, reading] = make(owner, order, reading)
-        return found
+        codec = cached.get((order, reading))
+        if codec is None:
+            codec = cached[order, reading] = make(owner, order, reading)
+        return codec
 
     owner._codec_ = staticmethod(codecs)
     return codecs
@@ -120,13 +120,13 @@ def functions(kind: type) -> Functions:
     They replace those that the class inherits, unless its fields have these names.
     """
     owner = owner_of(kind)
-    made: Functions | None = owner.__dict__.get("_functions_")
-    if made is None:
-        made = owner._functions_ = _functions(owner)
-        serialize, deserialize = made
+    pair: Functions | None = owner.__dict__.get("_functions_")
+    if pair is None:
+        pair = owner._functions_ = _functions(owner)
+        serialize, deserialize = pair
         _provide(owner, "serialize", serialize)
         _provide(owner, "deserialize", staticmethod(deserialize))
-    return made
+    return pair
 
 
 def _provide(owner: Any, name: str, function: object) -> None:
@@ -214,8 +214,8 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
 
     try:
         validate(message, wire_only=True)
-    except ValidationError as found:
-        return found
+    except ValidationError as exact:
+        return exact
     return error
 
 
@@ -250,9 +250,9 @@ def maker(kind: Any) -> Callable[[], Any]:
         return partial(object.__new__, kind)
 
     def make() -> Any:
-        made: Any = object.__new__(kind)
-        made._check_fields = CHECK_FIELDS
-        return made
+        message: Any = object.__new__(kind)
+        message._check_fields = CHECK_FIELDS
+        return message
 
     return make
 

@@ -39,7 +39,7 @@ else:
         return lambda cls: cls
 
 
-#: What generated classes call `dict`; linters take a display for a mistake there.
+#: `dict` for generated classes, in which linters object to a display.
 table = dict
 
 
@@ -88,7 +88,7 @@ def dataclass_params(_kind: type) -> Any:
 
 
 class InterfaceMeta(type):
-    """What rclpy looks for on the class of a class; one subclass for each interface."""
+    """The attributes that rclpy reads from a metaclass; one subclass for each interface."""
 
     _TYPE_SUPPORT: ClassVar[Any] = None
 
@@ -106,9 +106,9 @@ def metaclass_of(
     if module != namespace["__module__"]:
         namespace["__module__"] = module
         namespace.pop("__firstlineno__", None)  # that is another file's
-    made = type(f"Metaclass_{name}", (base,), {"__module__": module})
-    setattr(sys.modules.get(module), made.__name__, made)
-    return made
+    metaclass = type(f"Metaclass_{name}", (base,), {"__module__": module})
+    setattr(sys.modules.get(module), metaclass.__name__, metaclass)
+    return metaclass
 
 
 class MessageMeta(InterfaceMeta):
@@ -140,15 +140,15 @@ class MessageMeta(InterfaceMeta):
             public: namespace.pop(public, None) for public in map(public_name, fields)
         }
         namespace["__slots__"] = [slot_name(field) for field in fields]
-        made: Any = type.__new__(metaclass, name, bases, namespace)
+        created: Any = type.__new__(metaclass, name, bases, namespace)
         for slot, (public, conversion) in zip(
-            made.__slots__, converted.items(), strict=True
+            created.__slots__, converted.items(), strict=True
         ):
-            member = made.__dict__[slot]
+            member = created.__dict__[slot]
             attribute = member if conversion is None else conversion.property_of(member)
-            type.__setattr__(made, public, attribute)
-        metaclass._message = made
-        return made
+            type.__setattr__(created, public, attribute)
+        metaclass._message = created
+        return created
 
     @classmethod
     def __import_type_support__(cls) -> None:
@@ -181,7 +181,7 @@ class Message(metaclass=MessageMeta):
 
     @property
     def _check_fields(self) -> bool:
-        """Whether the message checks each value when it is assigned, as in rosidl."""
+        """True if the message checks each value at its assignment, as in rosidl."""
         return codec.is_checked(type(self))
 
     @_check_fields.setter
@@ -354,13 +354,13 @@ def _subclass(
         fields = {field for base in bases for field in _field_names(base)}
         namespace["__slots__"] = _without_fields(fields, namespace["__slots__"])
         namespace.pop("__weakref__", None)  # dataclass() of Python 3.10 forgets it
-    made: Any = type.__new__(metaclass, name, bases, namespace, **options)
+    created: Any = type.__new__(metaclass, name, bases, namespace, **options)
     owner = metaclass._message
     if owner is not None:
         codec.extended(owner)
-        if made.__eq__ is owner.__eq__ and _holds_numbers(owner):
-            made.__eq__ = _equal
-    return made
+        if created.__eq__ is owner.__eq__ and _holds_numbers(owner):
+            created.__eq__ = _equal
+    return created
 
 
 def _field_names(kind: type) -> tuple[str, ...]:
@@ -406,7 +406,7 @@ def _equal(self: Any, other: Any) -> Any:
 
 
 class Package:
-    """A module of another package, imported when one of its classes is asked for."""
+    """A module of another package, imported on first access to one of its classes."""
 
     def __init__(self, module: str) -> None:
         self._module = module
@@ -420,7 +420,7 @@ class Package:
 
 
 class Imported:
-    """A class attribute: a class of another package, imported when it is asked for."""
+    """A class attribute: a class of another package, imported on first access."""
 
     def __init__(self, module: str, name: str) -> None:
         self._package = Package(module)
@@ -452,13 +452,13 @@ def _impl(action: Any) -> Any:
 
 
 def complete(protocol: str) -> None:
-    """Put what is in the module `protocol` into that which rosidl has all classes in.
+    """Copy the names of the module `protocol` into the module where rosidl has all classes.
 
-    There pickles look for classes, and whoever evaluates annotations for what they name.
+    Pickles look for classes there, and evaluated annotations for the names in them.
     """
-    known = vars(sys.modules[protocol.removesuffix("__protocol")])
+    names = vars(sys.modules[protocol.removesuffix("__protocol")])
     for name, value in vars(sys.modules[protocol]).items():
-        known.setdefault(name, value)
+        names.setdefault(name, value)
 
 
 def _protocol_getter(module: str) -> Any:
@@ -488,12 +488,12 @@ class _GroupMeta(InterfaceMeta):
         if not bases:
             return super().__new__(cls, name, bases, namespace)
         metaclass = metaclass_of(cls, name, namespace)
-        made: Any = type.__new__(metaclass, name, bases, namespace)
-        metaclass._interface = made
+        created: Any = type.__new__(metaclass, name, bases, namespace)
+        metaclass._interface = created
         if cls._added not in namespace:
-            module: Any = sys.modules[made.__module__]
-            module.__getattr__ = _protocol_getter(made.__module__)
-        return made
+            module: Any = sys.modules[created.__module__]
+            module.__getattr__ = _protocol_getter(created.__module__)
+        return created
 
     def __call__(cls, *_values: object, **_named: object) -> Any:
         raise NotImplementedError(

@@ -33,7 +33,7 @@ class Primitive(NamedTuple):
 
     @property
     def allowed(self) -> str:
-        """What a field of it takes, in words."""
+        """The values that a field of it takes, in words."""
         if self.code in "?c":
             return "a bool" if self.code == "?" else "bytes of length 1"
         what = "a number" if self.code in "fd" else "an integer"
@@ -95,12 +95,12 @@ class FieldInfo(NamedTuple):
 
     @property
     def is_list(self) -> bool:
-        """Whether the value holds elements."""
+        """True if the value holds elements."""
         return self.is_sequence or self.size is not None
 
     @property
     def is_numeric(self) -> bool:
-        """Whether an element is an integer or float."""
+        """True if an element is an integer or float."""
         return self.primitive is not None and self.primitive.code not in "?c"
 
 
@@ -238,7 +238,8 @@ def least(name: str) -> int:
     """Return the fewest bytes that a structure can take."""
     fields = fields_of(name)
     sizes = (
-        4 if one.is_sequence else (one.size or 1) * least_element(one) for one in fields
+        4 if field.is_sequence else (field.size or 1) * least_element(field)
+        for field in fields
     )
     return sum(sizes) if fields else 1
 

@@ -64,7 +64,7 @@ def _members_type() -> Any:
 
 
 class Library(NamedTuple):
-    """What is needed of ROS 2's own libraries: addresses."""
+    """Addresses in ROS 2's own libraries."""
 
     identifier: int
     same_handle: int

@@ -78,11 +78,11 @@ def _memcmp() -> Any:
         import ctypes
 
         try:
-            made = ctypes.pythonapi["memcmp"]
+            function = ctypes.pythonapi["memcmp"]
         except AttributeError:  # Windows
             return None
-        made.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
-        _memcmp_function = made  # not before: another thread may be waiting for it
+        function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+        _memcmp_function = function  # not before: another thread may be waiting for it
     return _memcmp_function
 
 
@@ -91,10 +91,10 @@ def copied(message: Any) -> Any:
     kind = type(message)
     if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: value)
-    made = object.__new__(kind)
+    duplicate = object.__new__(kind)
     for slot in kind.__slots__:
-        setattr(made, slot, getattr(message, slot))
-    return made
+        setattr(duplicate, slot, getattr(message, slot))
+    return duplicate
 
 
 def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
@@ -104,13 +104,13 @@ def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
     kind = type(message)
     if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
-    made = memo[id(message)] = object.__new__(kind)
+    duplicate = memo[id(message)] = object.__new__(kind)
     for slot in kind.__slots__:
         value = getattr(message, slot)
         if type(value) not in ATOMIC:
             value = deepcopy(value, memo)
-        setattr(made, slot, value)
-    return made
+        setattr(duplicate, slot, value)
+    return duplicate
 
 
 def _reconstructed(
@@ -119,13 +119,13 @@ def _reconstructed(
     """Return a copy of an instance of a user's subclass, which may have more than slots."""
     reduced: Any = object.__reduce_ex__(message, 4)
     state = reduced[2]
-    made = object.__new__(type(message))
+    duplicate = object.__new__(type(message))
     if memo is not None:
-        memo[id(message)] = made
+        memo[id(message)] = duplicate
     for part in state if isinstance(state, tuple) else (state,):
         for name, value in (part or {}).items():
-            object.__setattr__(made, name, copy_of(value))
-    return made
+            object.__setattr__(duplicate, name, copy_of(value))
+    return duplicate
 
 
 def represented(message: Any) -> str:

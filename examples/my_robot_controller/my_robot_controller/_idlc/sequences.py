@@ -188,10 +188,10 @@ def to_list(
     if read and raw is not None:
         return read(raw)
     try:
-        found = iter(values)
+        elements = iter(values)
     except TypeError:
         raise FieldTypeError(name, "a sequence", values) from None
-    return list(found)
+    return list(elements)
 
 
 class ListOf(Generic[Element]):
@@ -298,7 +298,7 @@ def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], 
 
 
 class Fresh(Generic[Value]):
-    """A class attribute whose value is made anew at each access, for mutable defaults."""
+    """A class attribute whose value is created at each access, for mutable defaults."""
 
     def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
         self._make = make

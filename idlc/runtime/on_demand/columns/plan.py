@@ -1,4 +1,4 @@
-"""What a type's messages consist of, as steps that go over many messages at once.
+"""The plan of a type: the steps by which many of its messages are scanned at once.
 
 A structure is a `Level`: its fields and those of the structures in it, one after the other.
 Fields of fixed size that follow each other are one `Segment`, in which all is at the same
@@ -72,7 +72,7 @@ class Level:
 
     @cached_property
     def fixed(self) -> bool:
-        """Whether its size depends on nothing but where it begins."""
+        """True if its size depends on nothing but its position."""
         return all(isinstance(step, Segment) for step in self.steps)
 
     @cached_property
@@ -85,17 +85,17 @@ class Level:
 
     @cached_property
     def narrow(self) -> bool:
-        """Whether it consists of strings, and none of them is wide."""
+        """True if it consists of strings, none of them wide."""
         return all(isinstance(step, Text) and not step.wide for step in self.steps)
 
     @cached_property
     def wanted(self) -> bool:
-        """Whether there is a column in it."""
+        """True if a column is read from it."""
         return any(map(is_wanted, self.steps))
 
 
 def is_wanted(step: Segment | Text | List) -> bool:
-    """Return whether there is a column in a step."""
+    """Return whether a column is read from a step."""
     return bool(step.leaves) if isinstance(step, Segment) else step.key is not None
 
 
@@ -179,7 +179,7 @@ def _selection(name: str, fields: tuple[str, ...]) -> dict[str, Any]:
         type_ = name
         *outer, last = field.split(".")
         for step in (*outer, last):
-            known = {one.name: one for one in fields_of(type_)} if type_ else {}
+            known = {info.name: info for info in fields_of(type_)} if type_ else {}
             if step not in known:
                 close = get_close_matches(step, known, 1)
                 hint = f"; did you mean {close[0]!r}?" if close else ""
@@ -196,7 +196,7 @@ def _selection(name: str, fields: tuple[str, ...]) -> dict[str, Any]:
 class _Builder:
     """Makes one level, step by step.
 
-    What follows begins at `at` modulo `known`; of the rest nothing is known.
+    The next value begins at `at` modulo `aligned`; nothing more is known of its position.
     """
 
     def __init__(self, keys: Any, datetimes: bool, aligned: int = 1) -> None:
@@ -204,7 +204,7 @@ class _Builder:
         self.datetimes = datetimes
         self.level = Level(next(keys))
         self.segment: Segment | None = None
-        self.known = aligned
+        self.aligned = aligned
         self.at = 0
 
     def structure_level(self, name: str, wanted: Wanted) -> Level:
@@ -213,7 +213,7 @@ class _Builder:
         return self.level
 
     def structure(self, name: str, wanted: Wanted) -> Struct:
-        """Go over a structure."""
+        """Plan a structure."""
         fields = fields_of(name)
         if not fields:
             self.place(1, 1)
@@ -226,7 +226,7 @@ class _Builder:
         return Struct(made)
 
     def field(self, field: FieldInfo, wanted: Wanted) -> Node:
-        """Go over a field."""
+        """Plan a field."""
         if not field.is_list:
             return self.element(field, wanted)
         if field.primitive is not None and field.size is not None:
@@ -245,7 +245,7 @@ class _Builder:
         return Lists(field.size, step, level.node)
 
     def element(self, field: FieldInfo, wanted: Wanted) -> Node:
-        """Go over one value."""
+        """Plan a single value."""
         if field.nested:
             made = self.structure(field.nested, wanted)
             known = INSTANTS.get(field.nested)
@@ -264,7 +264,7 @@ class _Builder:
     def numbers(
         self, field: FieldInfo, wanted: Wanted, size: int | None = None
     ) -> Node:
-        """Go over a number, or an array of them."""
+        """Plan a number, or an array of them."""
         assert field.primitive is not None
         width = field.primitive.size
         segment, offset = self.place(width, width * (1 if size is None else size))
@@ -279,7 +279,7 @@ class _Builder:
         return Numbers(leaf.key, leaf.code, size)
 
     def array(self, element: Segment, size: int) -> None:
-        """Go over an array of structures that are one segment each."""
+        """Plan an array of structures that are one segment each."""
         segment, offset = self.place(element.align, size * element.size)
         for leaf in element.leaves:
             repeats = ((size, element.size), *leaf.repeats)
@@ -288,9 +288,9 @@ class _Builder:
             )
 
     def place(self, align: int, size: int) -> tuple[Segment, int]:
-        """Go over bytes of fixed size; return where they are."""
-        if align > self.known:
-            self.segment, self.known, self.at = None, align, 0
+        """Plan bytes of fixed size; return where they are."""
+        if align > self.aligned:
+            self.segment, self.aligned, self.at = None, align, 0
         start = self.at + -self.at % align
         if self.segment is None:
             self.segment = Segment(next(self.keys), align)
@@ -302,10 +302,10 @@ class _Builder:
         self.at = start + size
         return self.segment, offset
 
-    def add(self, step: Text | List, known: int) -> None:
-        """Go over what is not of fixed size."""
+    def add(self, step: Text | List, aligned: int) -> None:
+        """Add a step that is not of fixed size."""
         self.level.steps.append(step)
-        self.segment, self.known, self.at = None, known, 0
+        self.segment, self.aligned, self.at = None, aligned, 0
 
 
 def code_of(field: FieldInfo) -> str:

@@ -59,12 +59,12 @@ def from_dict(kind: type, values: dict[str, Any]) -> Any:
 def _from_dict(kind: Any, name: str, values: Any, path: str) -> Any:
     if not isinstance(values, dict):
         raise ValidationError(path or "values", f"a dictionary of {name}", values)
-    known = {field.name: field for field in fields_of(name)}
+    fields = {field.name: field for field in fields_of(name)}
     message = kind()
     for key, value in values.items():
-        field = known.get(key)
+        field = fields.get(key)
         if field is None:
-            problem = f"{name} has no such field{spelling_hint(str(key), list(known))}"
+            problem = f"{name} has no such field{spelling_hint(str(key), list(fields))}"
             raise ValidationError(_join(path, key), "absent", value, problem)
         place = _join(path, field.public)
         _set(message, field, _value(value, field, place), path)
@@ -89,7 +89,10 @@ def _value(value: Any, field: FieldInfo, path: str) -> Any:
         return value
     if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
         raise ValidationError(path, "a list", value)
-    return [_element(one, field, f"{path}[{index}]") for index, one in enumerate(value)]
+    return [
+        _element(element, field, f"{path}[{index}]")
+        for index, element in enumerate(value)
+    ]
 
 
 def _element(value: Any, field: FieldInfo, path: str) -> Any:
@@ -111,8 +114,8 @@ def dataclass_params() -> Any:
     """Return the `__dataclass_params__` of all messages."""
     import dataclasses
 
-    made: Any = dataclasses.make_dataclass("Message", [], slots=True)
-    return made.__dataclass_params__
+    model: Any = dataclasses.make_dataclass("Message", [], slots=True)
+    return model.__dataclass_params__
 
 
 def dataclass_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
@@ -128,13 +131,13 @@ def dataclass_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
     plain = dataclasses.make_dataclass(
         owner.__name__, _fields(owner), init=False, repr=False, eq=False
     )
-    found: dict[str, Any] = plain.__dataclass_fields__  # type: ignore[attr-defined]
-    owner.__dataclass_fields__ = found
+    fields: dict[str, Any] = plain.__dataclass_fields__  # type: ignore[attr-defined]
+    owner.__dataclass_fields__ = fields
     if "_arrays." not in "".join(owner.__annotations__.values()):
         # pytest explains field by field what dataclasses made, which it knows by this name
         code = owner.__eq__.__code__
         owner.__eq__.__code__ = code.replace(co_filename="<string>")
-    return found
+    return fields
 
 
 def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
@@ -149,12 +152,12 @@ def _fields(owner: Any) -> Iterator[tuple[str, Any, dataclasses.Field[Any]]]:
     except ImportError:  # of another package, whose classes only these fields need
         types = owner.__annotations__
     for name, wire, default in names:
-        made: Any = (
+        field: Any = (
             dataclasses.field(default_factory=_fresh(owner, slot_name(wire)))
             if default is None
             else dataclasses.field(default=default)
         )
-        yield name, types[name], made
+        yield name, types[name], field
 
 
 def _fresh(owner: Any, slot: str) -> Any:
@@ -167,23 +170,23 @@ def _fresh(owner: Any, slot: str) -> Any:
 # pydantic: a `CoreSchema` is made of dictionaries
 
 
-def message_schema(cls: Any, found: Any, handler: Any) -> Any:
-    """Return the schema of a message, given the one that it has as a dataclass.
+def message_schema(cls: Any, reference: Any, handler: Any) -> Any:
+    """Return the schema of a message, from the one that it has as a dataclass.
 
     That may be a reference; what it leads to is changed, because other fields have it, too.
     """
-    schema = handler.resolve_ref_schema(found)
+    schema = handler.resolve_ref_schema(reference)
     if schema["type"] == "dataclass":
         own = {field.public: field for field in fields_of(type_name(cls))}
-        for one in schema["schema"].get("fields", ()):
-            if one["name"] in own:  # subclasses have more
-                _check(one, own[one["name"]])
+        for entry in schema["schema"].get("fields", ()):
+            if entry["name"] in own:  # subclasses have more
+                _check(entry, own[entry["name"]])
         inner = {key: schema[key] for key in schema if key != "ref"}
         shared = {"ref": schema["ref"]} if "ref" in schema else {}
         schema.clear()
         function = {"type": "no-info", "function": _checked}
         schema.update(shared, type="function-wrap", function=function, schema=inner)
-    return found
+    return reference
 
 
 def _checked(value: Any, make: Any) -> Any:
@@ -224,7 +227,7 @@ def _after(
 
 
 def numbers_schema(elements: Any) -> Any:
-    """Return the schema of an array of numbers, given that of a list of them."""
+    """Return the schema of an array of numbers, from that of a list of them."""
     return {
         "type": "function-before",
         "function": {"type": "no-info", "function": _listed},

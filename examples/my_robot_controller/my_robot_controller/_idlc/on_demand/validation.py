@@ -177,17 +177,19 @@ def refused(
     numpy said, and one of its kind is returned: rosidl's classes raise that.
     """
     primitive = next(
-        known for known in PRIMITIVES.values() if kind in (known.code, known.name)
+        candidate
+        for candidate in PRIMITIVES.values()
+        if kind in (candidate.code, candidate.name)
     )
     field = FieldInfo(name, primitive, False, False, None, "", size, size is None, None)
-    found = ValidationError(
+    failure = ValidationError(
         name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
     )
     if isinstance(values, (bytes, bytearray)) and size is None:
         problem = (
             f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
         )
-        found = ValidationError(name, "whole numbers of bytes", values, problem)
+        failure = ValidationError(name, "whole numbers of bytes", values, problem)
     elif (
         isinstance(values, (list, tuple))
         or getattr(values, "ndim", 0) == 1
@@ -196,13 +198,13 @@ def refused(
         try:
             _list(values, field, name, wire_only=True)
         except ValidationError as exact:
-            found = exact
+            failure = exact
     raised = ValidationError
     if isinstance(error, OverflowError):
         raised = FieldRangeError
     elif isinstance(error, TypeError) or isinstance(values, (str, dict)):
         raised = FieldTypeError
-    return found.at(found.path, raised)  # type: ignore[no-any-return]
+    return failure.at(failure.path, raised)  # type: ignore[no-any-return]
 
 
 # checks at each assignment
@@ -276,7 +278,7 @@ def become_checked(message: Any, check: bool) -> None:
 
 
 class Checked:
-    """What the classes of messages that check their fields have in common."""
+    """The base of the classes whose instances check their fields."""
 
     __slots__ = ()
 
@@ -295,7 +297,7 @@ def _restored(kind: type, values: dict[str, Any]) -> Any:
 
 @cache
 def checked_class(kind: Any) -> Any:
-    """Return the subclass whose fields check what they are given."""
+    """Return the subclass whose fields check the values that are assigned."""
     owner = owner_of(kind)
     namespace: dict[str, Any] = {
         name: getattr(kind, name) for name in ("__module__", "__qualname__", "__doc__")
@@ -308,7 +310,7 @@ def checked_class(kind: Any) -> Any:
 
 
 def _converts(owner: Any, field: FieldInfo) -> bool:
-    """Return whether a class makes lists of what a field is given."""
+    """Return whether a class makes lists of the values of a field."""
     is_property = isinstance(owner.__dict__[field.public], property)
     return is_property and not field.is_numeric
 
@@ -346,7 +348,7 @@ def _check(value: Any, field: FieldInfo) -> None:
 def _refusal(value: Any, field: FieldInfo) -> str:
     """Return what the field allows if it refuses a value, else nothing."""
     if not field.is_list:
-        return _refusal_of_one(value, field)
+        return _refusal_of_element(value, field)
     if field.is_numeric and field.primitive is not None:
         if field.is_sequence and isinstance(value, array):
             if value.typecode != field.primitive.code:
@@ -365,11 +367,13 @@ def _refusal(value: Any, field: FieldInfo) -> str:
         return f"a set or sequence of length {field.size}"
     if field.bound is not None and len(value) > field.bound:
         return f"a set or sequence of length <= {field.bound}"
-    found = (_refusal_of_one(one, field, listed=True) for one in value)
-    return next((f"a set or sequence, each value {one}" for one in found if one), "")
+    refusals = (_refusal_of_element(element, field, listed=True) for element in value)
+    return next(
+        (f"a set or sequence, each value {text}" for text in refusals if text), ""
+    )
 
 
-def _refusal_of_one(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
+def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
     if field.nested:
         right = isinstance(value, class_of(field.nested))
         return "" if right else f"a {field.nested}"

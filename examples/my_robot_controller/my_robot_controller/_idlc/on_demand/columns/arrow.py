@@ -68,7 +68,9 @@ def _flattened(pa: Any, struct: Any) -> Any:
 
 
 def _struct(pa: Any, names: list[str], arrays: list[Any], count: int) -> Any:
-    fields = [pa.field(name, one.type) for name, one in zip(names, arrays, strict=True)]
+    fields = [
+        pa.field(name, array.type) for name, array in zip(names, arrays, strict=True)
+    ]
     return pa.Array.from_buffers(pa.struct(fields), count, [None], children=arrays)
 
 
@@ -145,13 +147,13 @@ def definition_of(name: str) -> str:
     MCAP calls this form ros2msg.
     """
     needed = [name]
-    for one in needed:
-        found = (field.nested for field in fields_of(one) if field.nested)
-        needed += [other for other in dict.fromkeys(found) if other not in needed]
+    for type_ in needed:
+        nested = (field.nested for field in fields_of(type_) if field.nested)
+        needed += [other for other in dict.fromkeys(nested) if other not in needed]
     parts = [_message_text(name)]
     parts += [
-        f"{SEPARATOR}\nMSG: {_short_name(one)}\n{_message_text(one)}"
-        for one in needed[1:]
+        f"{SEPARATOR}\nMSG: {_short_name(other)}\n{_message_text(other)}"
+        for other in needed[1:]
     ]
     return "".join(parts)
 

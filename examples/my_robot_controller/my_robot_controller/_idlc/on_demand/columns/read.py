@@ -34,7 +34,9 @@ class Messages(NamedTuple):
 
     def raw(self, index: int) -> bytes:
         """Return one message."""
-        start, stop = (np.array([int(one[index])]) for one in (self.starts, self.stops))
+        start, stop = (
+            np.array([int(positions[index])]) for positions in (self.starts, self.stops)
+        )
         return bytes(self.source.ranges(start, stop - start))
 
 
@@ -56,8 +58,8 @@ def messages_of(messages: Any) -> Messages:
 def _of_batch(batch: Any) -> Messages:
     array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
     starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
-    for one in (starts, stops):
-        if one.size and one.dtype.kind not in "iu":
+    for positions in (starts, stops):
+        if positions.size and positions.dtype.kind not in "iu":
             raise TypeError("starts and stops of a batch must be integers")
     starts, stops = starts.astype(np.int64), stops.astype(np.int64)
     if starts.shape != stops.shape or starts.ndim != 1:

@@ -104,7 +104,7 @@ def repeat_fixed(
     """Scan elements of fixed size with gaps.
 
     Where the first one begins decides about its gaps. All others begin after one that ends
-    with what aligned most, and what follows that: they are alike.
+    with what aligned most, and what follows that: they have equal gaps.
     """
     some = np.flatnonzero(counts)
     counts = counts[some]
@@ -253,7 +253,7 @@ class SequentialScan:
             return self.advance(at, count * packed.size)
         if not level.fixed:
             return self.repeat(level, at, number, range(count))
-        cursor = Cursors(*(np.array([one]) for one in (at, self.end, self.phase)))
+        cursor = Cursors(*(np.array([value]) for value in (at, self.end, self.phase)))
         repeat_fixed(level, cursor, np.array([count]), self.result, number)
         return int(cursor.at[0])
 

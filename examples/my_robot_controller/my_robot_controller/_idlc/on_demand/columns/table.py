@@ -200,7 +200,7 @@ class _Making(Reading):
             return self.table.texts(self.elements, node)
         if isinstance(node, Instant):
             parts = (node.seconds, node.nanoseconds)
-            return instants(node, *(self.column(one, count, depth) for one in parts))
+            return instants(node, *(self.column(part, count, depth) for part in parts))
         if isinstance(node, Lists):
             return self.lists(node, count, depth)
         columns = {
