@@ -1,4 +1,7 @@
-"""`python -m maintenance.release`: prepare a release, or rehearse it. RELEASING.md says when to do what."""
+"""`python -m maintenance.release`: prepare a release, or rehearse it.
+
+RELEASING.md says when to do what.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What idlc is built from: bounded in pyproject.toml, and fixed to the byte in maintenance/requirements/."""
+"""What idlc is built from: bounded in pyproject.toml, and fixed to the byte by locks."""
 
 import re
 import sys

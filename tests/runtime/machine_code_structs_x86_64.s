@@ -1,9 +1,5 @@
-"""The machine code of `memory` for x86-64 (System V calling convention).
+# The machine code of typesupport/introspection.py for x86-64 (System V calling convention).
 
-`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
-"""
-
-TEXT = """
 .intel_syntax noprefix
 empty:  # (memory, plan): free what the plan says, and leave it empty
   push rbx
@@ -171,47 +167,3 @@ converter: .quad 0
 plan: .quad 0
 sequence: .quad 0
 size: .quad 0
-"""
-
-CODE = bytes.fromhex(
-    # empty
-    "535541544155415641574883ec084989fc488b1e488d6e084885db74664c8b6d"
-    "004d01e54d89ef4c8b75084d85f675084d8b7d004d8b751048837d1800741a4d"
-    "85f674154c89ff488b7518e8b0ffffff4c037d1049ffceebe648837d0800751a"
-    "498b7d0031f6ff156c01000031c04989450049894508498945104883c52048ff"
-    "cbeb954883c408415f415e415d415c5d5bc3660f1f440000"
-    # create
-    "f30f1efabf01000000488b356001000031d2ff2520010000"
-    # destroy
-    "f30f1efa534889fb488b3539010000e83cffffff4889df5b31f6ff2508010000"
-    # convert_from_py
-    "f30f1efa53554883ec084889fb4889f54889f7488b350e010000e811ffffff48"
-    "8b3dfa0000004889ee4889daff15de00000085c00f94c04883c4085d5bc36690"
-    # convert_to_py
-    "f30f1efa4889fe488b3dd2000000ff25c40000000f1f4000"
-    # finish
-    "f30f1efa488b35c5000000e9c8feffff"
-    # resize
-    "f30f1efa53554883ec084889fb4889f5488b35b1000000e8acfeffffb8010000"
-    "004885ed74274889ef488b35a000000031d2ff15600000004885c07410488903"
-    "48896b0848896b10b8010000004883c4085d5bc30f1f4000"
-    # length
-    "f30f1efa488b4708c30f1f8000000000"
-    # in_sequence
-    "f30f1efa488b055d000000480fafc6480307c30f1f440000"
-    # in_array
-    "f30f1efa488b0545000000480fafc64801f8c30f1f440000"
-)
-
-#: Where each function begins.
-ENTRIES = {
-    "create": 0x98,
-    "destroy": 0xB0,
-    "convert_from_py": 0xD0,
-    "convert_to_py": 0x110,
-    "finish": 0x128,
-    "resize": 0x138,
-    "length": 0x190,
-    "in_sequence": 0x1A0,
-    "in_array": 0x1B8,
-}

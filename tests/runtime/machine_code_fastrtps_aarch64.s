@@ -1,9 +1,5 @@
-"""The machine code of `fastrtps` for aarch64 (AAPCS64 calling convention).
+// The machine code of typesupport/fastrtps.py for aarch64 (AAPCS64 calling convention).
 
-`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
-"""
-
-TEXT = """
 serialize:  // (memory, cdr) -> bool
   hint #34
   stp x29, x30, [sp, #-64]!
@@ -151,39 +147,3 @@ length: .quad 0
 answers: .quad 0
 memory: .quad 0
 make: .quad 0
-"""
-
-CODE = bytes.fromhex(
-    # serialize
-    "5f2403d5fd7bbca9f35301a9f55b02a9fd030091730f0058136873f8730300b4"
-    "820f00587302028b768640f800008052140e00589402018b950240f9e20d0058"
-    "226862f8420015cb5f0016eb63010054160100b4e00315aa610ac1a8b502028b"
-    "d60202cb700b005800023fd6f9ffff17950200f920008052f35341a9f55b42a9"
-    "fd7bc4a8c0035fd6820c0058026862f80000805222ffffb4430c0058566863f8"
-    "d61200d1630b00584200038b42100091f3c30091625a00a9ddffff171f2003d5"
-    # deserialize
-    "5f2403d5fd7bbea9f30b00f9fd030091f30301aae2080058026862f8421000d1"
-    "c1080058016861f8210002cbe00302aa5007005800023fd6400100b462080058"
-    "7302028b610240f9600200f9e00301aa9006005800023fd62000805204000014"
-    "5006005800023fd600008052f30b40f9fd7bc2a8c0035fd6"
-    # serialized_size
-    "5f2403d521060058016861f8810000b440060058206860f8c0035fd621060058"
-    "006861f8800000b401060058006861f8001000d1c0035fd6"
-    # maximum_size
-    "5f2403d51f000039000080d2c0035fd6"
-    # resolve
-    "5f2403d522050058430040f9630100b4e40301aa6514403886144038bf00066b"
-    "8100005485ffff35400440f9c0035fd642400091f5ffff17000080d2c0035fd6"
-    # create
-    "5f2403d5600300589003005800021fd6"
-)
-
-#: Where each function begins.
-ENTRIES = {
-    "serialize": 0x0,
-    "deserialize": 0xC0,
-    "serialized_size": 0x138,
-    "maximum_size": 0x170,
-    "resolve": 0x180,
-    "create": 0x1C0,
-}

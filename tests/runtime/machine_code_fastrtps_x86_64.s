@@ -1,9 +1,5 @@
-"""The machine code of `fastrtps` for x86-64 (System V calling convention).
+# The machine code of typesupport/fastrtps.py for x86-64 (System V calling convention).
 
-`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
-"""
-
-TEXT = """
 .intel_syntax noprefix
 serialize:  # (memory, cdr) -> bool
   endbr64
@@ -155,38 +151,3 @@ length: .quad 0
 answers: .quad 0
 memory: .quad 0
 make: .quad 0
-"""
-
-CODE = bytes.fromhex(
-    # serialize
-    "f30f1efa5355415441554883ec1831c0488b1dd1010000488b1c1f4885db7464"
-    "48031dd10100004c8b2b4883c308488b2da30100004801f54c8b6500488b159d"
-    "010000488b14164c29e24c39ea722a4d85ed741c4c89e7488b33488b53084901"
-    "d44929d5ff154e0100004883c310ebdf4c896500b8010000004883c418415d41"
-    "5c5d5bc3488b1575010000488b14174885d274e5488b1d6d0100004c8b2c1a49"
-    "83ed044803154e0100004883c204488914244c896c24084889e3e96fffffff90"
-    # deserialize
-    "f30f1efa534889f3488b0509010000488b04074883e804488b3502010000488b"
-    "34374829c64889c7ff15d20000004885c0741a48031df6000000488b3b488903"
-    "ff15c2000000b8010000005bc3ff15bd00000031c05bc390"
-    # serialized_size
-    "f30f1efa488b05c5000000488b04074885c0740b480305c5000000488b00c348"
-    "8b05c2000000488b04074885c0740f488b15ba000000488b04104883e804c390"
-    # maximum_size
-    "f30f1efac6070031c0c3660f1f440000"
-    # resolve
-    "f30f1efa488b159d000000488b024885c074214889f1448a00443a01751048ff"
-    "c048ffc14584c075ed488b4208c34883c210ebd7c30f1f00"
-    # create
-    "f30f1efa488b3d6d000000ff256f0000000f1f8000000000"
-)
-
-#: Where each function begins.
-ENTRIES = {
-    "serialize": 0x0,
-    "deserialize": 0xC0,
-    "serialized_size": 0x118,
-    "maximum_size": 0x158,
-    "resolve": 0x168,
-    "create": 0x1A0,
-}

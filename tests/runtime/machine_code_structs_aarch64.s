@@ -1,9 +1,5 @@
-"""The machine code of `memory` for aarch64 (AAPCS64 calling convention).
+// The machine code of typesupport/introspection.py for aarch64 (AAPCS64 calling convention).
 
-`CODE` is what an assembler makes of `TEXT`, up to the words at its end. A test compares.
-"""
-
-TEXT = """
 empty:  // (memory, plan): free what the plan says, and leave it empty
   stp x29, x30, [sp, #-64]!
   stp x19, x20, [sp, #16]
@@ -155,49 +151,3 @@ converter: .quad 0
 plan: .quad 0
 sequence: .quad 0
 size: .quad 0
-"""
-
-CODE = bytes.fromhex(
-    # empty
-    "fd7bbca9f35301a9f55b02a9f76303a9fd030091f30300aa348440f8f50301aa"
-    "b40300b4b60240f9d602138bf70316aab80640f9780000b5d70240f9d80a40f9"
-    "a10e40f9210100b4180100b4e00317aaa10e40f9ebffff97a00a40f9f702008b"
-    "180700d1f9ffff17a00640f9e00000b5c00240f9010080d2900b005800023fd6"
-    "df7e00a9df0a00f9b5820091940600d1e4ffff17f35341a9f55b42a9f76343a9"
-    "fd7bc4a8c0035fd6"
-    # create
-    "5f2403d5200080d2410b0058020080d25009005800021fd6"
-    # destroy
-    "5f2403d5fd7bbea9fd030091e00b00f9c1090058cbffff97e00b40f9fd7bc2a8"
-    "010080d23008005800021fd61f2003d5"
-    # convert_from_py
-    "5f2403d5fd7bbea9fd030091e00701a9e00301aa21080058beffff97e20741a9"
-    "80070058f006005800023fd61f000071e0179f1afd7bc2a8c0035fd61f2003d5"
-    # convert_to_py
-    "5f2403d5e10300aa40060058f005005800021fd61f2003d5"
-    # finish
-    "5f2403d5e1050058acffff171f2003d5"
-    # resize
-    "5f2403d5fd7bbea9fd030091e00701a941050058a5ffff97e00f40f9200100b4"
-    "01050058020080d21003005800023fd6a00000b4e10b41a9200800a9220800f9"
-    "20008052fd7bc2a8c0035fd61f2003d5"
-    # length
-    "5f2403d5000440f9c0035fd61f2003d5"
-    # in_sequence
-    "5f2403d5e2020058000040f92000029bc0035fd61f2003d5"
-    # in_array
-    "5f2403d5220200582000029bc0035fd6"
-)
-
-#: Where each function begins.
-ENTRIES = {
-    "create": 0xA8,
-    "destroy": 0xC0,
-    "convert_from_py": 0xF0,
-    "convert_to_py": 0x130,
-    "finish": 0x148,
-    "resize": 0x158,
-    "length": 0x1A8,
-    "in_sequence": 0x1B8,
-    "in_array": 0x1D0,
-}
