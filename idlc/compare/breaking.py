@@ -37,7 +37,7 @@ from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import manifest, read_statements
 from idlc.project.settings import Config, Scope, working_in
-from idlc.wire.layout import Extents, oversized
+from idlc.wire.layout import ContentSizes, oversized
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -287,7 +287,7 @@ def _side(
     # of a type that is defined twice, nobody knows which definition was meant
     also = {shown: compiled[name] for shown, name in every.items() if name in compiled}
     pairs = list(models_of(given, scope, report))
-    extents: Extents = {}
+    extents: ContentSizes = {}
     for model in without_errors(pairs, report, also):
         report.extend(oversized(model, extents))
     models = list(without_errors(pairs, report, also))
@@ -320,7 +320,7 @@ def sound_ones(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> 
     found = Report()
     models = {model.package: model for _, model in models_of(given, scope, found)}
     if not found.had_errors:
-        extents: Extents = {}
+        extents: ContentSizes = {}
         for model in models.values():
             found.extend(oversized(model, extents))
     report.extend(one for one in found if one.severity is codes.ERROR)

@@ -331,7 +331,7 @@ _NUMBERS = ("no", "one", "two")
 
 
 def lower(
-    file: tree.File | idl.File, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
+    file: tree.File | idl.IdlFile, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
 ) -> ir.Interface:
     """Return the interface that a file defines for a distribution; missing sections are empty.
 

@@ -132,7 +132,7 @@ _PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.item
 _CONSTANTS = "_Constants"
 
 
-def lower_idl(file: idl.File, wanted: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
+def lower_idl(file: idl.IdlFile, wanted: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
     """Return the wanted structures of a file, which must hold these and no others."""
     return _Lowering(file, report).structures(wanted)
 
@@ -147,7 +147,7 @@ class _Type(NamedTuple):
 class _Lowering:
     """Lowers one file; holds what its steps share."""
 
-    def __init__(self, file: idl.File, report: Report) -> None:
+    def __init__(self, file: idl.IdlFile, report: Report) -> None:
         self.file = file
         self.report = report
         self.typedefs: dict[str, _Type] = {}
@@ -298,7 +298,7 @@ class _Lowering:
             return None
         return found
 
-    def _constant(self, constant: idl.Constant) -> ir.Constant | None:
+    def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
         self._check_annotations(constant.annotations)
         span = self.file.span(constant.name)
         wrong = lower_types.constant_name(constant.name.text, span)
