@@ -84,7 +84,7 @@ class Compiler:
                 with stage("lower", source.path):
                     found = Report()
                     interface = lower(tree, name, found, self.library.distro)
-                    lowered = self._pool.learn(interface, found)
+                    lowered = self._pool.remember(interface, found)
             own.append(lowered.interface)
             report.extend(lowered.problems)
         return tuple(own)

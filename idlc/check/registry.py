@@ -179,7 +179,7 @@ def _ask(rules: Sequence[Rule], model: Model, report: Report, memory: Memory | N
     if memory is None:
         return
     known = memory.of(model)
-    for one in model.each():
+    for one in model.per_interface():
         name = one.own[0].name
         if name not in known:
             found = Report()

@@ -35,7 +35,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
-from idlc.model.from_description import NotBelievedError, reported_model
+from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import look, nothing_in
@@ -433,8 +433,8 @@ def _learn(
                 try:
                     model = reported_model(description, sources, name, type_hash, node)
                     if any(oversized(model)):
-                        raise NotBelievedError("it is larger than anybody can use")
-                except NotBelievedError as error:
+                        raise DescriptionError("it is larger than anybody can use")
+                except DescriptionError as error:
                     problem = f"is not believed: {error}"
                 else:
                     list(_add(model, known))

@@ -24,9 +24,9 @@ CATEGORIES = (CORRECTNESS, PORTABILITY, STYLE, PACKAGE)
 class Code(msgspec.Struct, frozen=True):
     """A kind of problem: its stable id, its short name, its severity and its category.
 
-    `default` is true if `idlc check` reports it without being asked: rules about names and the
-    amount of documentation are off, and rules against code that works as well as its alternative.
-    `usage` is true for a problem of the call or its environment, not of an interface: exit status 2.
+    `default`: `idlc check` reports it without being asked. Rules about names and the amount of
+    documentation are off, and rules against code that works as well as its alternative.
+    `usage`: a problem of the call or its environment, not of an interface; exit status 2.
     """
 
     id: str

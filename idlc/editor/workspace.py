@@ -90,7 +90,7 @@ class State(msgspec.Struct, frozen=True, dict=True):
                 reach = model.reach(interface.name)
                 paths = {one.source.path for one in reach if one and one.source}
                 is_sound = model.is_sound(interface.name) and not paths & self._broken
-                return model.alone(interface) if is_sound else None
+                return model.restricted_to(interface) if is_sound else None
         return None
 
     def source(self, name: ir.TypeName) -> Source | None:

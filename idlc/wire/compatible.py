@@ -1,4 +1,4 @@
-"""The comparison of two versions of a structure on the wire: does the new one misread the old?
+"""The comparison of two versions of a structure on the wire: the new one may misread the old.
 
 Plain CDR has no names and no lengths of structures: a reader depends on the offset of each number,
 text and count, so a nested structure equals its fields in its place.
@@ -143,7 +143,7 @@ class _Follower:
     def __init__(self, before: Messages, after: Messages) -> None:
         self._before = before
         self._after = after
-        self._known: dict[Hashable, set[_Offset]] = {}
+        self._ends: dict[Hashable, set[_Offset]] = {}
 
     def follow(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
         """Return the places after two runs; raise _MisreadError if a value is misread.
@@ -192,17 +192,17 @@ class _Follower:
                 return {_Offset(at) for at in ((0, 4) if old.type.wide else range(8))}
             case ir.Sequence(), ir.Sequence() if _fits(old.type.bound, new.type.bound):
                 key: Hashable = (old.type, new.type, start % 8, at_end)
-                if key not in self._known:
+                if key not in self._ends:
                     ends = self._sequence(old.type, new.type, (start + 4) % 8, at_end=at_end)
-                    self._known[key] = ends
-                return self._known[key]
+                    self._ends[key] = ends
+                return self._ends[key]
             case ir.Array(), ir.Array() if old.type.size == new.type.size or (
                 at_end and new.type.size < old.type.size
             ):
                 key = (old.type, new.type, start % 8)
-                if key not in self._known:
-                    self._known[key] = self._array(old.type, new.type, start % 8)
-                return self._known[key]
+                if key not in self._ends:
+                    self._ends[key] = self._array(old.type, new.type, start % 8)
+                return self._ends[key]
         raise _MisreadError
 
     def _elements(self, old: ir.Element, new: ir.Element) -> _Runs:

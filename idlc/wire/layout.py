@@ -98,7 +98,7 @@ class _Layouts:
 
     def __init__(self, messages: Messages) -> None:
         self._messages = messages
-        self._known: dict[tuple[ir.TypeName, int], Extent] = {}
+        self._sizes: dict[tuple[ir.TypeName, int], Extent] = {}
 
     def fields(self, fields: Iterable[ir.Field], start: int) -> tuple[list[Placed], Extent]:
         """Return fields from an offset on, and the bytes to the end of the last."""
@@ -137,10 +137,10 @@ class _Layouts:
         return Extent(_COUNT, exact=False)
 
     def _structure(self, name: ir.TypeName, residue: int) -> Extent:
-        extent = self._known.get((name, residue))
+        extent = self._sizes.get((name, residue))
         if extent is None:
             extent = self.fields(self._messages[name].wire_fields, residue)[1]
-            self._known[name, residue] = extent
+            self._sizes[name, residue] = extent
         return extent
 
     def _repeated(self, element: ir.Element, count: int, at: int) -> Extent:

@@ -17,7 +17,7 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """The location of a value: a slot of the object in a local variable, of the structure `type`."""
+    """The location of a value: a slot of the object in a local variable, of structure `type`."""
 
     owner: str
     slot: str
