@@ -4,31 +4,23 @@ from __future__ import annotations
 
 import datetime
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
-import msgspec
 
-from idlc.check.run import Checked
-from idlc.cli import options, output, reports
-from idlc.compare import packages
-from idlc.compare.breaking import GIT, BreakingOptions, Verdict, breaking
-from idlc.compare.changes import LEVELS
-from idlc.compare.distribution import is_distro
-from idlc.diagnostics.formats import notice
-from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.terminal import counted
-from idlc.project.settings import load_settings, scope
+from idlc.cli import options
 
 if TYPE_CHECKING:
+    from idlc.compare.breaking import BreakingOptions, Verdict
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict
+    from idlc.diagnostics.report import Report
 
 GRAPH = "graph"
 PATIENCE = 5.0
 
 
-class BreakingWishes(msgspec.Struct, frozen=True):
+class BreakingWishes(NamedTuple):
     """What was typed."""
 
     paths: tuple[str, ...]
@@ -44,6 +36,14 @@ class BreakingWishes(msgspec.Struct, frozen=True):
 
 def compare(typed: BreakingWishes) -> int:
     """Compare versions, show what breaks and return the exit status."""
+    from idlc.cli import output
+    from idlc.compare import packages
+    from idlc.compare.breaking import BreakingOptions
+    from idlc.compare.changes import LEVELS
+    from idlc.compare.distribution import is_distro
+    from idlc.diagnostics.report import Report
+    from idlc.project.settings import load_settings, scope
+
     report = Report()
     settings = load_settings(report)
     against = typed.against or packages.against(settings, report)
@@ -76,6 +76,9 @@ def compare(typed: BreakingWishes) -> int:
 
 def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the recordings to compare with, and the paths that are none of them."""
+    from idlc.compare.breaking import GIT
+    from idlc.compare.distribution import is_distro
+
     if against == GRAPH or is_distro(against) or against.startswith(GIT):
         return (), paths
     from idlc.recordings.find import recordings_of
@@ -86,6 +89,8 @@ def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], 
 def _compared(
     wanted: BreakingOptions, recordings: tuple[str, ...], typed: BreakingWishes, report: Report
 ) -> Verdict | GraphVerdict | RecordedVerdict | None:
+    from idlc.compare.breaking import breaking
+
     if recordings:
         from idlc.compare.recording import compare_with_recordings
 
@@ -103,6 +108,10 @@ def _show(
     verdict: Verdict | GraphVerdict | RecordedVerdict | None,
     typed: BreakingWishes,
 ) -> None:
+    from idlc.check.run import Checked
+    from idlc.cli import output, reports
+    from idlc.diagnostics.formats import notice
+
     style = typed.style
     if style == "json":
         output.show(report, style, sys.stdout)
@@ -124,6 +133,9 @@ def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...] = ()
 ) -> str:
     """Return the last line of the text: it says what was not looked at, or not shown."""
+    from idlc.compare.breaking import Verdict
+    from idlc.diagnostics.terminal import counted
+
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     left_out = verdict.not_compared if isinstance(verdict, Verdict) else ()
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"
@@ -140,6 +152,8 @@ def _summary(
 
 def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
     """Return what was looked at, and what of it was not told."""
+    from idlc.diagnostics.terminal import counted
+
     seen = [counted(number, noun) for noun, number in verdict.seen.items()]
     text = f"; looked at {', '.join(seen)}"
     facts = verdict._asdict()
@@ -152,6 +166,8 @@ def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
 
 def _next(verdict: Verdict) -> str:
     """Return what was added, and which version comes next."""
+    from idlc.diagnostics.report import first_few
+
     text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
     if verdict.part is None:
         facts = (verdict.allowed, verdict.added, verdict.not_compared, verdict.hidden)

@@ -14,7 +14,7 @@ from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import one_line, visible
 
-#: What stands in our console scripts.
+#: The text in our console scripts.
 _OURS = b"idlc.cli.main"
 
 
