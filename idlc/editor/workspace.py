@@ -239,7 +239,7 @@ class Workspace:
     def _around(self, path: Path) -> Facts | None:
         given = self._packages[self._places[path][0]]
         with working_in(self.folder):
-            return next(iter(self._checkers.values())).around(given)
+            return next(iter(self._checkers.values())).package_facts(given)
 
     def earlier(self, against: str = "") -> Earlier:
         """Return what the packages are compared with: `against`, or what pyproject.toml says."""
