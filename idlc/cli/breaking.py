@@ -100,7 +100,7 @@ def _compared(
     from idlc.compare.running import compare_with_graph
 
     patience = typed.timeout or PATIENCE
-    return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))
+    return compare_with_graph(wanted, patience, report, has_paths=bool(typed.paths))
 
 
 def _show(

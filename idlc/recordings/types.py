@@ -20,7 +20,7 @@ from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.definitions import ENCODINGS, Recorded
 from idlc.recordings.versions import Contents, Version
-from idlc.wire.layout import Extents, oversized
+from idlc.wire.layout import ContentSizes, oversized
 
 #: Names that are told in a sentence.
 NAMED = 5
@@ -182,7 +182,7 @@ class RecordedTypes:
             for package, names in sorted(self.names.items())
         }
         if not found.had_errors:
-            extents: Extents = {}
+            extents: ContentSizes = {}
             for model in models.values():
                 found.extend(oversized(model, extents))
         errors = Report()
