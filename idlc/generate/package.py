@@ -126,7 +126,7 @@ def _imports(model: Model) -> tuple[str, ...]:
 
 def planned(
     models: Sequence[Model],
-    wanted: Mapping[Target, inputs.Inputs],
+    requested: Mapping[Target, inputs.Inputs],
     compiler: Compiler,
     *,
     check: bool,
@@ -134,13 +134,14 @@ def planned(
 ) -> list[Package]:
     """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
     vendor = _Vendor({model.package for model in models}, compiler, check=check)
-    found: list[Package | None] = []
-    for model, (target, given) in zip(models, wanted.items(), strict=True):
+    packages: list[Package | None] = []
+    for model, (target, package) in zip(models, requested.items(), strict=True):
         names = vendor.add(model, target) if vendor_deps else None
         library = compiler.library
-        found.append(package_of(model, target, given.digests, library, check=check, vendored=names))
-    found += [vendor.packages[name] for name in sorted(vendor.packages)]
-    return [] if None in found else [one for one in found if one]
+        digests = package.digests
+        packages.append(package_of(model, target, digests, library, check=check, vendored=names))
+    packages += [vendor.packages[name] for name in sorted(vendor.packages)]
+    return [] if None in packages else [package for package in packages if package]
 
 
 class _Vendor:
@@ -171,7 +172,7 @@ class _Vendor:
         names = library.interfaces(package)
         sources = [(name, source) for name in names if (source := library.source(name))]
         whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(one for one in report if one.severity is Severity.ERROR)
+        target.report.extend(each for each in report if each.severity is Severity.ERROR)
         self._needed[package] = _needed(whole)
         if not accept_name(package, "what is depended on", target.report) or report.had_errors:
             return None
@@ -201,13 +202,13 @@ class Generated(NamedTuple):
     needs: tuple[str, ...] = ()
 
 
-def generated(one: Package) -> Generated:
+def generated(package: Package) -> Generated:
     """Return what is done to a package that is ready to be written."""
-    removed = sum(change.new is None for change in one.plan.changes)
-    written = len(one.plan.changes) - removed
-    target = one.target
-    files = len(one.plan.outputs)
-    return Generated(target.package, target.name, len(one.lock.inputs), files, written, removed)
+    removed = sum(change.new is None for change in package.plan.changes)
+    written = len(package.plan.changes) - removed
+    target = package.target
+    files = len(package.plan.outputs)
+    return Generated(target.package, target.name, len(package.lock.inputs), files, written, removed)
 
 
 def up_to_date(
@@ -216,16 +217,16 @@ def up_to_date(
     """Return what there is if a run would change nothing; empty otherwise."""
     if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
         return ()
-    found = [target]
+    folders = [target]
     for package in target.lock.vendored:
-        found.append(target.beside(package))
+        folders.append(target.beside(package))
         names = library.interfaces(package)
-        if not found[-1].unchanged(as_inputs(names, library), library):
+        if not folders[-1].unchanged(as_inputs(names, library), library):
             return ()
     return tuple(
-        Generated(one.package, one.name, len(one.lock.inputs), len(one.lock.outputs))
-        for one in found
-        if one.lock
+        Generated(folder.package, folder.name, len(folder.lock.inputs), len(folder.lock.outputs))
+        for folder in folders
+        if folder.lock
     )
 
 
@@ -253,4 +254,4 @@ def with_needs(
                 "which writes it next to this one",
             )
         )
-    return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)
+    return tuple(package._replace(needs=quiet.get(package.out, ())) for package in done)

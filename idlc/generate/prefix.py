@@ -42,22 +42,22 @@ class Libraries(NamedTuple):
     build_tag: str = ""
 
 
-def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
+def libraries_of(model: Model, distro: Distribution | None = None) -> Libraries:
     """Return the libraries of a model without errors, by default for what is installed here.
 
     Who writes them moves them into place: programs may have the old ones open.
     """
     from idlc.generate.native.library import libraries
 
-    found = found or distribution()
-    target = target_of(found)
+    distro = distro or distribution()
+    target = target_of(distro)
     if not model.own or isinstance(target, str):
         missing = target if model.own and isinstance(target, str) else ""
         return Libraries({}, missing, build_tag(model))
     with stage("libraries", model.package):
         files = libraries(model, *target)
     placed = {f"lib/{name}": content for name, content in files.items()}
-    return Libraries(placed, build_tag=build_tag(model, found.name))
+    return Libraries(placed, build_tag=build_tag(model, distro.name))
 
 
 def build_tag(model: Model, *libraries: str) -> str:
@@ -66,17 +66,17 @@ def build_tag(model: Model, *libraries: str) -> str:
     return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
 
 
-def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
+def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
     """Return for which processor and layout libraries are made here, or why none can be."""
     from idlc.generate.native.layouts import LAYOUTS
     from idlc.generate.native.library import MACHINES
 
     machine = MACHINES.get(prefixes.machine())
-    layout = LAYOUTS.get(found.name)
+    layout = LAYOUTS.get(distro.name)
     if machine is None:
         return f"idlc makes libraries for Linux on {' and '.join(MACHINES)}, and this is neither"
     if layout is None:
-        return f"idlc does not know this distribution of ROS 2 ({found.why})"
+        return f"idlc does not know this distribution of ROS 2 ({distro.why})"
     return machine, layout
 
 
@@ -94,35 +94,35 @@ def shared(
     other alone.
     """
     name = model.package
-    found: dict[str, str | bytes] = {**libraries.files}
+    files: dict[str, str | bytes] = {**libraries.files}
     if manifest is not None:
-        found[f"share/{name}/package.xml"] = manifest
+        files[f"share/{name}/package.xml"] = manifest
     interfaces = {}
     for own in model.own:
         key = f"{own.name.kind}/{own.name.name}"
         interfaces[f"{key}.{own.name.kind}"] = file_text(own)
         interfaces[f"{key}.idl"] = idl(own)
         described = model.describer.installed(str(own.name))
-        found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
-    found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
-    found[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
+        files[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
+    files |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
+    files[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
     if libraries.missing:
         report.notes.append(
             f"`{name}` is not registered in the index of ROS 2, because recorders stop at packages "
             f"without a library: {libraries.missing}"
         )
     else:
-        found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
-        found[f"{INDEX}/packages/{name}"] = ""
+        files[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
+        files[f"{INDEX}/packages/{name}"] = ""
     return {
         path: content.encode() if isinstance(content, str) else content
-        for path, content in found.items()
+        for path, content in files.items()
     }
 
 
 def dependencies(model: Model) -> list[str]:
     """Return the packages whose interfaces a model has besides its own."""
-    return sorted({one.package for one in model.interfaces} - {model.package})
+    return sorted({name.package for name in model.interfaces} - {model.package})
 
 
 #: How the files begin by which shells learn of a prefix, and which all packages in it share.
@@ -158,16 +158,16 @@ class Overlay(Target):
     @property
     def distribution(self) -> Distribution:
         """The distribution that libraries are for: the installed one, unless others are wanted."""
-        found = distribution((self._path, *prefixes.ament_prefixes()))
-        if not self._distros or found.name in self._distros:
-            return found
-        wanted = self._distros[0]
+        installed = distribution((self._path, *prefixes.ament_prefixes()))
+        if not self._distros or installed.name in self._distros:
+            return installed
+        chosen = self._distros[0]
         self.report.notes.append(
-            f"`{self.name}` gets libraries for {wanted}, not for {found.name} ({found.why})"
+            f"`{self.name}` gets libraries for {chosen}, not for {installed.name} ({installed.why})"
         )
-        return Distribution(wanted, f"--distro {wanted}")
+        return Distribution(chosen, f"--distro {chosen}")
 
-    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
         del beside
         return alone(self._path)
@@ -192,7 +192,7 @@ class Overlay(Target):
     def cause(self, change: Change) -> str:
         """Say why a library differs, if another distribution is the reason."""
         old, new = (inspect(data or b"") for data in (change.old, change.new))
-        if old is None or new is None or old.told == new.told:
+        if old is None or new is None or old.stamp == new.stamp:
             return ""
         return "it is for another distribution of ROS 2"
 
@@ -228,7 +228,7 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
     return {**placed, **shared(model, manifest, libraries, overlay.report)}
 
 
-def enter(overlay: Target) -> bool:
+def write_setup_scripts(overlay: Target) -> bool:
     """Write the files by which a shell learns of the prefix; return whether that went well."""
     assert isinstance(overlay, Overlay)
     files = {
@@ -239,7 +239,7 @@ def enter(overlay: Target) -> bool:
     return overlay.share(files)
 
 
-def _rendered(template: str, **given: object) -> str:
+def _rendered(template: str, **variables: object) -> str:
     from idlc.project.templates import environment
 
-    return environment().get_template(template).render(**given)
+    return environment().get_template(template).render(**variables)

@@ -51,7 +51,7 @@ def unchanged(
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
         and not _idlc_is_newer(out / FILE)
-        and all(_dependency(name, library) == one for name, one in lock.dependencies.items())
+        and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
     )
 
 
@@ -129,7 +129,7 @@ class Target:
         self.report = report
         self._force = force
 
-    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
         return alone(self._path.parent if beside else self._path)
 
@@ -159,12 +159,12 @@ class Target:
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
         """Return whether what is here is what compiling the inputs would write."""
-        found = unchanged(
+        is_unchanged = unchanged(
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
-        if found:
+        if is_unchanged:
             write.sweep(self._path)
-        return found
+        return is_unchanged
 
     def missing(self) -> list[str]:
         """Return the packages that the generated code needs and this Python cannot import."""
@@ -251,16 +251,16 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     pairs = [(old.inputs, new.inputs)]
     if dependencies:
         pairs.append((old.dependencies, new.dependencies))
-    found = []
+    reasons = []
     if old.idlc != new.idlc:
-        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+        reasons.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
     if old.converts_values != new.converts_values:
-        found.append("it was written for another distribution of ROS 2")
+        reasons.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
-        found.append(f"the package was called `{old.package}`")
+        reasons.append(f"the package was called `{old.package}`")
     for before, after in pairs:
-        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
-        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
         common = sorted(before.keys() & after.keys())
-        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
-    return first_few(found, 3)
+        reasons += [f"`{name}` changed" for name in common if before[name] != after[name]]
+    return first_few(reasons, 3)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.check.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report, Severity
-from idlc.generate.requested import wanted
+from idlc.generate.requested import requested_packages
 from idlc.generate.target import last_change
 from idlc.model import ir
 from idlc.model.python_names import class_
@@ -100,7 +100,7 @@ def asked_models(
     if is_recording(what):
         return _of_recording(what, where, report)
     if is_path(what):
-        given = wanted([what], [], "", where, report)
+        given = requested_packages([what], [], "", where, report)
         library = library_for(given, where, report)
         names = [name for one in given for name in one.names]
         compiler = Compiler(library)

@@ -18,8 +18,8 @@ class Machine(NamedTuple):
     """A processor. `code` is what an assembler makes of `text`; a test compares.
 
     A function of it ends where the next one begins. `holes` are the places in `code` that depend
-    on where something else is, with the name that it has in `text`; `fill(code, at, here, target)`
-    fills the one at `at`, which will be at the address `here`.
+    on where something else is, with the name that it has in `text`;
+    `fill(code, at, address, target)` fills the one at `at`, which will be at `address`.
     """
 
     number: int
@@ -256,10 +256,10 @@ class _File:
         machine, table, at = self.image.machine, self.sections[".rela.dyn"].data, 0
         for section in self.pointed:
             for where, place in section.pointers:
-                there = place.address
-                pack_into("<Q", section.data, where, there)
-                here = section.address + where
-                pack_into("<2Qq", table, at, here, machine.relative, there)
+                target = place.address
+                pack_into("<Q", section.data, where, target)
+                address = section.address + where
+                pack_into("<2Qq", table, at, address, machine.relative, target)
                 at += RELOCATION
         for index, name in enumerate(sorted(self.image.imports), 1):
             info = index << 32 | machine.absolute

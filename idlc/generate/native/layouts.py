@@ -61,7 +61,7 @@ class Structures:
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        self._known: dict[ir.TypeName, Structure] = {}
+        self._structures: dict[ir.TypeName, Structure] = {}
 
     def add(self, name: ir.TypeName, fields: Iterable[ir.Field]) -> Structure:
         """Return the structure of a message."""
@@ -72,7 +72,7 @@ class Structures:
             offsets.append(start)
             end, most = start + size, max(most, align)
         structure = Structure(tuple(offsets), end + -end % most, most)
-        self._known[name] = structure
+        self._structures[name] = structure
         return structure
 
     def _field(self, type_: ir.FieldType) -> tuple[int, int]:
@@ -86,7 +86,7 @@ class Structures:
             case ir.String():
                 size, align, sequence = layout.string, 8, layout.string_sequence
             case ir.Ref():
-                _, size, align = self._known[element.target]
+                _, size, align = self._structures[element.target]
                 sequence = layout.message_sequence
             case ir.Unknown():
                 raise ValueError("an unknown type has no layout")

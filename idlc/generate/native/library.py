@@ -52,9 +52,9 @@ class Descriptions:
     def about(self, name: str) -> tuple[Place, Place, Place]:
         """Return functions that return a type's hash, description and sources."""
         if name not in self._about:
-            told = (self._hash(name), *self._description(name))
+            places = (self._hash(name), *self._description(name))
             hash_, description, sources = (
-                self._image.function("get", target=place) for place in told
+                self._image.function("get", target=place) for place in places
             )
             self._about[name] = (hash_, description, sources)
         return self._about[name]
@@ -65,16 +65,16 @@ class Descriptions:
     def _description(self, name: str) -> tuple[Place, Place]:
         full = self._model.describer.description(name)
         referenced = full["referenced_type_descriptions"]
-        own, *others = (self._individual(one) for one in (full["type_description"], *referenced))
+        own, *others = map(self._individual, (full["type_description"], *referenced))
         description = self._image.tables.words(*own, *self._sequence(others))
-        names = (name, *(one["type_name"] for one in referenced))
-        sources = [self._source(one) for one in names]
+        names = (name, *(individual["type_name"] for individual in referenced))
+        sources = [self._source(type_name) for type_name in names]
         return description, self._image.tables.words(*self._sequence(sources))
 
-    def _individual(self, one: IndividualDict) -> Words:
-        name = one["type_name"]
+    def _individual(self, individual: IndividualDict) -> Words:
+        name = individual["type_name"]
         if name not in self._individuals:
-            fields = [self._field(field) for field in one["fields"]]
+            fields = [self._field(field) for field in individual["fields"]]
             self._individuals[name] = (*self._string(name), *self._sequence(fields))
         return self._individuals[name]
 
@@ -134,7 +134,7 @@ def libraries(
     }
 
 
-def told(layout: Layout) -> bytes:
+def identity_stamp(layout: Layout) -> bytes:
     """Return what a library's constants begin with: who made it, and for which layout."""
     return AUTHOR + pack(f"<{len(layout)}I", *layout)
 
@@ -145,7 +145,7 @@ def symbol(identifier: str, name: ir.TypeName) -> str:
 
 
 def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
-    image.constants.put(told(layout))
+    image.constants.put(identity_stamp(layout))
     support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
     for interface in model.own:
         for message in derive.messages(interface):
@@ -275,9 +275,10 @@ def _reached(model: Model) -> list[ir.Message]:
     for interface in model.own:
         for message in derive.messages(interface):
             full = model.describer.description(str(message.name))
-            references = (one["type_name"] for one in full["referenced_type_descriptions"])
-            held.update(dict.fromkeys((str(message.name), *references), 0))
+            referenced = full["referenced_type_descriptions"]
+            names = (individual["type_name"] for individual in referenced)
+            held.update(dict.fromkeys((str(message.name), *names), 0))
     for name in held:
         held[name] = len(model.describer.description(name)["referenced_type_descriptions"])
-    names = sorted(held, key=lambda name: (held[name], name))
-    return [model.messages[ir.TypeName.parse(name)] for name in names]
+    ordered = sorted(held, key=lambda name: (held[name], name))
+    return [model.messages[ir.TypeName.parse(name)] for name in ordered]
