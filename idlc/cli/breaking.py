@@ -9,18 +9,14 @@ from typing import TYPE_CHECKING
 import click
 import msgspec
 
-from idlc.check.run import Checked
 from idlc.cli import options, output, reports
-from idlc.compare import packages
-from idlc.compare.breaking import GIT, BreakingOptions, Verdict, breaking
 from idlc.compare.changes import LEVELS
-from idlc.compare.distribution import is_distro
-from idlc.diagnostics.formats import notice
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.terminal import counted
 from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
+    from idlc.compare.breaking import BreakingOptions, Verdict
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict
 
@@ -44,6 +40,10 @@ class BreakingWishes(msgspec.Struct, frozen=True):
 
 def compare(typed: BreakingWishes) -> int:
     """Compare versions, show what breaks and return the exit status."""
+    from idlc.compare import packages
+    from idlc.compare.breaking import BreakingOptions
+    from idlc.compare.distribution import is_distro
+
     report = Report()
     settings = load_settings(report)
     against = typed.against or packages.against(settings, report)
@@ -76,6 +76,9 @@ def compare(typed: BreakingWishes) -> int:
 
 def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the recordings to compare with, and the paths that are none of them."""
+    from idlc.compare.breaking import GIT
+    from idlc.compare.distribution import is_distro
+
     if against == GRAPH or is_distro(against) or against.startswith(GIT):
         return (), paths
     from idlc.recordings.find import recordings_of
@@ -86,6 +89,8 @@ def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], 
 def _compared(
     wanted: BreakingOptions, recordings: tuple[str, ...], typed: BreakingWishes, report: Report
 ) -> Verdict | GraphVerdict | RecordedVerdict | None:
+    from idlc.compare.breaking import breaking
+
     if recordings:
         from idlc.compare.recording import compare_with_recordings
 
@@ -103,6 +108,9 @@ def _show(
     verdict: Verdict | GraphVerdict | RecordedVerdict | None,
     typed: BreakingWishes,
 ) -> None:
+    from idlc.check.run import Checked
+    from idlc.diagnostics.formats import notice
+
     style = typed.style
     if style == "json":
         output.show(report, style, sys.stdout)
@@ -124,6 +132,8 @@ def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...] = ()
 ) -> str:
     """Return the last line of the text: it says what was not looked at, or not shown."""
+    from idlc.compare.breaking import Verdict
+
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     left_out = verdict.not_compared if isinstance(verdict, Verdict) else ()
     text = f"breaks: {', '.join(parts)}" if parts else "nothing breaks"

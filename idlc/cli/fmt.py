@@ -8,20 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 import click
 
-from idlc.check.compiler import stage
-from idlc.check.format import laid_out
 from idlc.cli import options, output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted
 from idlc.diagnostics.text import one_line, visible
 from idlc.model import ir
-from idlc.project.atomic import rewrite
-from idlc.project.files import read_source
-from idlc.project.find import Exclusions, InterfaceFile, find
-from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
+    from idlc.project.find import Exclusions, InterfaceFile
 
 
 class Formatted(NamedTuple):
@@ -44,6 +39,11 @@ def fmt(
 
     Files with syntax errors are reported and left alone.
     """
+    from idlc.check.compiler import stage
+    from idlc.project.atomic import rewrite
+    from idlc.project.files import read_source
+    from idlc.project.find import find
+
     for file in find(paths, report, exclude):
         source = read_source(file.path, file.shown, report)
         if source is None:
@@ -56,12 +56,16 @@ def fmt(
 
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
+    from idlc.check.format import laid_out
+
     new = laid_out(source, ir.TypeName("package", file.kind, file.name), report)
     return Formatted(file.shown) if new is None else Formatted(file.shown, source.text, new)
 
 
 def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: bool) -> int:
     """Format files, or show what would change, and return the exit status."""
+    from idlc.project.settings import load_settings, scope
+
     report = Report()
     settings = load_settings(report)
     files: list[Formatted] = []

@@ -6,19 +6,20 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from idlc.cli import completion, options, output, reports
-from idlc.diagnostics.formats import DOCUMENTS
+from idlc.cli.output import DOCUMENTS
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import counted, summary
 from idlc.diagnostics.text import one_line
-from idlc.generate.gen import GenOptions, gen
-from idlc.generate.package import Generated
-from idlc.project.find import Stamp, snapshot, stamps
-from idlc.recordings.find import files
+
+if TYPE_CHECKING:
+    from idlc.generate.gen import GenOptions
+    from idlc.generate.package import Generated
+    from idlc.project.find import Stamp
 
 
 def refuse(report: Report, style: str) -> None:
@@ -31,6 +32,8 @@ def refuse(report: Report, style: str) -> None:
 
 def once(wanted: GenOptions, style: str) -> int:
     """Run once, show what happened and return the exit status."""
+    from idlc.generate.gen import gen
+
     report = Report()
     packages = gen(wanted, report)
     if style == "text":
@@ -117,6 +120,9 @@ def _after(wanted: GenOptions) -> dict[str, Stamp]:
 
 
 def _snapshot(wanted: GenOptions) -> dict[str, Stamp]:
+    from idlc.project.find import snapshot, stamps
+    from idlc.recordings.find import files
+
     return snapshot(wanted.paths, wanted.scope.include) | stamps(files(wanted.paths))
 
 
@@ -178,7 +184,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     package with a setup.py, PATH and OUT default to the package and the folder that setup.py takes
     it from.
     """
-    from idlc.generate.gen import in_package, with_settings
+    from idlc.generate.gen import GenOptions, in_package, with_settings
     from idlc.project.settings import load_settings, scope
 
     report = Report()

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from idlc.cli import completion
-from idlc.diagnostics.formats import DOCUMENTS
+from idlc.cli.output import DOCUMENTS
 
 FORMATS = ("text", "json")
 REPORT_FORMATS = (*FORMATS, *DOCUMENTS)

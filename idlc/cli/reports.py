@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TextIO
 
 from idlc.cli import output
-from idlc.diagnostics.formats import DOCUMENTS, Run
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.terminal import MANY, counted, statistics, summary
 from idlc.version import __version__
@@ -49,4 +48,6 @@ def write(
             facts |= {"distros": list(checked.distros)} if checked.distros else {}
             output.fact(stream, "summary", **output.counts(report), **facts)
         case _:
+            from idlc.diagnostics.formats import DOCUMENTS, Run
+
             stream.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))

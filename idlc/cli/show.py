@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
 from idlc.cli import completion, options, output
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import display_width, one_line
-from idlc.project.settings import Scope
-from idlc.recordings.show import TopicFacts, definitions, topics
+
+if TYPE_CHECKING:
+    from idlc.project.settings import Scope
+    from idlc.recordings.show import TopicFacts
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
@@ -22,6 +25,8 @@ def show_recording(
     path: str, wanted: Sequence[str], style: str, scope: Scope, report: Report
 ) -> int:
     """Show the topics of a recording, or the definitions of wanted ones; return the exit status."""
+    from idlc.recordings.show import definitions, topics
+
     if wanted:
         output.texts(definitions(path, wanted, style, scope, report), style, sys.stdout)
     elif style not in ("text", "json"):

@@ -19,7 +19,7 @@ from idlc.editor.protocol.capabilities import DEFAULT_ENCODING
 from idlc.editor.protocol.parts import Location, Position, Range
 from idlc.editor.workspace import State, Wishes
 from idlc.model import ir
-from idlc.project import templates
+from idlc.project.cache import cache_folder
 
 FOLDER = "interfaces"
 
@@ -31,7 +31,7 @@ def inside(source: Source) -> str:
 
 def file_of(source: Source) -> Path | None:
     """Return a file of this user's cache that holds a text of the catalogue; `None` if none can."""
-    base = templates.folder()
+    base = cache_folder()
     if base is None:
         return None
     path = base / FOLDER / inside(source)

@@ -13,7 +13,7 @@ from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedInput
 
 from idlc.diagnostics.source import Source, Span
-from idlc.language.grammar import piece
+from idlc.language.lalr import piece
 from idlc.language.tree import Piece
 
 

@@ -80,9 +80,9 @@ SHARED_LENGTH = 1000
 
 
 def _lalr() -> ModuleType:
-    from idlc.language import grammar
+    from idlc.language import lalr
 
-    return grammar
+    return lalr
 
 
 def parse(source: Source) -> tree.File:

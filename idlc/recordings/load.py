@@ -7,7 +7,7 @@ import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from importlib import import_module, invalidate_caches
+from importlib import import_module
 from pathlib import Path
 from shutil import rmtree
 from types import ModuleType
@@ -19,11 +19,11 @@ from idlc.generate.requested import requested_packages
 from idlc.generate.target import last_change
 from idlc.model import ir
 from idlc.model.python_names import class_
+from idlc.project.cache import cache_folder
 from idlc.project.find import is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.templates import RenderedFile
-from idlc.project.templates import folder as caches
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
@@ -43,7 +43,7 @@ def folder() -> Path:
     Where nothing can be kept, it is a folder that lives as long as this process.
     """
     chosen = os.environ.get("IDLC_CACHE")
-    base = Path(chosen) if chosen else caches()
+    base = Path(chosen) if chosen else cache_folder()
     try:
         if base is not None:
             place = base / "loaded"

@@ -13,8 +13,8 @@ import pytest
 
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
+from idlc.cli.output import DOCUMENTS
 from idlc.diagnostics import codes
-from idlc.diagnostics.formats import DOCUMENTS
 from idlc.version import __version__
 from tests.support import recordings
 from tests.support.files import write

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from idlc.language import grammar, parse
-from idlc.language.grammar import LINE_ENDS, terminals
-from idlc.language.grammar import grammar as grammar_grammar
+from idlc.language import lalr, parse
+from idlc.language.grammar import LINE_ENDS, grammar, terminals
 from tests.support.paths import VERDICTS
 
 TEXTS = [
@@ -29,11 +28,11 @@ def whole(text):
 def assert_same(text):
     text = whole(text)
     found = parse.quick_lines(text)
-    assert found in (None, grammar.lalr_lines(text))
+    assert found in (None, lalr.lines(text))
     for line in text.splitlines():
         code = line.partition("#")[0].replace("\t", " ").rstrip()
         if code:
-            assert parse.quick_definition(code) in (None, grammar.parse_definition_text(code)), code
+            assert parse.quick_definition(code) in (None, lalr.definition(code)), code
 
 
 def test_every_recorded_case_is_read_as_lark_reads_it():
@@ -61,11 +60,9 @@ def test_nearly_all_lines_are_ordinary():
 
 
 def test_terminals_are_those_that_lark_reads():
-    read = {one.name: one.pattern.to_regexp() for one in grammar._lark().terminals}
+    read = {one.name: one.pattern.to_regexp() for one in lalr._lark().terminals}
     # lark spells control characters out
-    plain = {
-        name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar_grammar())
-    }
+    plain = {name for name in read if re.search(rf"(?m)^{name}(\.\d)?: /[^\n]*$", grammar())}
     plain -= {"CODE", "COMMENT", "NEWLINE", "SEPARATOR"}
     assert len(plain) > 10
     assert {name: terminals()[name] for name in plain} == {name: read[name] for name in plain}

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from idlc.project import templates
+from idlc.project.cache import cache_folder
 
 WITH_CACHE = {"PYTHONDONTWRITEBYTECODE": ""}
 
@@ -51,21 +51,21 @@ def test_a_damaged_file_is_made_again(tmp_path, rest):
 def test_no_cache_where_others_can_write(tmp_path, monkeypatch):
     (tmp_path / "idlc").mkdir(mode=0o700)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert templates.folder.__wrapped__() == tmp_path / "idlc"
+    assert cache_folder.__wrapped__() == tmp_path / "idlc"
     (tmp_path / "idlc").chmod(0o777)
-    assert templates.folder.__wrapped__() is None
+    assert cache_folder.__wrapped__() is None
 
 
 def test_no_cache_in_a_home_of_somebody_else(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home/.cache"))
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
-    assert templates.folder.__wrapped__() is None
+    assert cache_folder.__wrapped__() is None
     assert not (tmp_path / "home").exists()
 
 
 def test_the_folder_is_private(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    assert stat.S_IMODE(templates.folder.__wrapped__().stat().st_mode) == 0o700
+    assert stat.S_IMODE(cache_folder.__wrapped__().stat().st_mode) == 0o700
 
 
 def test_without_a_place_for_a_cache_all_works(tmp_path):
