@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import datetime
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
-import msgspec
 
-from idlc.cli import options, output, reports
-from idlc.compare.changes import LEVELS
-from idlc.diagnostics.report import Report, first_few
-from idlc.diagnostics.terminal import counted
-from idlc.project.settings import load_settings, scope
+from idlc.cli import options
 
 if TYPE_CHECKING:
     from idlc.compare.breaking import BreakingOptions, Verdict
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict
+    from idlc.diagnostics.report import Report
 
 GRAPH = "graph"
 PATIENCE = 5.0
 
 
-class BreakingWishes(msgspec.Struct, frozen=True):
+class BreakingWishes(NamedTuple):
     """What was typed."""
 
     paths: tuple[str, ...]
@@ -40,9 +36,13 @@ class BreakingWishes(msgspec.Struct, frozen=True):
 
 def compare(typed: BreakingWishes) -> int:
     """Compare versions, show what breaks and return the exit status."""
+    from idlc.cli import output
     from idlc.compare import packages
     from idlc.compare.breaking import BreakingOptions
+    from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
+    from idlc.diagnostics.report import Report
+    from idlc.project.settings import load_settings, scope
 
     report = Report()
     settings = load_settings(report)
@@ -109,6 +109,7 @@ def _show(
     typed: BreakingWishes,
 ) -> None:
     from idlc.check.run import Checked
+    from idlc.cli import output, reports
     from idlc.diagnostics.formats import notice
 
     style = typed.style
@@ -133,6 +134,7 @@ def _summary(
 ) -> str:
     """Return the last line of the text: it says what was not looked at, or not shown."""
     from idlc.compare.breaking import Verdict
+    from idlc.diagnostics.terminal import counted
 
     parts = [f"{number} {level}" for level, number in verdict.levels.items() if number]
     left_out = verdict.not_compared if isinstance(verdict, Verdict) else ()
@@ -150,6 +152,8 @@ def _summary(
 
 def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
     """Return what was looked at, and what of it was not told."""
+    from idlc.diagnostics.terminal import counted
+
     seen = [counted(number, noun) for noun, number in verdict.seen.items()]
     text = f"; looked at {', '.join(seen)}"
     facts = verdict._asdict()
@@ -162,6 +166,8 @@ def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
 
 def _next(verdict: Verdict) -> str:
     """Return what was added, and which version comes next."""
+    from idlc.diagnostics.report import first_few
+
     text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
     if verdict.part is None:
         facts = (verdict.allowed, verdict.added, verdict.not_compared, verdict.hidden)

@@ -8,13 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 import click
 
-from idlc.cli import options, output
-from idlc.diagnostics.report import Report
-from idlc.diagnostics.terminal import counted
-from idlc.diagnostics.text import one_line, visible
-from idlc.model import ir
+from idlc.cli import options
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
     from idlc.diagnostics.source import Source
     from idlc.project.find import Exclusions, InterfaceFile
 
@@ -57,6 +54,7 @@ def fmt(
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
     from idlc.check.format import laid_out
+    from idlc.model import ir
 
     new = laid_out(source, ir.TypeName("package", file.kind, file.name), report)
     return Formatted(file.shown) if new is None else Formatted(file.shown, source.text, new)
@@ -64,6 +62,9 @@ def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
 
 def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: bool) -> int:
     """Format files, or show what would change, and return the exit status."""
+    from idlc.cli import output
+    from idlc.diagnostics.report import Report
+    from idlc.diagnostics.text import one_line
     from idlc.project.settings import load_settings, scope
 
     report = Report()
@@ -85,6 +86,8 @@ def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: 
 
 
 def _summary(files: Sequence[Formatted], done: str) -> str:
+    from idlc.diagnostics.terminal import counted
+
     changed = sum(file.changed for file in files)
     broken = sum(file.old is None for file in files)
     numbers = {
@@ -98,6 +101,9 @@ def _summary(files: Sequence[Formatted], done: str) -> str:
 def _diff(file: Formatted, stream: TextIO) -> Iterator[str]:
     """Yield a unified diff: for a program as it is, for a terminal without what would harm it."""
     from difflib import unified_diff
+
+    from idlc.cli import output
+    from idlc.diagnostics.text import one_line, visible
 
     old = (file.old or "").splitlines(keepends=True)
     new = (file.new or "").splitlines(keepends=True)

@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from idlc.cli import completion, options, output, reports
-from idlc.cli.output import DOCUMENTS
-from idlc.diagnostics.report import Report
-from idlc.diagnostics.terminal import counted, summary
-from idlc.diagnostics.text import one_line
+from idlc.cli import completion, options
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions
     from idlc.generate.package import Generated
     from idlc.project.find import Stamp
@@ -24,6 +21,8 @@ if TYPE_CHECKING:
 
 def refuse(report: Report, style: str) -> None:
     """Show problems that leave nothing to be done."""
+    from idlc.cli import output
+
     if style == "text":
         output.show(report, style, sys.stderr)
     else:
@@ -32,6 +31,8 @@ def refuse(report: Report, style: str) -> None:
 
 def once(wanted: GenOptions, style: str) -> int:
     """Run once, show what happened and return the exit status."""
+    from idlc.cli import output
+    from idlc.diagnostics.report import Report
     from idlc.generate.gen import gen
 
     report = Report()
@@ -47,6 +48,8 @@ def _document(
     report: Report, style: str, packages: Sequence[Generated] = (), *, check: bool = False
 ) -> None:
     """Write what happened in a format for programs."""
+    from idlc.cli import output, reports
+
     if style != "json":
         from idlc.check.run import Checked  # with its rules, which a run does without
 
@@ -60,6 +63,9 @@ def _document(
 
 
 def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
+    from idlc.cli import output
+    from idlc.diagnostics.terminal import summary
+
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     if report.had_errors:
@@ -72,6 +78,9 @@ def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
 
 def _line(package: Generated, check: bool) -> str:
     """Return the line about a package: what it is, and what was done if only a part was written."""
+    from idlc.diagnostics.terminal import counted
+    from idlc.diagnostics.text import one_line
+
     done = []
     if check:
         done.append("up to date")
@@ -93,6 +102,8 @@ INTERVAL = 0.25
 
 def run_again(wanted: GenOptions, style: str) -> int:
     """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
+    from idlc.diagnostics.text import one_line
+
     try:
         seen = _snapshot(wanted)
         once(wanted, style)
@@ -184,6 +195,8 @@ def command(style: str, watch: bool, **given: Any) -> int:
     package with a setup.py, PATH and OUT default to the package and the folder that setup.py takes
     it from.
     """
+    from idlc.cli import output
+    from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
     from idlc.project.settings import load_settings, scope
 
@@ -205,7 +218,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
         )
-    if watch and style in DOCUMENTS:
+    if watch and style in options.DOCUMENTS:
         raise click.UsageError("--watch goes with --format text and json only")
     if watch:
         return run_again(wanted, style)

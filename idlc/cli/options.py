@@ -9,9 +9,10 @@ import click
 from click.core import ParameterSource
 
 from idlc.cli import completion
-from idlc.cli.output import DOCUMENTS
 
 FORMATS = ("text", "json")
+#: The formats of reports that CI systems read.
+DOCUMENTS = ("github", "sarif", "junit", "gitlab")
 REPORT_FORMATS = (*FORMATS, *DOCUMENTS)
 
 Command = TypeVar("Command", bound=Callable[..., Any])

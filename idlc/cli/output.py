@@ -14,8 +14,6 @@ from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import one_line, visible
 
-#: The formats of reports that CI systems read.
-DOCUMENTS = ("github", "sarif", "junit", "gitlab")
 #: The text in our console scripts.
 _OURS = b"idlc.cli.main"
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from idlc.cli import completion, options, output
-from idlc.diagnostics.report import Report
-from idlc.diagnostics.text import display_width, one_line
+from idlc.cli import completion, options
 
 if TYPE_CHECKING:
+    from idlc.diagnostics.report import Report
     from idlc.project.settings import Scope
     from idlc.recordings.show import TopicFacts
 
@@ -25,6 +24,7 @@ def show_recording(
     path: str, wanted: Sequence[str], style: str, scope: Scope, report: Report
 ) -> int:
     """Show the topics of a recording, or the definitions of wanted ones; return the exit status."""
+    from idlc.cli import output
     from idlc.recordings.show import definitions, topics
 
     if wanted:
@@ -44,12 +44,16 @@ def show_recording(
 
 
 def _table(found: Sequence[TopicFacts]) -> list[str]:
+    from idlc.diagnostics.text import display_width
+
     rows = [HEAD, *map(_row, found)] if found else []
     widths = [max(map(display_width, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(_padded, row, widths, range(len(row)))).rstrip() + "\n" for row in rows]
 
 
 def _row(one: TopicFacts) -> tuple[str, ...]:
+    from idlc.diagnostics.text import one_line
+
     count = "?" if one.messages is None else str(one.messages)
     hash_ = one_line(one.hash or "-")
     here = one.here if one.definition else f"{one.here}; no definition in the recording"
@@ -60,6 +64,8 @@ def _row(one: TopicFacts) -> tuple[str, ...]:
 
 
 def _padded(text: str, width: int, column: int) -> str:
+    from idlc.diagnostics.text import display_width
+
     space = " " * (width - display_width(text))
     return space + text if HEAD[column] == "messages" else text + space
 
@@ -107,6 +113,8 @@ def command(
     types, counts and type hashes are shown, and whether the types known here are the same; or, with
     TOPIC, the definitions of their types.
     """
+    from idlc.cli import output
+    from idlc.diagnostics.report import Report
     from idlc.documents.show import show
     from idlc.project.settings import load_settings, scope
     from idlc.recordings.find import is_recording

@@ -13,7 +13,7 @@ import pytest
 
 from idlc.cli.app import COMMANDS
 from idlc.cli.main import main
-from idlc.cli.output import DOCUMENTS
+from idlc.cli.options import DOCUMENTS
 from idlc.diagnostics import codes
 from idlc.version import __version__
 from tests.support import recordings
