@@ -16,7 +16,7 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.files import absolute, shown
 from idlc.project.find import look, nothing_in
-from idlc.recordings.types import NAMED, Around, recorded_types
+from idlc.recordings.types import NAMED, LocalTypes, recorded_types
 from idlc.recordings.versions import topics_of, versions
 
 
@@ -75,7 +75,7 @@ class _Here:
     def __init__(
         self, given: Sequence[inputs.Inputs], options: BreakingOptions, report: Report
     ) -> None:
-        self.around = Around(options.scope, report)
+        self.around = LocalTypes(options.scope, report)
         self._given = {one.package: one for one in given}
         self._models = sound_ones(given, options.scope, report)
         self._unknown: set[ir.TypeName] = set()
