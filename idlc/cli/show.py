@@ -56,7 +56,7 @@ def _row(one: TopicFacts) -> tuple[str, ...]:
 
     count = "?" if one.messages is None else str(one.messages)
     hash_ = one_line(one.hash or "-")
-    here = one.comparison if one.definition else f"{one.comparison}; no definition in the recording"
+    here = one.here if one.definition else f"{one.here}; no definition in the recording"
     name = one_line(one.name)
     # lines that begin with other characters may be commands to a CI system
     name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
