@@ -17,8 +17,8 @@ from idlc.recordings.versions import read, topics_of, versions
 class TopicFacts(NamedTuple):
     """One line of the table.
 
-    `hash` is the recorded one, or that of the recorded definition. `here` compares it with the local
-    type of the same name: same, differs or unknown. `definition` is the encoding of the
+    `hash` is the recorded one, or that of the recorded definition. `here` compares it with the
+    local type of the same name: same, differs or unknown. `definition` is the encoding of the
     recorded one.
     """
 
