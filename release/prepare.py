@@ -112,7 +112,7 @@ def version_is(project: Project, version: str, day: str) -> None:
     edits = _Edits(project, {})
     for path, pattern, new, missing in (
         ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", f"## {version} ({day})", _NO_CHANGES),
-        ("idlc/__init__.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
+        ("idlc/version.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
         ("CITATION.cff", "version: .*", f"version: {version}", _NO_VERSION),
     ):
         edits.substitute(path, f"(?m)^{pattern}$", new, missing.format(path=path, version=version))

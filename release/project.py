@@ -37,7 +37,7 @@ class Project(NamedTuple):
     @property
     def version(self) -> str:
         """The version, which stands in the package itself."""
-        found: list[str] = re.findall(r'(?m)^__version__ = "(.*)"$', self.text("idlc/__init__.py"))
+        found: list[str] = re.findall(r'(?m)^__version__ = "(.*)"$', self.text("idlc/version.py"))
         return found[0]
 
     @property

@@ -124,7 +124,7 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     [
         ("CHANGELOG.md", None, "0.10.1", "2031-01-02", "add `## 0.10.1 (not released yet)`"),
         ("CITATION.cff", "version: ", HERE.version, "2031-01-02", "CITATION.cff names no version"),
-        ("idlc/__init__.py", "__version__", HERE.version, "2031-01-02", "names no version"),
+        ("idlc/version.py", "__version__", HERE.version, "2031-01-02", "names no version"),
         ("CHANGELOG.md", None, "1.0", "2031-01-02", "not like 1.2.3"),
         ("CHANGELOG.md", None, HERE.version, "tomorrow", "not like 2026-12-31"),
     ],
