@@ -61,7 +61,7 @@ def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None)
     return output.status(report) or int(arguments.strict and bool(len(report)))
 
 
-def run() -> int:
+def serve_editor() -> int:
     """Serve the client at the other end of standard input and output; return the exit status."""
     from idlc.editor.server import serve
 

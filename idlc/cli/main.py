@@ -38,10 +38,10 @@ def _run(words: list[str]) -> int:
 
         return ended(lambda: check_paths(tuple(words[1:])))
     if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
-        from idlc.cli.direct import run as serve
+        from idlc.cli.direct import serve_editor
         from idlc.cli.exit_status import ended
 
-        return ended(serve)
+        return ended(serve_editor)
     from idlc.cli.app import run
 
     return run(words)

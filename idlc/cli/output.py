@@ -45,7 +45,7 @@ def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
         return
     size = 0
 
-    def tell(what: str, done: int, total: int) -> None:
+    def update(what: str, done: int, total: int) -> None:
         nonlocal size
         full = WIDTH * min(done, total) // max(total, 1)
         line = f"{'█' * full}{'░' * (WIDTH - full)} {done:,} of {total:,}  {one_line(what)[:40]}"
@@ -54,7 +54,7 @@ def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
         size = len(line)
 
     try:
-        yield tell
+        yield update
     finally:
         stream.write(f"\r{' ' * size}\r")
 

@@ -1,4 +1,4 @@
-"""The pipeline of `idlc gen`: compile, render, compare with what is on disk, write."""
+"""The pipeline of `idlc gen`: compile, render, compare with the files on disk, write."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ if TYPE_CHECKING:
 
 
 class GenOptions(NamedTuple):
-    """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both.
+    """The arguments of `idlc gen`, which writes to `out`, into the prefix `ament`, or both.
 
-    `topics` are those of recordings whose types are wanted; none means all. `again` is the command
-    that writes what `check` compares, for hints.
+    Types of `topics` of recordings are written; none means all. `again` is the command for hints
+    that writes the files which `check` compares.
     """
 
     paths: tuple[str, ...]
@@ -54,7 +54,7 @@ class GenOptions(NamedTuple):
 
 
 def with_settings(options: GenOptions, settings: Config) -> GenOptions:
-    """Return what was typed, with what pyproject.toml says where nothing was."""
+    """Return options, with defaults from pyproject.toml."""
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
@@ -63,7 +63,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
 
 
 def in_package(options: GenOptions) -> GenOptions:
-    """Return options with what the package around implies where nothing was said.
+    """Return options with defaults from the package of the working folder.
 
     A package that setup.py builds is compiled into the folder from which setup.py installs it.
     """
@@ -85,7 +85,7 @@ def in_package(options: GenOptions) -> GenOptions:
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
     runs = [options._replace(ament="")] if options.out else []
-    runs += [options] if options.ament else []  # OUT may give the package its name
+    runs += [options] if options.ament else []  # the package may be named by OUT
     done: list[Generated] = []
     for run in runs:
         done += () if report.had_errors else _run_once(run, report)
@@ -163,9 +163,9 @@ def is_name(word: str) -> bool:
 def named_packages(
     words: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> list[inputs.Inputs]:
-    """Return the packages that names mean, with those of their interfaces that are meant.
+    """Return the packages that names resolve to, with the interfaces that they resolve to.
 
-    They are `whole` in a prefix, where they hide those of the same name in others.
+    Packages are `whole` in a prefix, where they hide packages of the same name in others.
     """
     chosen: dict[str, set[ir.TypeName]] = {}
     libraries: dict[str, Library] = {}
@@ -215,7 +215,7 @@ def _compile_and_write(
 
 
 def _may_be_refused(packages: Iterable[inputs.Inputs], distro: Distro) -> bool:
-    """Return whether files that one distribution accepted may be an error for this one."""
+    """Return whether files that another distribution accepts may have errors for this one."""
     if distro.reads_optional:
         return False
     return any(OPTIONAL.encode() in file.data for package in packages for file in package.files)
@@ -228,13 +228,13 @@ class Run(NamedTuple):
     options: GenOptions
 
     def lock(self, package: str) -> lock.Lock | None:
-        """Return what the last run recorded of a package; `None` if there was none."""
+        """Return the lock of a package from the last run; `None` if there was none."""
         out = self.folder / self.options.out
         locks = (load_lock(folder, "", Report()) for folder in (out / package, out))
         return next((lock for lock in locks if lock and lock.package == package), None)
 
     def is_needed(self, package: str, inputs: Mapping[str, str], key: str) -> bool:
-        """Return whether a package was made of other texts than these, or by another idlc.
+        """Return whether a package was generated from other texts, or by another idlc.
 
         `inputs` are the digests of all files of the package, `key` is one that it must have.
         """
@@ -244,7 +244,7 @@ class Run(NamedTuple):
         return any(inputs.get(name) != digest for name, digest in lock.inputs.items())
 
     def make(self, report: Report) -> tuple[Generated, ...]:
-        """Write, and return what was done; empty after an error. Raises OSError."""
+        """Write, and return the packages; empty after an error. Raises OSError."""
         with working_in(self.folder):
             return gen(self.options, report)
 
@@ -252,8 +252,8 @@ class Run(NamedTuple):
 def run_for(path: Path, package: str) -> Run | None:
     """Return the run that compiles a file of a package.
 
-    It is that of the nearest settings which say what is written where, or the one that made a
-    generated package in the source package, or beside its interfaces.
+    The nearest settings with paths and an output decide, or else the lock of a generated package
+    in the source package, or beside its interfaces.
     """
     for folder in path.parents:
         if is_file(folder / settings.SETTINGS_FILE) and (run := _by_settings(folder, path)):

@@ -10,14 +10,14 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
 from idlc.model.ir import spell
 
-#: What would end a text or begin a comment is written as an escape (language 1.5).
+#: Characters that would end a text or begin a comment are written as escapes (language 1.5).
 _SPECIAL = re.compile(r"[\x00-\x1f\x7f-\x9f\"'#\\]")
 #: In arrays escapes are interpreted once, and other characters break ROS 2's tools (language 4).
 _SPECIAL_IN_ARRAYS = re.compile(r"[^\x20-\x7e]|[\"'#\\]")
 
 
 def file_text(interface: ir.Interface) -> str:
-    """Return the text that defines an interface, as it was written if it was."""
+    """Return the text that defines an interface: its file's, or one generated from IDL."""
     source = interface.source
     if source is None:
         return ""

@@ -1,4 +1,4 @@
-"""One package of `idlc gen`: rendered, compared with what is on disk, ready to be written."""
+"""One package of `idlc gen`: rendered, compared with the files on disk, ready to be written."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _key(name: ir.TypeName) -> str:
 
 
 def as_inputs(names: Iterable[ir.TypeName], library: Library) -> dict[str, str]:
-    """Return the digests of a library's interfaces as those of input files are recorded."""
+    """Return the digests of a library's interfaces, keyed like input files in a lock."""
     digests = dependencies(names, library)
     return {_key(name): digests[str(name)] for name in names}
 
@@ -51,9 +51,9 @@ def package_of(
     check: bool,
     vendored: Sequence[str] | None = None,
 ) -> Package | None:
-    """Return a sound model rendered and compared with what is on disk.
+    """Return a sound model rendered and compared with the files on disk.
 
-    `vendored` are the packages that are written because of it, where that was asked for.
+    `vendored` are the packages that are written because of it, with --vendor-deps.
     """
     from idlc.generate.python.render import render_package
     from idlc.project import templates
@@ -96,7 +96,7 @@ def package_of(
 def _with_surroundings(
     model: Model, modules: Mapping[str, str], target: Target
 ) -> dict[str, str | bytes]:
-    """Return the files to write: modules, and in a prefix all that ROS 2 looks for there."""
+    """Return the files to write: modules, and in a prefix the files that ROS 2 reads there."""
     if not target.modules:  # a package folder
         return {**modules}
     from idlc.generate.prefix import overlaid
@@ -105,10 +105,10 @@ def _with_surroundings(
 
 
 def _check_syntax(plan: Plan, target: Target) -> None:
-    """Fail on rendered code that Python cannot read, which would be idlc's own fault.
+    """Fail on rendered code that Python cannot parse, which would be a bug of idlc.
 
-    Only text from an interface file can have that effect, and text that could has a backslash in
-    front of it; modules without one are like those that the tests read.
+    Only text from an interface file can cause that, and such text is escaped by a backslash;
+    modules without one are like those that the tests parse.
     """
     for change in plan.changes:
         rendered = change.path.endswith(".py") and "/_idlc/" not in f"/{change.path}"
@@ -132,7 +132,7 @@ def planned(
     check: bool,
     vendor_deps: bool,
 ) -> list[Package]:
-    """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
+    """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     vendor = _Vendor({model.package for model in models}, compiler, check=check)
     packages: list[Package | None] = []
     for model, (target, package) in zip(models, requested.items(), strict=True):
@@ -156,7 +156,7 @@ class _Vendor:
         self.packages: dict[str, Package | None] = {}
 
     def add(self, model: Model, target: Target) -> list[str]:
-        """Add what a model depends on, and return the names."""
+        """Add the packages that a model depends on, and return their names."""
         names: set[str] = set()
         waiting = _needed(model) - self._own
         while waiting:
@@ -187,10 +187,10 @@ def _needed(model: Model) -> set[str]:
 
 
 class Generated(NamedTuple):
-    """What a run of `idlc gen` did to one package.
+    """The outcome of `idlc gen` for one package.
 
-    `files` counts all that it consists of; `needs` are packages that it imports
-    and that are not here.
+    `files` is the number of all its files; `needs` are packages that it imports
+    and that are not installed.
     """
 
     package: str
@@ -203,7 +203,7 @@ class Generated(NamedTuple):
 
 
 def generated(package: Package) -> Generated:
-    """Return what is done to a package that is ready to be written."""
+    """Return the outcome for a package that is ready to be written."""
     removed = sum(change.new is None for change in package.plan.changes)
     written = len(package.plan.changes) - removed
     target = package.target
@@ -214,7 +214,7 @@ def generated(package: Package) -> Generated:
 def up_to_date(
     target: Target, digests: dict[str, str], library: Library, vendor_deps: bool
 ) -> tuple[Generated, ...]:
-    """Return what there is if a run would change nothing; empty otherwise."""
+    """Return the packages if a run would change nothing; empty otherwise."""
     if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
         return ()
     folders = [target]
@@ -235,7 +235,7 @@ def with_needs(
 ) -> tuple[Generated, ...]:
     """Report IDL617 for generated packages that need others that cannot be imported here.
 
-    Where they are not imported anyway, that is only noted in what is returned.
+    Where nodes do not run, these are only in `needs` of the result.
     """
     quiet: dict[str, tuple[str, ...]] = {}
     for target in targets:

@@ -1,4 +1,4 @@
-"""A prefix that ROS 2 and its tools look into, with several packages and files of others in it."""
+"""A prefix that ROS 2 and its tools read, with several packages and files of others in it."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 class Libraries(NamedTuple):
     """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
 
-    `missing` says why there are none although the package has interfaces. Such a package must not
-    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel of the
-    package has in its name, so that wheels for different distributions have different names.
+    `missing` says why a package with interfaces has none. Such a package must not be registered in
+    the index of ROS 2: recorders stop at it. `build_tag` is part of the name of the package's
+    wheel, so that wheels for different distributions have different names.
     """
 
     files: Mapping[str, bytes]
@@ -43,9 +43,9 @@ class Libraries(NamedTuple):
 
 
 def libraries_of(model: Model, distro: Distribution | None = None) -> Libraries:
-    """Return the libraries of a model without errors, by default for what is installed here.
+    """Return the libraries of a model without errors, by default for the installed distribution.
 
-    Who writes them moves them into place: programs may have the old ones open.
+    Write them elsewhere and move them into place: programs may have the old ones open.
     """
     from idlc.generate.native.library import libraries
 
@@ -67,7 +67,7 @@ def build_tag(model: Model, *libraries: str) -> str:
 
 
 def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
-    """Return for which processor and layout libraries are made here, or why none can be."""
+    """Return the processor and layout of libraries on this machine, or why there are none."""
     from idlc.generate.native.layouts import LAYOUTS
     from idlc.generate.native.library import MACHINES
 
@@ -89,9 +89,9 @@ def shared(
 ) -> dict[str, bytes]:
     """Return libraries, package.xml, interfaces and entries in the index, in the order to write.
 
-    What leads to others comes after these. Without libraries the package is registered neither as
-    a package nor as one with interfaces: recorders stop at the one, `ros2 interface list` at the
-    other alone.
+    Files come after those that they refer to. Without libraries the package is registered neither
+    as a package nor as one with interfaces: recorders stop at the first, `ros2 interface list` at
+    the second without the first.
     """
     name = model.package
     files: dict[str, str | bytes] = {**libraries.files}
@@ -125,12 +125,12 @@ def dependencies(model: Model) -> list[str]:
     return sorted({name.package for name in model.interfaces} - {model.package})
 
 
-#: How the files begin by which shells learn of a prefix, and which all packages in it share.
+#: The first bytes of the setup files for shells, which all packages in a prefix share.
 MARK = b"# Written by idlc"
 
 
 class Overlay(Target):
-    """A package in a prefix. What idlc wrote of it is recorded in its share folder."""
+    """A package in a prefix. Its lock is in its share folder."""
 
     def __init__(
         self,
@@ -152,12 +152,12 @@ class Overlay(Target):
 
     @property
     def place(self) -> str:
-        """The prefix's path, which shells need where they do not know what they read."""
+        """The prefix's path, for shells that do not know the path of the file they source."""
         return self._path.as_posix()
 
     @property
     def distribution(self) -> Distribution:
-        """The distribution that libraries are for: the installed one, unless others are wanted."""
+        """The distribution that libraries are for: the installed one, unless others are chosen."""
         installed = distribution((self._path, *prefixes.ament_prefixes()))
         if not self._distros or installed.name in self._distros:
             return installed
@@ -182,9 +182,9 @@ class Overlay(Target):
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Return whether nothing is to be done: not to be told from interfaces alone.
+        """Return `False`: interfaces alone do not show whether a run would change nothing.
 
-        Libraries depend on what else is installed, too.
+        Libraries depend on the installed distribution, too.
         """
         del inputs, library, vendor_deps
         return False
@@ -197,7 +197,7 @@ class Overlay(Target):
         return "it is for another distribution of ROS 2"
 
     def share(self, files: Mapping[str, str]) -> bool:
-        """Write the files for shells, but not over those of others, which are noted."""
+        """Write the files for shells; foreign files stay, with a note."""
         tree, changes = Tree(self._path), []
         for path, text in files.items():
             old, new = tree.read(path), text.encode("utf-8")
@@ -217,7 +217,7 @@ _SHELLS = ("sh", "bash", "zsh")
 def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[str, str | bytes]:
     """Return the files of a package by their paths in the prefix.
 
-    They are in the order in which to write them: what leads to others comes after these.
+    They are in the order in which to write them: files come after those that they refer to.
     """
     assert isinstance(overlay, Overlay)
     manifest = overlay.manifest or _rendered(
@@ -229,7 +229,7 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
 
 
 def write_setup_scripts(overlay: Target) -> bool:
-    """Write the files by which a shell learns of the prefix; return whether that went well."""
+    """Write the setup files for shells; return whether that succeeded."""
     assert isinstance(overlay, Overlay)
     files = {
         f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))

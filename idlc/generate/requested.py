@@ -1,4 +1,4 @@
-"""Which packages a run of `idlc gen` writes, and into which folders."""
+"""The packages that a run of `idlc gen` writes, and their folders."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def requested_packages(
     scope: Scope,
     report: Report,
 ) -> tuple[inputs.Inputs, ...]:
-    """Return the packages that paths mean, and those that were named; empty after a problem.
+    """Return the packages at paths, and the named ones; empty after a problem.
 
     Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
     """
@@ -47,7 +47,7 @@ def requested_packages(
 def _from_files(
     files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
-    """Return files by package: as one that is called like `out` if nothing says otherwise."""
+    """Return files by package: as one, by default with the name of the folder `out`."""
     homes = by_home(files)
     apart = [] if scope.package else several(homes)
     if _mixed(apart, report):
@@ -96,7 +96,7 @@ def _note_name(name: str, home: Path, out: str, report: Report) -> None:
 
 
 def _mixed(homes: Sequence[Path], report: Report) -> bool:
-    """Report folders of interfaces within each other that no package.xml tells apart."""
+    """Report nested folders of interfaces without a package.xml."""
     loose = [home for home in homes if not manifest(home)]
     if not any(set(home.parents) & set(homes) for home in loose):
         return False
@@ -126,9 +126,9 @@ def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
 def completed(
     packages: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
 ) -> list[inputs.Inputs]:
-    """Return packages with the interfaces that others need of those given in part; empty for none.
+    """Return packages with the needed interfaces that partial packages lack; empty for none.
 
-    What is written beside the others is what they import.
+    Packages import the ones that are written beside them.
     """
     extended = []
     for package in packages:
@@ -140,7 +140,7 @@ def completed(
 
 
 def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
-    """Return the .idl files of a package that no .msg, .srv or .action file is beside, sorted."""
+    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
     unread = []
     for folder in folders:
         for kind in KINDS:
@@ -168,7 +168,7 @@ def folder_targets(
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
-    Reports IDL608 where a package of an earlier run is in the way, IDL612 for what is no folder.
+    Reports IDL608 where a package of an earlier run is in the way, IDL612 for other files.
     """
     top = absolute(out)
     if len(packages) == 1:

@@ -26,7 +26,7 @@ def storable(schema: pa.Schema) -> pa.Schema:
 
     They get the field that ROS 2 adds for C++, for the same reason.
     """
-    return _with_types(schema, lambda kind: _each(kind, _filled_type))
+    return _with_types(schema, lambda kind: _converted(kind, _filled_type))
 
 
 def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
@@ -47,17 +47,17 @@ def _with_types(schema: pa.Schema, convert: Any) -> pa.Schema:
     return pa.schema(fields, schema.metadata)
 
 
-def _each(kind: pa.DataType, convert: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
+def _converted(kind: pa.DataType, convert: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
     """Return a type with each type in it converted, inner ones first, and then itself."""
     import pyarrow as pa
     from pyarrow import types
 
     if types.is_struct(kind):
-        kind = pa.struct([field.with_type(_each(field.type, convert)) for field in kind])
+        kind = pa.struct([field.with_type(_converted(field.type, convert)) for field in kind])
     elif types.is_large_list(kind):
-        kind = pa.large_list(_each(kind.value_type, convert))
+        kind = pa.large_list(_converted(kind.value_type, convert))
     elif types.is_fixed_size_list(kind):
-        kind = pa.list_(_each(kind.value_type, convert), kind.list_size)
+        kind = pa.list_(_converted(kind.value_type, convert), kind.list_size)
     return convert(kind)
 
 
@@ -138,7 +138,7 @@ def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
 
 def _timeless(column: pa.Array) -> pa.Array:
     """Return a column with times as texts: those of Python have no nanoseconds."""
-    return column.cast(_each(column.type, _timeless_type))
+    return column.cast(_converted(column.type, _timeless_type))
 
 
 def _timeless_type(kind: pa.DataType) -> pa.DataType:

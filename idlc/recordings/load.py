@@ -59,12 +59,12 @@ def folder() -> Path:
     return Path(temporary)
 
 
-def has(name: str) -> bool:
+def is_stored(name: str) -> bool:
     """Return whether packages are there under a name."""
     return (folder() / name).is_dir()
 
 
-def keep(name: str, files: Iterable[RenderedFile]) -> None:
+def store(name: str, files: Iterable[RenderedFile]) -> None:
     """Write packages under a name, whole or not at all; packages of other processes stay."""
     target = folder() / name
     draft = Path(tempfile.mkdtemp(dir=folder(), prefix=".new-"))
@@ -232,7 +232,7 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     report = Report()
     models, asked = asked_models(str(what), tuple(include), distro, report)
     _raise_for(report)
-    name = _kept(models)
+    name = _stored(models)
     return Loaded(f"{LOADED}.{name}", models, asked)
 
 
@@ -246,12 +246,12 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
         converts = Scope(include=include).distro.converts_values
         texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
         key = _key(texts, converts=converts)
-    if not (key and has(key)):
+    if not (key and is_stored(key)):
         models, report = topic_models(topic, include)
         for diagnostic in report:
             warnings.warn(MissingDefinitionWarning(topic.name, diagnostic.message), stacklevel=2)
         # local definitions that were used instead may change
-        key = _kept(models, "" if list(report) else key)
+        key = _stored(models, "" if list(report) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
     if topic.hash not in (None, _type_of(kind).hash):
         message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
@@ -315,7 +315,7 @@ def _class(home: str, name: str) -> Any:
     return getattr(module, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
 
 
-def _kept(models: Mapping[str, Model], key: str = "") -> str:
+def _stored(models: Mapping[str, Model], key: str = "") -> str:
     """Return the name under which the packages are kept, after they are written if need be."""
     if not key:
         texts = [
@@ -326,8 +326,8 @@ def _kept(models: Mapping[str, Model], key: str = "") -> str:
         ]
         converts = any(model.distro.converts_values for model in models.values())
         key = _key(texts, converts=converts)
-    if not has(key):
-        keep(key, _files(models, f"{LOADED}.{key}"))
+    if not is_stored(key):
+        store(key, _files(models, f"{LOADED}.{key}"))
         invalidate_caches()
     return key
 

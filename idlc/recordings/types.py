@@ -60,12 +60,12 @@ class LocalTypes:
         """Return the hash of a type that an interface defines; `None` if it is not known."""
         if name not in self._hashes:
             model = self.model(interface.package, [interface])
-            is_known = has(model, name)
+            is_known = defines(model, name)
             self._hashes[name] = model.describer.hash(str(name)) if is_known else None
         return self._hashes[name]
 
 
-def has(model: Model, name: ir.TypeName) -> bool:
+def defines(model: Model, name: ir.TypeName) -> bool:
     """Return whether a structure or interface is in a model."""
     return name in model.messages or name in model.interfaces
 
@@ -254,7 +254,7 @@ class RecordedTypes:
     def hash(self, topic: Typed) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
         model = self.models[topic.name.package]
-        return model.describer.hash(str(topic.name)) if has(model, topic.name) else None
+        return model.describer.hash(str(topic.name)) if defines(model, topic.name) else None
 
 
 def _empty_ones(

@@ -1,4 +1,4 @@
-"""What a library on disk holds, read from its bytes, which may be anybody's."""
+"""The content of a library on disk, read from its bytes, which are not trusted."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Inspected(NamedTuple):
 
 
 def inspect(data: bytes) -> Inspected | None:
-    """Return what a file holds; `None` if it is no shared library for Linux, or a torn one."""
+    """Return the content of a file; `None` if it is no shared library for Linux, or truncated."""
     try:
         kind, machine = unpack_from("<2H", data, 16)
         if not data.startswith(_HEADER) or kind != _SHARED:

@@ -1,6 +1,6 @@
 """The type support of a package's messages, in two libraries as C++ tools look for them.
 
-A handle answers who asks for another identifier with another handle, or with NULL:
+When asked for another identifier, a handle returns another handle, or NULL:
 
     rosidl_typesupport_cpp                what rclcpp, rosbag2 and the like load
     ├─ rosidl_typesupport_fastrtps_c      what Fast DDS asks for: a name, no bound, no codec
@@ -41,7 +41,7 @@ def hash_bytes(text: str) -> bytes:
 
 
 class Descriptions:
-    """The functions of each type that return these three, made once."""
+    """The functions that return hash, description and sources of each type, made once."""
 
     def __init__(self, model: Model, image: Image) -> None:
         self._model = model
@@ -49,7 +49,7 @@ class Descriptions:
         self._individuals: dict[str, Words] = {}
         self._about: dict[str, tuple[Place, Place, Place]] = {}
 
-    def about(self, name: str) -> tuple[Place, Place, Place]:
+    def functions(self, name: str) -> tuple[Place, Place, Place]:
         """Return functions that return a type's hash, description and sources."""
         if name not in self._about:
             places = (self._hash(name), *self._description(name))
@@ -98,7 +98,7 @@ class Descriptions:
         return (*self._string(name), *self._string(encoding), *self._string(text))
 
     def _string(self, text: str) -> Words:
-        """Return a string of C with its size, and with room for what ends it."""
+        """Return a string of C with its size, and its capacity with the terminator."""
         size = len(text.encode())
         return (self._image.string(text), size, size + 1) if text else (None, 0, 0)
 
@@ -125,7 +125,7 @@ def libraries(
 ) -> dict[str, bytes]:
     """Return the content of each library of a package by the name of its file.
 
-    Whoever has one open must not see it change: write it beside, and move it there.
+    A library that is open must not change: write a new file, and move it into place.
     """
     return {
         f"lib{model.package}__{identifier}.so": _library(model, Image(machine), layout, identifier)
@@ -135,7 +135,7 @@ def libraries(
 
 
 def identity_stamp(layout: Layout) -> bytes:
-    """Return what a library's constants begin with: who made it, and for which layout."""
+    """Return the first bytes of a library's constants: its author, and its layout."""
     return AUTHOR + pack(f"<{len(layout)}I", *layout)
 
 
@@ -151,14 +151,14 @@ def _library(model: Model, image: Image, layout: Layout, identifier: str) -> byt
         for message in derive.messages(interface):
             handle = support.fields[message.name]
             if identifier == OWN:
-                handle = support.own(message.name, handle)
+                handle = support.resolving_handle(message.name, handle)
             name = symbol(identifier, message.name)
             image.exports[name] = image.function("get", target=handle)
     return shared_library(image, f"lib{model.package}__{identifier}.so")
 
 
 class _TypeSupport:
-    """The handles of one library. `fields` has those of FIELDS, or with `cpp` of FIELDS_CPP."""
+    """The handles of one library. `fields` are for FIELDS, or with `cpp` for FIELDS_CPP."""
 
     def __init__(self, model: Model, image: Image, layout: Layout, *, cpp: bool) -> None:
         self.image = image
@@ -171,7 +171,7 @@ class _TypeSupport:
         for message in _reached(model):
             self.fields[message.name] = self._fields(message)
 
-    def own(self, name: ir.TypeName, fields: Place) -> Place:
+    def resolving_handle(self, name: ir.TypeName, fields: Place) -> Place:
         """Return the handle that answers for all others."""
         image = self.image
         answers = {FASTRTPS: self._fastrtps(name), FIELDS: fields}
@@ -182,7 +182,7 @@ class _TypeSupport:
         return self._handle(OWN, table, image.function("resolve"), name)
 
     def _handle(self, identifier: str, data: Place, find: Place, name: ir.TypeName) -> Place:
-        about = self.descriptions.about(str(name))
+        about = self.descriptions.functions(str(name))
         return self.image.data.words(self.image.string(identifier), data, find, *about)
 
     def _single(self, identifier: str, data: Place, name: ir.TypeName) -> Place:
@@ -257,7 +257,7 @@ class _TypeSupport:
 
 
 def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
-    """Return how introspection calls a type, its bound, and which message it is."""
+    """Return a type's id in introspection, its bound, and its name if it is a message."""
     match element:
         case ir.Primitive():
             return TYPE_IDS[element.name], 0, None
@@ -270,7 +270,7 @@ def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
 
 
 def _reached(model: Model) -> list[ir.Message]:
-    """Return a package's messages and all that they refer to, those first that others hold."""
+    """Return a package's messages and all that they refer to, nested ones first."""
     held: dict[str, int] = {}
     for interface in model.own:
         for message in derive.messages(interface):

@@ -77,7 +77,7 @@ def _operator(field: ir.Field, receiver: str, operator: str) -> str:
 def _compared(field: ir.Field, receiver: str, references: References) -> str | Group:
     """Return whether a field is equal.
 
-    It is a call for what may be an array, what has no type, and what is too long for a line.
+    It is a call for possible arrays, untyped values, and expressions too long for a line.
     """
     plain = _operator(field, receiver, "==")
     element = ir.element_of(field.type)

@@ -59,9 +59,9 @@ class Homes:
 class References:
     """The names of all classes that a module mentions.
 
-    `own` are the structures that it defines, `others` those of other packages that their fields
-    name. `direct` are imported with the module; `implied` are others of fields that ROS 2 adds,
-    imported when they are used, so that each part of a protocol needs only what it holds.
+    `own` are the structures that it defines, `others` are in fields and of other packages.
+    `direct` are imported with the module; `implied` are others in fields that ROS 2 adds, imported
+    when they are used, so that each part of a protocol needs only its own types.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class References:
     def _named(
         self, own: set[ir.TypeName], others: set[ir.TypeName]
     ) -> dict[ir.TypeName, python_names.ClassName]:
-        """Return each structure's class; those that the module defines keep their plain name.
+        """Return each structure's class; classes that the module defines keep their plain name.
 
-        Others get another one if something else has it: an exception of Python, for example.
+        Others get another name if theirs is taken: by an exception of Python, for example.
         """
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
         for name in own | others:
@@ -118,9 +118,9 @@ class References:
         return f"{self._homes.parent}{type_.package}.{type_.kind}"
 
     def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
-        """Return import statements, those of this package and those of others, sorted.
+        """Return import statements from this package, and from others, sorted.
 
-        Those of others are indented by four more columns.
+        Imports from others are indented by four more columns.
         """
         inside: dict[tuple[int, str], set[str]] = defaultdict(set)
         outside: dict[str, set[str]] = defaultdict(set)

@@ -176,7 +176,7 @@ def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[
     return [line]
 
 
-def text(value: str) -> str:
+def string_literal(value: str) -> str:
     """Return a string literal with the quotes that formatters choose."""
     quote = '"' if value.count('"') <= value.count("'") else "'"
     if value.isascii() and value.isprintable():
@@ -202,7 +202,7 @@ def number(value: ir.Scalar) -> str:
 def scalar(type_: ir.Element, value: ir.Scalar) -> str:
     """Return the literal of a value of a primitive or string type."""
     if isinstance(type_, ir.String):
-        return text(str(value))
+        return string_literal(str(value))
     if isinstance(type_, ir.Primitive) and type_.name == "byte":
         return octet(int(value))
     if isinstance(type_, ir.Primitive) and type_.name.startswith("float"):

@@ -128,9 +128,9 @@ class Cursor(msgspec.Struct, frozen=True):
         """Return the same position, held by another variable."""
         return Cursor(base, offset, self.alignment)
 
-    def with_alignment(self, known: Alignment) -> Cursor:
+    def with_alignment(self, alignment: Alignment) -> Cursor:
         """Return the same position with another known alignment."""
-        return Cursor(self.base, self.offset, known)
+        return Cursor(self.base, self.offset, alignment)
 
 
 #: The end of the header.

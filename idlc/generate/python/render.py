@@ -19,7 +19,7 @@ from idlc.generate.python import classes, documentation, fields, imports
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.codec import CodecView, codec
 from idlc.generate.python.imports import Homes, References
-from idlc.generate.python.lines import text as literal_text
+from idlc.generate.python.lines import string_literal
 from idlc.model import derive, ir, link, python_names
 from idlc.model.describe import IndividualDict
 from idlc.project.templates import RenderedFile, environment
@@ -66,7 +66,7 @@ def content(model: link.Model) -> TypesDict:
 def type_data_source(model: link.Model, parent: str = "") -> str:
     """Return the text of the module: one line of it for each type."""
     parts = _parts(content(model), parent)
-    lines = "".join(f"    {literal_text(part)}\n" for part in parts)
+    lines = "".join(f"    {string_literal(part)}\n" for part in parts)
     return f'"""The types of {model.package}, read by `typeinfo`."""\n\nJSON = (\n{lines})\n'
 
 

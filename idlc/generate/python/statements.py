@@ -63,7 +63,7 @@ class Emitter:
 
     @contextmanager
     def within(self, head: str) -> Iterator[None]:
-        """Make what is emitted meanwhile the body of a compound statement."""
+        """Put the statements emitted meanwhile into the body of a compound statement."""
         outside, self.body = self.body, []
         yield
         outside.append(Block(head, tuple(self.body)))

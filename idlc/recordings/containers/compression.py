@@ -45,7 +45,7 @@ class Room:
             what = f"more than {MOST_GROWTH:,} times as much as the file"
             raise RecordingError(f"what is compressed in it holds {what}")
 
-    def each(self) -> Iterator[None]:
+    def records(self) -> Iterator[None]:
         """Yield for each record for which there is room; raise RecordingError after the last."""
         while self._records > 0:
             self._records -= 1

@@ -267,7 +267,7 @@ def first_messages(
         mine = waiting if chunk.indexes is None else waiting & named
         if not mine:
             continue
-        for data, _ in zip(_contents(source, chunk, room), room.each(), strict=False):
+        for data, _ in zip(_contents(source, chunk, room), room.records(), strict=False):
             number = int.from_bytes(data[:2], "little")
             if number in mine:
                 yield number, bytes(data[MESSAGE_HEAD:])
@@ -457,7 +457,7 @@ class _Walk:
             self.damaged = True
             content, counts = memoryview(b""), self.entries
             first, last = self.last.first, self.last.last
-        for (op, _, data), _ in zip(read_records(content), self.room.each(), strict=False):
+        for (op, _, data), _ in zip(read_records(content), self.room.records(), strict=False):
             self.facts.add(op, data)
             if op == MESSAGE_OP and len(data) >= CHANNEL_AND_TIME.size:
                 channel, _, time = CHANNEL_AND_TIME.unpack_from(data)

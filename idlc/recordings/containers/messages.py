@@ -345,7 +345,7 @@ def _walked(view: memoryview, opened: Opened, channels: Collection[int], room: R
     """Return the offsets of messages, by a walk from record to record."""
     unpack, ahead = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size
     places, at, stop = [], opened.start, opened.stop
-    for _ in room.each():
+    for _ in room.records():
         if at + ahead > stop:
             break
         op, size, channel = unpack(view, at)
