@@ -151,7 +151,7 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     packages = {name: tuple(found) for name, found in groupby(shown, lambda one: one.name.package)}
     home = homes([*packages])
     owners = {name: Home(there, about.get(name, About()).version) for name, there in home.items()}
-    template = html().get_template("site/interface.html.jinja")
+    template = html().get_template("documents/interface.html.jinja")
     files = []
     for name, (interface, model) in sorted(known.items()):
         owner = owners.get(name.package, Home())
@@ -160,8 +160,8 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     return (
         *_lists(packages, home, pages, about),
         RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
-        RenderedFile("search.js", verbatim("site/search.js")),
-        RenderedFile("style.css", verbatim("site/style.css")),
+        RenderedFile("search.js", verbatim("documents/search.js")),
+        RenderedFile("style.css", verbatim("documents/style.css")),
         *files,
     )
 
@@ -170,12 +170,12 @@ def _lists(
     packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
 ) -> Iterator[RenderedFile]:
     """Yield the pages that list interfaces, and for several packages the one that lists those."""
-    template = html().get_template("site/package.html.jinja")
+    template = html().get_template("documents/package.html.jinja")
     for name, interfaces in packages.items():
         text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
         yield RenderedFile(home[name], template.render(page=text))
     if len(packages) > 1:
-        title = html().get_template("site/index.html.jinja")
+        title = html().get_template("documents/index.html.jinja")
         yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
 
 
