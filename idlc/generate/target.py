@@ -21,8 +21,9 @@ from idlc.version import __version__
 
 _PACKAGE = Path(__file__).parents[1]
 #: The sources of idlc that affect the output: a change counts although the version stays.
+_ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
 _MAKERS = (
-    *(_PACKAGE / part for part in ("diagnostics", "syntax", "model", "checks", "emit", "runtime")),
+    *(_PACKAGE / room for room in _ROOMS),
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )
