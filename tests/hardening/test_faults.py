@@ -84,7 +84,13 @@ def test_killed_at_any_write(torn, before, machine, versions):
             assert b"mine\n" in kept, f"the edit is lost after write {point}"
 
 
-@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES, errno.EROFS, errno.EIO])
+OTHERS = [
+    pytest.param(number, marks=pytest.mark.long)
+    for number in (errno.EACCES, errno.EROFS, errno.EIO)
+]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, *OTHERS])
 def test_every_write_from_some_point_on_fails(number, before, machine, versions):
     words, start = before
     old, new = tree(start) if start else {}, tree(versions[1])
