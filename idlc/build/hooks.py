@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from idlc.cli import output
-from idlc.cli.exit_status import ended
+from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import did_you_mean, without_options
@@ -58,7 +58,7 @@ def finished(build: Callable[[Report], str | None]) -> str:
         output.notes(report, sys.stderr)
         return 0 if built else output.status(report) or 1
 
-    status = ended(command)
+    status = status_of(command)
     if status:
         sys.stderr.write("idlc: nothing was built, see above\n")
         raise SystemExit(status)

@@ -54,9 +54,9 @@ def check(options: CheckOptions, report: Report) -> Checked:
     With `fix`, problems with a harmless edit are fixed, and the others reported.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
-        from idlc.recordings.find import divided
+        from idlc.recordings.find import split_recordings
 
-        recordings, others = divided(options.paths)
+        recordings, others = split_recordings(options.paths)
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0

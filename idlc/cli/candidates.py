@@ -54,10 +54,10 @@ def types(
 
 def topics(word: str, paths: Sequence[str]) -> list[str]:
     """Return the topics of recordings that begin with a word."""
-    from idlc.recordings.find import divided
-    from idlc.recordings.versions import read
+    from idlc.recordings.find import split_recordings
+    from idlc.recordings.versions import read_topics
 
-    recordings = filter(None, (read(path, Report()) for path in divided(paths)[0]))
+    recordings = filter(None, (read_topics(path, Report()) for path in split_recordings(paths)[0]))
     names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 

@@ -228,9 +228,9 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
 def _refuse_useless(paths: Sequence[str], package: str | None, topics: Sequence[str]) -> None:
     """Refuse options that have no effect on the paths."""
     from idlc.project.find import is_path
-    from idlc.recordings.find import divided
+    from idlc.recordings.find import split_recordings
 
-    recordings, others = divided(paths) if package or topics else ((), ())
+    recordings, others = split_recordings(paths) if package or topics else ((), ())
     if topics and not recordings:
         raise click.UsageError("--topic is for recordings, and none was given")
     if package and not any(map(is_path, others)):

@@ -15,7 +15,7 @@ from idlc.project import inputs
 from idlc.project.find import find, is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.find import divided
+from idlc.recordings.find import split_recordings
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -84,7 +84,7 @@ def requested_models(
             problems = Report()
             yield from _named(target, scope, problems)
             report.extend(problems)
-    recordings, paths = divided(paths)
+    recordings, paths = split_recordings(paths)
     if recordings:
         from idlc.recordings.packages import recorded_models
 

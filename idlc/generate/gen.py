@@ -28,7 +28,7 @@ from idlc.project.library import Library, resolve
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import declared_name, manifest
 from idlc.project.settings import Config, Scope, load_settings, scope, working_in
-from idlc.recordings.find import divided
+from idlc.recordings.find import split_recordings
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
 
 
 def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    recordings, others = divided(options.paths)
+    recordings, others = split_recordings(options.paths)
     paths = [word for word in others if not is_name(word)]
     words = [word for word in others if is_name(word)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))

@@ -46,7 +46,7 @@ def is_there(word: str) -> bool:
     return "://" in word or is_file(word) or is_folder(Path(word))
 
 
-def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
+def split_recordings(words: Iterable[str]) -> tuple[list[str], list[str]]:
     """Return the words that mean recordings, and the others."""
     recordings: list[str] = []
     others: list[str] = []
@@ -74,7 +74,7 @@ def recordings_of(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...]
     A shell that expands the pattern itself leaves all but the first among the paths.
     """
     matches = expanded(against)
-    if not divided(matches)[0]:
+    if not split_recordings(matches)[0]:
         return (), paths
-    more, others = divided(paths)
+    more, others = split_recordings(paths)
     return tuple(dict.fromkeys((*matches, *more))), tuple(others)

@@ -28,7 +28,7 @@ from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types
-from idlc.recordings.versions import read, versions
+from idlc.recordings.versions import read_topics, versions
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
-    recording = read(path, report)
+    recording = read_topics(path, report)
     groups = versions(recording.topics) if recording else []
     if len(groups) != 1:
         from idlc.recordings.packages import check_versions

@@ -23,14 +23,14 @@ from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_typ
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-from idlc.recordings.versions import Version, contradictions, read, topics_of, versions
+from idlc.recordings.versions import Version, contradictions, read_topics, topics_of, versions
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
     """Report problems in the type definitions stored in recordings."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read(path, report, look=True)
+        recording = read_topics(path, report, check=True)
         groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
@@ -75,7 +75,7 @@ def recorded_models(
     """Yield the models of recordings, without faulty interfaces, and the names of their types."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read(path, report)
+        recording = read_topics(path, report)
         for version in versions(recording.topics) if recording else ():
             types = recorded_types(version, local, scope, report)
             for model in types.models.values():

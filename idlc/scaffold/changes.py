@@ -19,7 +19,7 @@ from idlc.project.library import Library
 from idlc.project.package_xml import declared_name, manifest
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import keep
-from idlc.scaffold.project import Done, Project
+from idlc.scaffold.project import FileOutcome, Project
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.roles.role import Endpoint, Role
 from idlc.scaffold.templates import (
@@ -50,7 +50,7 @@ class Result(NamedTuple):
     """
 
     folder: str
-    done: tuple[Done, ...]
+    done: tuple[FileOutcome, ...]
     diff: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     following: tuple[str, ...] = ()
