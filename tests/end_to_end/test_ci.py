@@ -122,6 +122,7 @@ def act(environment, **inputs):
     return run("sh", str(ROOT / ".ci/action"), **environment, **given)
 
 
+@pytest.mark.long
 def test_the_action_is_content_with_a_good_pull_request(pull_request, here):
     done = act(pull_request, paths="demo")
     assert (done.returncode, done.stderr) == (0, "1 file already formatted\n")
@@ -156,6 +157,7 @@ def test_the_action_annotates_what_is_wrong_and_what_breaks(pull_request, here):
     ]
 
 
+@pytest.mark.long
 def test_the_action_checks_generated_code_where_there_is_any(pull_request):
     write("pyproject.toml", '[tool.idlc]\npaths = ["demo"]\nout = "out/demo"\n')
     done = act(pull_request, paths="demo", breaking="false")
@@ -168,6 +170,7 @@ def test_the_action_checks_generated_code_where_there_is_any(pull_request):
     assert act(pull_request, paths="demo", breaking="false", generated="true").returncode == 2
 
 
+@pytest.mark.long
 def test_what_files_say_is_no_command_of_githubs(pull_request):
     """GitHub takes lines that begin with two colons for commands, blanks before them or not."""
     write("demo/msg/Drive.msg", "# ::error::mine\n::error::mine\n  ::error::mine\nint8   a\n")
@@ -183,6 +186,7 @@ def test_what_files_say_is_no_command_of_githubs(pull_request):
     assert heard
 
 
+@pytest.mark.long
 def test_no_file_of_a_pull_request_is_imported_or_written_through(pull_request, here):
     for name in sorted(sys.stdlib_module_names - {"runpy", "importlib", "pkgutil"}):
         write(f"{name}.py", f"open({str(here / 'ran')!r}, 'a').write('{name} ')\n")
@@ -199,6 +203,7 @@ def test_no_file_of_a_pull_request_is_imported_or_written_through(pull_request, 
     assert set(starts) == {"-I"}
 
 
+@pytest.mark.long
 def test_the_actions_inputs(pull_request):
     write("demo/msg/Drive.msg", "float32   speed  # [m/s]\n")
     off = {"format": "false", "breaking": "false"}
@@ -208,6 +213,7 @@ def test_the_actions_inputs(pull_request):
     assert act(pull_request, paths="demo", strict="true", **off).returncode == 1
 
 
+@pytest.mark.long
 def test_no_text_of_a_pull_request_becomes_a_command(pull_request, here):
     for paths in ("$(touch hacked)", "; touch hacked", "--help", "* `touch hacked`"):
         act(pull_request, paths=paths)

@@ -228,6 +228,7 @@ def user(trees):
     (trees / "mistakes.py").unlink()
 
 
+@pytest.mark.long
 def test_user_code_and_generated_code_pass_mypy_strict(user):
     flags = ["--strict", "--cache-dir", user / ".mypy", "--warn-unreachable"]
     packages = [word for case in CASES for word in ("-p", package_of(case))]
@@ -237,6 +238,7 @@ def test_user_code_and_generated_code_pass_mypy_strict(user):
     assert wrong_lines(result.stdout) == MISTAKEN, result.stdout
 
 
+@pytest.mark.long
 def test_user_code_and_generated_code_pass_basedpyright(user):
     (user / "pyrightconfig.json").write_text('{"typeCheckingMode": "standard"}', encoding="utf-8")
     packages = [package_of(case) for case in CASES]

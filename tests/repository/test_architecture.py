@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from jinja2 import Environment, nodes
 
-from tests.support.imports import MODULES, graph, imports, room
+from tests.support.imports import MODULES, graph, imports, room, tree
 from tests.support.paths import DOCS, ROOT
 
 TEMPLATES = sorted((ROOT / "templates").rglob("*.jinja"))
@@ -64,10 +64,6 @@ def name_of(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def tree_of(module: str) -> ast.Module:
-    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
-
-
 # the house
 
 
@@ -97,7 +93,7 @@ def test_folders_and_the_house_stay_small():
     assert crowded == CROWDED
 
 
-def only_forwards(tree: ast.Module) -> bool:
+def only_forwards(module: str) -> bool:
     """Return whether a module holds names of others and nothing of its own."""
     return all(
         isinstance(statement, (ast.Import, ast.ImportFrom))
@@ -111,13 +107,13 @@ def only_forwards(tree: ast.Module) -> bool:
                 or isinstance(statement.value, (ast.Name, ast.Attribute))
             )
         )
-        for statement in tree.body
+        for statement in tree(module).body
     )
 
 
 def test_nothing_but_a_package_only_forwards():
     modules = [name for name, path in MODULES.items() if path.name != "__init__.py"]
-    assert [name for name in modules if only_forwards(tree_of(name))] == []
+    assert [name for name in modules if only_forwards(name)] == []
 
 
 @pytest.mark.parametrize(
@@ -125,7 +121,7 @@ def test_nothing_but_a_package_only_forwards():
     [name for name, path in MODULES.items() if path.name == "__init__.py" and name.count(".") == 1],
 )
 def test_a_room_says_what_it_offers_without_loading_it(module):
-    assert ast.get_docstring(tree_of(module))
+    assert ast.get_docstring(tree(module))
     if room(module) not in OFFERED_AT_ONCE:
         assert imports(module) == ()
 
@@ -136,7 +132,7 @@ def test_the_core_does_no_io(module):
     for each in imports(module):
         top = each.module.split(".")[0]
         assert top in allowed or top not in IO_MODULES, f"line {each.line}: imports {top}"
-    for node in ast.walk(tree_of(module)):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id not in IO_CALLS, f"line {node.lineno}: calls {node.func.id}"
 
@@ -154,7 +150,7 @@ def test_only_the_command_line_prints():
     printing = {
         module
         for module in MODULES
-        if room(module) not in {"cli", "runtime"} and any(map(prints, ast.walk(tree_of(module))))
+        if room(module) not in {"cli", "runtime"} and any(map(prints, ast.walk(tree(module))))
     }
     assert printing == set(PRINTS)
 

@@ -80,6 +80,7 @@ def test_the_kept_run_is_of_everything(tmp_path):
     assert set(PEERS) <= set(run.versions)
 
 
+@pytest.mark.long
 def test_readers_of_recordings_can_be_measured(tmp_path):
     path = tmp_path / "run.json"
     words = ["recording zstd: imu", "--quick", "--rounds", "1", "--json", str(path)]

@@ -81,6 +81,7 @@ def run(copy: Path, command: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["add-a-rule", "add-a-command", "add-an-output-format", "add-a-field-kind"]
 )

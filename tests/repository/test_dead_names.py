@@ -4,7 +4,7 @@ import ast
 import re
 from collections.abc import Iterator
 
-from tests.support.imports import MODULES
+from tests.support.imports import MODULES, tree
 from tests.support.paths import ROOT
 
 #: What is called by its name from outside: by click, pytest, Python, and PEP 517's frontends.
@@ -28,8 +28,8 @@ def used() -> Iterator[str]:
     """Yield the names that code, templates and settings refer to."""
     for path in (*(ROOT / "templates").rglob("*.jinja"), ROOT / "pyproject.toml"):
         yield from WORD.findall(path.read_text(encoding="utf-8"))
-    for path in MODULES.values():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for module in MODULES:
+        for node in ast.walk(tree(module)):
             yield from names(node)
 
 
@@ -52,12 +52,12 @@ def base_name(base: ast.expr) -> str:
     return ast.unparse(base).partition("[")[0]
 
 
-def defined(tree: ast.Module, own: set[str]) -> Iterator[str]:
+def defined(module: ast.Module, own: set[str]) -> Iterator[str]:
     """Yield the names that a module defines, and the methods of its classes.
 
     What a class of somebody else asks for, it calls; `own` are the classes that are not.
     """
-    for node in tree.body:
+    for node in module.body:
         match node:
             case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
                 yield name
@@ -70,16 +70,15 @@ def defined(tree: ast.Module, own: set[str]) -> Iterator[str]:
 
 
 def test_every_name_is_used():
-    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
-    nodes = [node for tree in trees.values() for node in ast.walk(tree)]
+    nodes = (node for module in MODULES for node in ast.walk(tree(module)))
     classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
     own = RECORDS | {node.name for node in classes}
     own -= {node.name for node in classes if not {*map(base_name, node.bases)} <= own}
     known = {*used(), *PUBLIC}
     unused = [
         f"{module}: {name}"
-        for module, tree in trees.items()
-        for name in defined(tree, own)
+        for module in MODULES
+        for name in defined(tree(module), own)
         if name not in known and not CALLED.fullmatch(name)
     ]
     assert unused == []

@@ -148,6 +148,7 @@ def test_two_versions_are_told_field_by_field(start, look, packages):
     assert len({one["hash"] for one in goals}) == 1
 
 
+@pytest.mark.long
 def test_who_does_not_answer_is_known_by_hash(start, look):
     """A node that dies meanwhile, one that is always busy, and one that describes nothing."""
     start("one", "talker", f"publisher:{DRIVE}", f"server:{GO}")

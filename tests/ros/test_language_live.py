@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 from rosidl_adapter import convert_to_idl
 
 from tests.ros.test_verdict_live import ask_rosidl
@@ -10,6 +11,7 @@ from tests.support import language_book
 BOOK = language_book.BOOK.read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_examples(tmp_path):
     examples = [one for one in language_book.examples(BOOK) if not one.distro]
     outcomes = ask_rosidl([example.case for example in examples], tmp_path)

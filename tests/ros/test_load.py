@@ -56,6 +56,7 @@ def start(sides, program):
 OF_RCLPY = re.compile(r"The following exception was never retrieved: cannot use Destroyable.*\n")
 
 
+@pytest.mark.long
 def test_eight_publishers_and_eight_subscribers_that_die(start):
     load = start("eight_by_eight", MESSAGES)
     chance = random.Random(1)

@@ -69,10 +69,12 @@ def test_behaviour_without_machine_code(behaviour, start):
     assert finish(start("without_machine_code", behaviour)) == ("", "")
 
 
+@pytest.mark.long
 def test_memory_stays_flat(start):
     assert finish(start("memory_stays_flat", "200000")) == ("", "")
 
 
+@pytest.mark.long
 def test_memory_stays_flat_in_services(start):
     assert finish(start("memory_stays_flat_in_services", "40000")) == ("", "")
 

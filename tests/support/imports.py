@@ -36,45 +36,42 @@ def room(module: str) -> str:
 
 
 @cache
+def tree(module: str) -> ast.Module:
+    """Return the syntax tree of a module."""
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
+@cache
 def imports(module: str) -> tuple[Import, ...]:
     """Return the imports of a module, those inside of functions too."""
     path = MODULES[module]
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    return tuple(_imports(tree, package.split(".")))
+    return tuple(_imports(tree(module), package.split("."), at_once=True, for_types=False))
 
 
-def _imports(tree: ast.Module, package: list[str]) -> Iterator[Import]:
-    late = {
-        id(node)
-        for function in ast.walk(tree)
-        if is_function(function)
-        for node in ast.walk(function)
-    }
-    typing = {id(node) for block in ast.walk(tree) for node in _type_checking(block)}
-    for node in ast.walk(tree):
-        when = (id(node) not in late, id(node) in typing)
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield Import(alias.name, node.lineno, 0, *when)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            name = ".".join([*base, *([node.module] if node.module else [])])
-            for alias in node.names:
-                whole = f"{name}.{alias.name}"
-                yield Import(whole if whole in MODULES else name, node.lineno, node.level, *when)
-
-
-def is_function(node: ast.AST) -> bool:
-    """Return whether the statements in a node run when it is called."""
-    return isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-
-
-def _type_checking(block: ast.AST) -> Iterator[ast.AST]:
-    test = block.test if isinstance(block, ast.If) else None
-    if isinstance(block, ast.If) and isinstance(test, ast.Name) and test.id == "TYPE_CHECKING":
-        for statement in block.body:
-            yield from ast.walk(statement)
+def _imports(
+    parent: ast.AST, package: list[str], *, at_once: bool, for_types: bool
+) -> Iterator[Import]:
+    when = (at_once, for_types)
+    for node in ast.iter_child_nodes(parent):
+        match node:
+            case ast.Import(names=names):
+                for alias in names:
+                    yield Import(alias.name, node.lineno, 0, *when)
+            case ast.ImportFrom(module=name, names=names, level=level):
+                base = package[: len(package) - level + 1] if level else []
+                home = ".".join([*base, *([name] if name else [])])
+                for alias in names:
+                    whole = f"{home}.{alias.name}"
+                    yield Import(whole if whole in MODULES else home, node.lineno, level, *when)
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield from _imports(node, package, at_once=False, for_types=for_types)
+            case ast.If(test=ast.Name(id="TYPE_CHECKING"), body=body, orelse=orelse):
+                typing, running = ast.Module(body, []), ast.Module(orelse, [])
+                yield from _imports(typing, package, at_once=at_once, for_types=True)
+                yield from _imports(running, package, at_once=at_once, for_types=for_types)
+            case ast.stmt() | ast.ExceptHandler() | ast.match_case():
+                yield from _imports(node, package, at_once=at_once, for_types=for_types)
 
 
 def graph() -> dict[str, set[str]]:

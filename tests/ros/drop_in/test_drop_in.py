@@ -150,6 +150,7 @@ def test_the_environment_lets_all_messages_check(
     assert [key for key in taken if "append" not in key] == []  # lists cannot check
 
 
+@pytest.mark.long
 def test_invented_messages_of_every_kind(classes, ros_environment, record_property, tmp_path):
     """rosidl's classes without its C code: all but what is sent."""
     source, theirs = tmp_path / "source", tmp_path / "rosidl" / "every_kind"
