@@ -156,7 +156,7 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     owners = {
         name: Home(address, about.get(name, About()).version) for name, address in home.items()
     }
-    template = html().get_template("site/interface.html.jinja")
+    template = html().get_template("documents/interface.html.jinja")
     files = []
     for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
@@ -165,8 +165,8 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
     return (
         *_lists(packages, home, pages, about),
         RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
-        RenderedFile("search.js", verbatim("site/search.js")),
-        RenderedFile("style.css", verbatim("site/style.css")),
+        RenderedFile("search.js", verbatim("documents/search.js")),
+        RenderedFile("style.css", verbatim("documents/style.css")),
         *files,
     )
 
@@ -175,12 +175,12 @@ def _lists(
     packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
 ) -> Iterator[RenderedFile]:
     """Yield the page of each package, and for several packages the title page."""
-    template = html().get_template("site/package.html.jinja")
+    template = html().get_template("documents/package.html.jinja")
     for name, interfaces in packages.items():
         text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
         yield RenderedFile(home[name], template.render(page=text))
     if len(packages) > 1:
-        title = html().get_template("site/index.html.jinja")
+        title = html().get_template("documents/index.html.jinja")
         yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
 
 

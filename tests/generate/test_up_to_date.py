@@ -11,7 +11,7 @@ from idlc.generate import target
 from idlc.generate.gen import GenOptions, gen
 from idlc.project.settings import Scope
 
-PACKAGE = Path(target.__file__).parents[2]
+PACKAGE = Path(target.__file__).parents[1]
 MAKERS = [path for path in target._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)

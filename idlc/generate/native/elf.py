@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 
 class Machine(NamedTuple):
-    """A processor. `code` is what an assembler makes of `text`; a test compares.
+    """A processor and its machine code.
 
     A function of it ends where the next one begins. `holes` are the places in `code` that depend
-    on where something else is, with the name that it has in `text`; `fill(code, at, here, target)`
+    on where something else is, with its name in the assembler text; `fill(code, at, here, target)`
     fills the one at `at`, which will be at the address `here`.
     """
 
@@ -27,7 +27,6 @@ class Machine(NamedTuple):
     absolute: int
     page: int
     properties: bytes
-    text: str
     code: bytes
     entries: Mapping[str, int]
     holes: Mapping[int, str]

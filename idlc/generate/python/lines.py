@@ -19,6 +19,8 @@ from idlc.model import ir
 
 #: Columns in generated packages; who writes other files gives another width.
 WIDTH = 88
+#: The same for the prose of docstrings, whose breaks are part of the text.
+DOCSTRING_WIDTH = WIDTH
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -247,7 +249,7 @@ def docstring(lines: list[str], *, one_line: bool) -> str:
 
 def wrapped(words: str, indent: int, hanging: int = 0) -> list[str]:
     """Return words on lines that fit when they are indented, all but the first by `hanging` too."""
-    width = WIDTH - 4 - indent
+    width = DOCSTRING_WIDTH - 4 - indent
     if len(words) <= width:
         return [words]
     return textwrap.wrap(
