@@ -11,7 +11,14 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native.inspect import Inspected, inspect
 from idlc.generate.native.layouts import LAYOUTS
-from idlc.generate.native.library import FIELDS_CPP, MACHINES, OWN, hash_bytes, symbol, told
+from idlc.generate.native.library import (
+    FIELDS_CPP,
+    MACHINES,
+    OWN,
+    hash_bytes,
+    identity_stamp,
+    symbol,
+)
 from idlc.model import derive
 from idlc.project import inputs
 from idlc.project.files import absolute, shown
@@ -101,12 +108,12 @@ def _differences(
         for message in messages
         # older distributions have no events
         if symbol(identifier, message.name) not in library.symbols
-        and (library.told is not None or not message.name.name.endswith("_Event"))
+        and (library.stamp is not None or not message.name.name.endswith("_Event"))
     ]
     if missing:
         names = first_few((f"`{name}`" for name in missing), 3)
         yield f"lacks {names}"
-    if library.told is None:
+    if library.stamp is None:
         return
     stale = [
         str(message.name)
@@ -118,5 +125,5 @@ def _differences(
         yield f"is out of date: {names} changed since"
     local = distribution((package.prefix, *ament_prefixes()))
     layout = LAYOUTS.get(local.name)
-    if layout is not None and library.told != told(layout):
+    if layout is not None and library.stamp != identity_stamp(layout):
         yield f"is for another distribution of ROS 2 than {local.name} ({local.why})"

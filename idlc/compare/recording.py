@@ -16,7 +16,7 @@ from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.files import absolute, shown
 from idlc.project.find import look, nothing_in
-from idlc.recordings.types import NAMED, Around, recorded_types
+from idlc.recordings.types import NAMED, LocalTypes, recorded_types
 from idlc.recordings.versions import topics_of, versions
 
 
@@ -78,7 +78,7 @@ class _LocalVersions:
     def __init__(
         self, packages: Sequence[inputs.Inputs], options: BreakingOptions, report: Report
     ) -> None:
-        self.types = Around(options.scope, report)
+        self.types = LocalTypes(options.scope, report)
         self._packages = {package.package: package for package in packages}
         self._models = error_free_models(packages, options.scope, report)
         self._unknown: set[ir.TypeName] = set()

@@ -21,6 +21,10 @@ FOLDERS = [
 ]
 
 
+def test_the_rooms_that_count_exist():
+    assert all((PACKAGE / room).is_dir() for room in target._ROOMS)
+
+
 @pytest.mark.parametrize("folder", FOLDERS, ids=str)
 def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
     for maker in MAKERS:

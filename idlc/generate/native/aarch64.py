@@ -48,14 +48,14 @@ HOLES = {
 }  # fmt: skip
 
 
-def _fill(code: bytearray, at: int, here: int, target: int) -> None:
+def _fill(code: bytearray, at: int, address: int, target: int) -> None:
     """Fill the instruction at `at`, as its kind wants it."""
     (word,) = unpack_from("<I", code, at)
     if word & 0x9F000000 == 0x90000000:  # adrp: by how many pages
-        pages = (target >> 12) - (here >> 12)
+        pages = (target >> 12) - (address >> 12)
         word |= (pages & 3) << 29 | (pages >> 2 & 0x7FFFF) << 5
     elif word & 0xFC000000 == 0x14000000:  # b: by how many instructions
-        word |= target - here >> 2 & 0x3FFFFFF
+        word |= target - address >> 2 & 0x3FFFFFF
     elif word & 0xFFC00000 == 0xF9400000:  # ldr: which word of the page
         word |= (target & 0xFFF) >> 3 << 10
     else:  # add: which byte of the page

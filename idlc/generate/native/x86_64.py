@@ -45,9 +45,9 @@ HOLES = {
 }  # fmt: skip
 
 
-def _fill(code: bytearray, at: int, here: int, target: int) -> None:
+def _fill(code: bytearray, at: int, address: int, target: int) -> None:
     """Fill the hole at `at` with the distance from the end of it."""
-    pack_into("<i", code, at, target - here - 4)
+    pack_into("<i", code, at, target - address - 4)
 
 
 MACHINE = Machine(
