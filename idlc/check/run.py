@@ -62,7 +62,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
     fixed = 0
     for rounds_left in reversed(range(_ROUNDS + 1)):
         looked = Report()
-        checked, problems = _once(options, looked)
+        checked, problems = _check_once(options, looked)
         edits = [change for problem in problems for change in problem.edits]
         if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
             break
@@ -94,7 +94,7 @@ def _with_recordings(
 
 
 def tidied(name: str, old: str, new: str) -> str:
-    """Return an edited file in its old layout: that of `idlc fmt`, or without long lines."""
+    """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
     if name.endswith("setup.py"):
         from idlc.check.package.setup_edits import wrapped
 
@@ -109,7 +109,7 @@ def tidied(name: str, old: str, new: str) -> str:
     return format_file(parse(Source(name, new)))
 
 
-def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
+def _check_once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
     listing = look(options.paths, report, scope.exclude, scope.unsaved)
     packages = inputs.packages(listing.files, scope, report, listing.packages)

@@ -18,12 +18,12 @@ from idlc.compare.packages import (
     added_package,
     against,
     allowances,
+    combined,
     compare,
     compare_hashes,
     part_to_raise,
     raised,
     removed_package,
-    together,
     without_allowed,
 )
 from idlc.diagnostics import codes
@@ -194,7 +194,7 @@ def _compare(
             for package, model in old.items()
         ]
         come = (model for package, model in new.items() if package not in old)
-        whole = together([*changes, *map(added_package, come)])
+        whole = combined([*changes, *map(added_package, come)])
     elsewhere = {*map(str, others), *submodules}
     report.extend(
         _not_compared(names, reason, options, hint)

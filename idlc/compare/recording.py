@@ -39,7 +39,7 @@ def compare_with_recordings(
 ) -> RecordedVerdict | None:
     """Report changes since recordings were made; `None` if something could not be read.
 
-    The interfaces of PATHs are compared, or without any those of this machine. Without levels,
+    The interfaces of PATHs are compared, or without PATHs the ones of this machine. Without levels,
     only changes that affect readers are reported.
     """
     listing = look(options.paths, report, options.scope.exclude)

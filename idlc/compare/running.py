@@ -98,7 +98,7 @@ def joined(report: Report) -> Iterator[Graph | None]:
     except ImportError as error:
         hint = "source your ROS 2 and use its Python, or pip install ros-jazzy-rclpy"
         report.add(codes.NO_RCLPY.of("graph", f"this needs rclpy: {error}", hint=hint))
-    except Exception as error:  # rclpy has no common base for what goes wrong here
+    except Exception as error:  # rclpy's errors have no common base
         report.add(codes.NO_RCLPY.of("graph", f"rclpy cannot start a node: {error}"))
     if node is None:
         yield None

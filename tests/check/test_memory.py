@@ -46,8 +46,8 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
         seen.append("".join(sorted(name.name for name in found)))
         return found
 
-    real = IncrementalFindings.of
-    monkeypatch.setattr(IncrementalFindings, "of", of)
+    real = IncrementalFindings.still_valid
+    monkeypatch.setattr(IncrementalFindings, "still_valid", of)
     assert workspace.change(folder / "msg" / changed, text.encode())
     after = workspace.state()
     assert set(seen) == {kept}

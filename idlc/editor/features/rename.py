@@ -11,7 +11,7 @@ import msgspec
 
 from idlc.check.package.cmake import calls
 from idlc.compare.changes import LEVELS, Change
-from idlc.compare.packages import called, compare
+from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
@@ -183,7 +183,7 @@ def rename_interface(
     world.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
     move = Move(world.uri(path), uris.from_path(target))
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
-    changes = [called(home.interface, renamed)]
+    changes = [renamed_interface(home.interface, renamed)]
     return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, world)
 
 
