@@ -14,7 +14,6 @@ from idlc.generate.native.layouts import LAYOUTS
 from idlc.generate.native.library import FIELDS_CPP, MACHINES, OWN, hash_bytes, symbol, told
 from idlc.model import derive
 from idlc.project import inputs
-from idlc.project.files import absolute, shown
 from idlc.project.find import look
 from idlc.project.prefixes import (
     INDEX,
@@ -26,6 +25,7 @@ from idlc.project.prefixes import (
     prefixes,
 )
 from idlc.project.prefixes import machine as this_machine
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 _AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
 
 
-def check_prefix(folder: str, report: Report) -> Checked:
+def check_prefix(folder: str, root: Root, report: Report) -> Checked:
     """Report each package in a prefix, or in the prefixes in a folder, that stops recorders."""
-    found = prefixes(absolute(folder))
+    found = prefixes(root.absolute(folder))
     if not found:
         message = f"no packages are installed in `{folder}`: there is no share/ament_index"
         hint = "name the folder that is in AMENT_PREFIX_PATH, or colcon's `install`"
@@ -44,10 +44,10 @@ def check_prefix(folder: str, report: Report) -> Checked:
     for prefix in found:
         for package, why in inconsistencies(prefix):
             message = f"`{package}`, which is in ROS 2's index, {why}"
-            place = shown(prefix / INDEX)
+            place = root.shown(prefix / INDEX)
             report.add(codes.INCONSISTENT_INDEX.of(place, message, hint=_AGAIN))
     files = []
-    for one in (one for prefix in found for one in installed_packages(prefix)):
+    for one in (one for prefix in found for one in installed_packages(prefix, root)):
         model = _model(one)
         for identifier in (OWN, FIELDS_CPP):
             name = f"lib{one.package}__{identifier}.so"
@@ -67,9 +67,9 @@ def check_prefix(folder: str, report: Report) -> Checked:
 def _model(one: InstalledPackage) -> Model | None:
     """Return what a package's installed interfaces mean; `None` where idlc cannot say."""
     dropped = Report()
-    files = look((one.share,), dropped).files
-    given = inputs.load(one.package, files, one.prefix / "share" / one.package, dropped)
-    found = list(models_of((given,), Scope(include=(str(one.prefix),)), dropped))
+    files = look((one.share,), one.root, dropped).files
+    given = inputs.load(one.package, files, one.prefix / "share" / one.package, one.root, dropped)
+    found = list(models_of((given,), Scope(one.root, include=(str(one.prefix),)), dropped))
     return None if dropped.had_errors or not files else found[0][1]
 
 

@@ -12,7 +12,6 @@ from idlc.check.package.facts import facts
 from idlc.check.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import inputs
-from idlc.project.files import absolute
 from idlc.project.find import KINDS, look, nothing_in
 from idlc.project.settings import Scope
 
@@ -31,7 +30,7 @@ class CheckOptions(msgspec.Struct, frozen=True):
     """What `idlc check` was asked to do."""
 
     paths: tuple[str, ...]
-    scope: Scope = Scope()
+    scope: Scope
     selection: Selection = Selection()
     fix: bool = False
 
@@ -56,7 +55,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
         from idlc.recordings.find import divided
 
-        recordings, others = divided(options.paths)
+        recordings, others = divided(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0
@@ -68,7 +67,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
             break
         from idlc.project.atomic import edit
 
-        done = edit(edits, report, tidied)
+        done = edit(edits, options.scope.root, report, tidied)
         fixed += done
         if not done:
             break
@@ -111,11 +110,12 @@ def tidied(name: str, old: str, new: str) -> str:
 
 def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
-    there = look(options.paths, report, scope.exclude, scope.unsaved)
+    root = scope.root
+    there = look(options.paths, root, report, scope.exclude)
     packages = inputs.packages(there.files, scope, report, there.packages)
     for path in there.empty:
-        if not any(one.home.is_relative_to(absolute(path)) for one in packages):
-            report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
+        if not any(one.home.is_relative_to(root.absolute(path)) for one in packages):
+            report.add(nothing_in(path, root, scope.exclude, also="package.xml and no "))
     found: dict[str, Report] = {}
     models: list[Model] = []
     for distro, checker in checkers(packages, scope).items():
@@ -188,9 +188,8 @@ class Checker:
 
     def around(self, given: inputs.Inputs) -> Facts | None:
         """Return what surrounds a package, with the texts that it has now."""
-        scope = self._scope
         if given.package not in self._facts:
-            found = facts(given, self.library.packages, scope.exclude, scope.unsaved)
+            found = facts(given, self.library.packages, self._scope)
             self._facts[given.package] = found
         known = self._facts[given.package]
         if known is None or not known.inputs:

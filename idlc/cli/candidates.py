@@ -9,6 +9,7 @@ from idlc.model import ir
 from idlc.model.distros import BY_NAME
 from idlc.project import inputs
 from idlc.project.library import Library
+from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 
 
@@ -34,7 +35,7 @@ def types(
     package, slash, rest = word.partition("/")
     if slash:
         return sorted(_within(package, rest, library, kinds))
-    near = list(inputs.near())
+    near = list(inputs.near(Root.here()))
     named = {
         one.name
         for name in (library.packages() if bare == "all" else near)
@@ -56,7 +57,7 @@ def topics(word: str, paths: Sequence[str]) -> list[str]:
     from idlc.recordings.find import divided
     from idlc.recordings.versions import read
 
-    found = (read(path, Report()) for path in divided(paths)[0])
+    found = (read(path, Report()) for path in divided(paths, Root.here())[0])
     names = {one.topic.name for recording in found if recording for one in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 
@@ -74,7 +75,7 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
 
 def _library(include: Sequence[str], distro: str | None) -> Library:
     """Return what is there for the distribution that was typed, else for the one that is meant."""
-    report = Report()
+    report, root = Report(), Root.here()
     known = distro if distro in BY_NAME else None
-    meant = scope(load_settings(report), distro=known).distro
-    return Library(include, report, own=inputs.near(), distro=meant)
+    meant = scope(load_settings(root, report), distro=known).distro
+    return Library(include, root, report, own=inputs.near(root), distro=meant)

@@ -74,12 +74,13 @@ def command(wanted: str, fields: str | None, **given: Any) -> int:
     from idlc.cli import output
     from idlc.cli.output import shown
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.recordings.columns import ColumnsOptions, columns
     from idlc.recordings.find import divided, expanded
 
     report = Report()
     names = None if fields is None else tuple(one.strip() for one in fields.split(","))
-    recordings, topics = divided(given.pop("topics"))
+    recordings, topics = divided(given.pop("topics"), Root.here())
     paths = (*expanded(wanted), *recordings)
     asked = ColumnsOptions(paths or (wanted,), tuple(topics), fields=names, **given)
     with shown(sys.stderr) as tell:

@@ -10,6 +10,7 @@ from idlc.check import select
 from idlc.check.run import Checked, CheckOptions, check
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
+from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 
 
@@ -33,14 +34,14 @@ def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
     """Check what paths mean, or pyproject.toml, or the working folder; return the exit status."""
     wishes = wishes or Wishes()
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     configured = select.selection(settings, report)
     chosen = configured.with_lists(wishes.select, wishes.ignore)
     checked = Checked(())
     if wishes.prefix is not None:
         from idlc.check.prefix import check_prefix
 
-        checked = check_prefix(wishes.prefix, report)
+        checked = check_prefix(wishes.prefix, settings.root, report)
     elif not report.had_errors:
         wanted = CheckOptions(
             paths=paths or settings.paths or (".",),

@@ -134,7 +134,8 @@ def _snapshot(wanted: GenOptions) -> dict[str, Stamp]:
     from idlc.project.find import snapshot, stamps
     from idlc.recordings.find import files
 
-    return snapshot(wanted.paths, wanted.scope.include) | stamps(files(wanted.paths))
+    root = wanted.scope.root
+    return snapshot(wanted.paths, wanted.scope.include, root) | stamps(files(wanted.paths, root))
 
 
 EPILOG = """\
@@ -198,10 +199,11 @@ def command(style: str, watch: bool, **given: Any) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     if report.had_errors:
         refuse(report, style)
         return output.status(report)
@@ -213,7 +215,7 @@ def command(style: str, watch: bool, **given: Any) -> int:
     if not wanted.paths or not (wanted.out or wanted.ament):
         missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    _refuse_in_vain(wanted.paths, package, wanted.topics)
+    _refuse_in_vain(wanted, package)
     if wanted.check and (watch or wanted.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
@@ -225,15 +227,16 @@ def command(style: str, watch: bool, **given: Any) -> int:
     return once(wanted, style)
 
 
-def _refuse_in_vain(paths: Sequence[str], package: str | None, topics: Sequence[str]) -> None:
+def _refuse_in_vain(wanted: GenOptions, package: str | None) -> None:
     """Refuse options that mean nothing for what was given."""
     from idlc.project.find import is_path
     from idlc.recordings.find import divided
 
-    recordings, others = divided(paths) if package or topics else ((), ())
-    if topics and not recordings:
+    root = wanted.scope.root
+    recordings, others = divided(wanted.paths, root) if package or wanted.topics else ((), ())
+    if wanted.topics and not recordings:
         raise click.UsageError("--topic is for recordings, and none was given")
-    if package and not any(map(is_path, others)):
+    if package and not any(is_path(word, root) for word in others):
         what = "what was recorded" if recordings else "what is installed"
         raise click.UsageError(
             f"--package is for files, and none was given; {what} keeps the name that messages have"

@@ -177,11 +177,12 @@ def command(name: str, **given: Any) -> int:
     to package.xml and the node to the launch file, unless it does one thing and ends.
     """
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
     from idlc.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
-    settings = Settings(**{key: given[key] for key in shared})
+    settings = Settings(Root.here(), **{key: given[key] for key in shared})
     asked = any(given[role.name] for role in ROLES) or given["parameters"] or given["lifecycle"]
     try:
         spec.check_name(name)

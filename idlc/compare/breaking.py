@@ -30,13 +30,14 @@ from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
-from idlc.project.files import NOTHING_OPEN, absolute, is_folder
+from idlc.project.files import is_folder
 from idlc.project.find import InterfaceFile, find, look, nothing_in
 from idlc.project.git import Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import manifest, read_statements
-from idlc.project.settings import Config, Scope, working_in
+from idlc.project.package_xml import read_statements
+from idlc.project.root import Root
+from idlc.project.settings import Config, Scope
 from idlc.wire.layout import Extents, oversized
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ class BreakingOptions(NamedTuple):
 
     paths: tuple[str, ...]
     against: str
-    scope: Scope = Scope()
+    scope: Scope
     levels: tuple[str, ...] = LEVELS
     allowed: tuple[Allowance, ...] = ()
     allowed_in: str = ""
@@ -78,14 +79,16 @@ class Verdict(NamedTuple):
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     """Report each change that breaks something; `None` if a version could not be compiled."""
-    there = look(options.paths, report, options.scope.exclude)
+    there = look(options.paths, options.scope.root, report, options.scope.exclude)
     given = inputs.packages(there.files, options.scope, report)
     comparison = None if report.had_errors else _against(options, given, report)
     if comparison is None:
         return None
     if there.empty and not (comparison.differs or report.had_errors):
         # of what was removed, there is something to compare with
-        report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
+        report.extend(
+            nothing_in(one, options.scope.root, options.scope.exclude) for one in there.empty
+        )
         return None
     if comparison.left_out:  # for which allowances may be
         changes = not_allowed(comparison.changes, options, report)
@@ -98,7 +101,7 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     part = None
     if not (comparison.left_out or is_distro(options.against)):
         part = part_to_raise(comparison)
-    version = _version(given, report)
+    version = _version(given, options.scope.root, report)
     return Verdict(
         {level: sum(level in change.levels for change in wanted) for level in LEVELS},
         len(comparison.changes) - len(changes),
@@ -128,12 +131,12 @@ def _against(
         return compare_with_distro(options.against, given, options.scope, report)
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
-        with checked_out(name, options.paths[0], report) as revision:
+        with checked_out(name, options.paths[0], options.scope.root, report) as revision:
             found = revision and _compare(options, given, revision, report)
         return found and found.placed(f"{options.against}:")
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, given, report)
-    if is_revision(options.against, options.paths[0]):
+    if is_revision(options.against, options.paths[0], options.scope.root):
         report.add(
             codes.NO_SUCH_PATH.of(
                 options.against,
@@ -163,7 +166,8 @@ def earlier(
     """Return the packages as they are in a folder or git revision; `None` after errors."""
     if not options.against.startswith(GIT):
         return _before(options, given, None, report)
-    with checked_out(options.against.removeprefix(GIT), options.paths[0], report) as revision:
+    name, root = options.against.removeprefix(GIT), options.scope.root
+    with checked_out(name, options.paths[0], root, report) as revision:
         return _before(options, given, revision, report) if revision else None
 
 
@@ -251,19 +255,19 @@ def _before(
 ) -> Side | None:
     scope = options.scope
     if revision is None:
-        files = find([options.against], report, scope.exclude)
+        files = find([options.against], scope.root, report, scope.exclude)
     else:
         files = revision.files(options.paths, scope.exclude, report)
         include = tuple(revision.counterpart(path) or path for path in scope.include)
         scope = msgspec.structs.replace(
-            scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
+            scope, include=include, exclude=scope.exclude.seen_from(revision.folder, revision.top)
         )
     found = Report()
     old = _named_alike(inputs.packages(files, scope, found), given, files, scope, found)
     report.extend(one for one in found if one.code in codes.USAGE)
     if any(one.code in codes.USAGE for one in report):
         return None
-    homes = {one.home: files for one in old} if scope.package else by_home(files)
+    homes = {one.home: files for one in old} if scope.package else by_home(files, scope.root)
     return _side(old, homes, scope, found)
 
 
@@ -310,7 +314,7 @@ def _named_alike(
     """Give two single packages one name, unless both are named by a package.xml."""
     if len(old) != 1 or len(new) != 1 or old[0].package == new[0].package:
         return old
-    if all(manifest(one.folders[0]) for one in (old[0], new[0]) if one.folders):
+    if all(scope.root.manifest(one.folders[0]) for one in (old[0], new[0]) if one.folders):
         return old
     return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
@@ -331,7 +335,7 @@ def _compare_with_lock(
     options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
     folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
-    known = load_lock(absolute(folder), folder, report)
+    known = load_lock(options.scope.root.absolute(folder), folder, report)
     if known is None:
         if not report.had_errors:
             report.add(codes.NO_SUCH_PATH.of(options.against, f"no such file: `{options.against}`"))
@@ -339,7 +343,7 @@ def _compare_with_lock(
     mine = [one for one in given if one.package == known.package]
     if len(given) == 1 and not mine:
         named = msgspec.structs.replace(options.scope, package=known.package)
-        files = find(options.paths, report, named.exclude)
+        files = find(options.paths, named.root, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
     models = sound_ones(mine, options.scope, report)
     if report.had_errors:
@@ -351,12 +355,12 @@ def _compare_with_lock(
         return found._replace(differs=found.differs or not same)
 
 
-def _version(given: tuple[inputs.Inputs, ...], report: Report) -> str | None:
+def _version(given: tuple[inputs.Inputs, ...], root: Root, report: Report) -> str | None:
     """Return the version in the package.xml if there is one package only."""
     if len(given) != 1 or not given[0].folders:
         return None
-    path = manifest(given[0].folders[0])
-    found = read_statements(path, path.as_posix(), report) if path else ()
+    path = root.manifest(given[0].folders[0])
+    found = read_statements(path, path.as_posix(), root, report) if path else ()
     return next((one.text for one in found if one.tag == "version"), None)
 
 
@@ -369,13 +373,13 @@ class Earlier:
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
         ignored = Report()  # `idlc breaking` tells what is wrong in its table
         said = wished or packages.against(settings, ignored) or ""
-        comparable = said.startswith(GIT) or (bool(said) and is_folder(absolute(folder / said)))
+        comparable = said.startswith(GIT) or (bool(said) and is_folder(folder / said))
         self._folder = folder
         self.name = said if comparable else ""
         self._options = BreakingOptions(
             (),
             self.name,
-            msgspec.structs.replace(scope, unsaved=NOTHING_OPEN),
+            scope,
             allowed=packages.allowances(settings, ignored),
         )
         self.commit: str | None = None
@@ -386,9 +390,11 @@ class Earlier:
         if self.has_moved() or self._side is None:
             report = Report()
             paths = tuple(one.home.as_posix() for one in packages)
-            options = self._options._replace(paths=paths)
-            with working_in(self._folder):
-                found = earlier(options, tuple(packages), report) if paths and self.name else None
+            # what is open is what that version is compared with
+            scope = self._options.scope
+            scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
+            options = self._options._replace(paths=paths, scope=scope)
+            found = earlier(options, tuple(packages), report) if paths and self.name else None
             why = next((one.message for one in report if one.severity is Severity.ERROR), "")
             self._side = found or Side({}, frozenset(), why)
         return self._side
@@ -403,7 +409,7 @@ class Earlier:
         if not self.name.startswith(GIT):
             return False
         name = self.name.removeprefix(GIT)
-        before, self.commit = self.commit, git.commit(name, str(self._folder)) or ""
+        before, self.commit = self.commit, git.commit(name, self._folder) or ""
         if before == self.commit:
             return False
         self._side = None
@@ -411,7 +417,7 @@ class Earlier:
 
     def repository(self) -> tuple[Path, ...]:
         """Return the folders in which git notes what a name means; none without a repository."""
-        return git.places(str(self._folder)) if self.name.startswith(GIT) else ()
+        return git.places(self._folder) if self.name.startswith(GIT) else ()
 
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that nobody allowed in the settings."""

@@ -68,7 +68,12 @@ class _Layered(Library):
     ) -> None:
         own = {one.package: one.folders for one in given}
         super().__init__(
-            scope.include, Report(), own=own, exclude=scope.exclude, distro=scope.distro
+            scope.include,
+            scope.root,
+            Report(),
+            own=own,
+            exclude=scope.exclude,
+            distro=scope.distro,
         )
         self.other = other
         self._other_first = other_first

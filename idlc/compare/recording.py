@@ -14,7 +14,6 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.files import absolute, shown
 from idlc.project.find import look, nothing_in
 from idlc.recordings.types import NAMED, Around, recorded_types
 from idlc.recordings.versions import topics_of, versions
@@ -42,8 +41,8 @@ def compare_with_recordings(
     Compared are the interfaces of PATHs, or without any those that are known here. Without levels,
     only what concerns readers is reported.
     """
-    there = look(options.paths, report, options.scope.exclude)
-    report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
+    there = look(options.paths, options.scope.root, report, options.scope.exclude)
+    report.extend(nothing_in(one, options.scope.root, options.scope.exclude) for one in there.empty)
     found = Report()
     given = inputs.packages(there.files, options.scope, found)
     report.extend(found)
@@ -76,6 +75,7 @@ class _Here:
         self, given: Sequence[inputs.Inputs], options: BreakingOptions, report: Report
     ) -> None:
         self.around = Around(options.scope, report)
+        self._root = options.scope.root
         self._given = {one.package: one for one in given}
         self._models = sound_ones(given, options.scope, report)
         self._unknown: set[ir.TypeName] = set()
@@ -91,7 +91,7 @@ class _Here:
                 self._unknown |= _names(old) - _names(new)
             elif model.package in self._given:
                 new = self._models[model.package]
-                if self._given[model.package].is_whole:
+                if self._given[model.package].is_whole(self._root):
                     yield old, new  # what is not there was removed
                     continue
             else:
@@ -101,7 +101,7 @@ class _Here:
     def placed(self, changes: Iterable[Change], package: str) -> list[Change]:
         """Return changes, those of what was removed with the place where it would be."""
         given = self._given.get(package)
-        home = shown(absolute(given.home)) if given else ""
+        home = self._root.shown(given.home) if given else ""
         return [
             one._replace(place=f"{home}/{one.path.rpartition(f'{package}/')[2]}")
             if given and not one.span

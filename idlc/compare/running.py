@@ -344,9 +344,11 @@ def _empty(patience: float) -> Diagnostic:
 
 def _given(options: BreakingOptions, report: Report, *, is_given: bool) -> list[Model]:
     """Return the models of the files that were given, or that are found here."""
-    there = look(options.paths, report, options.scope.exclude)
+    there = look(options.paths, options.scope.root, report, options.scope.exclude)
     if is_given:
-        report.extend(nothing_in(one, options.scope.exclude) for one in there.empty)
+        report.extend(
+            nothing_in(one, options.scope.root, options.scope.exclude) for one in there.empty
+        )
     packages = inputs.packages(there.files, options.scope, report)
     found = Report()
     models = [model for _, model in models_of(packages, options.scope, found)]
@@ -381,7 +383,7 @@ def _add(model: Model, known: dict[Key, Model]) -> Iterator[Key]:
 def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
     """Yield the models of interfaces that are installed, or found along -I; broken ones are not."""
     dropped = Report()
-    library = Library(scope.include, dropped, distro=scope.distro)
+    library = Library(scope.include, scope.root, dropped, distro=scope.distro)
     compiler = Compiler(library)
     for name in sorted(set(map(interface_of, names))):
         try:

@@ -78,20 +78,20 @@ def wanted_models(
 
     What has errors is left out.
     """
-    paths = [one for one in wanted if is_path(one)]
+    paths = [one for one in wanted if is_path(one, scope.root)]
     for one in wanted:
         if one not in paths:
             found = Report()
             yield from _named(one, scope, found)
             report.extend(found)
-    recordings, paths = divided(paths)
+    recordings, paths = divided(paths, scope.root)
     if recordings:
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(recordings, scope, report)
     if paths:
         there = Report()
-        given = inputs.packages(find(paths, there, scope.exclude), scope, there)
+        given = inputs.packages(find(paths, scope.root, there, scope.exclude), scope, there)
         report.extend(there)
         report.notes += there.notes
         if not there.had_errors:

@@ -13,9 +13,9 @@ from idlc.editor.protocol import uris
 from idlc.editor.protocol.parts import Change, DocumentItem, Range
 from idlc.editor.protocol.positions import in_lines, lines_of
 from idlc.model import ir
-from idlc.project.files import Unsaved, absolute
 from idlc.project.find import KINDS
 from idlc.project.lock import digest
+from idlc.project.root import Root
 
 #: The language id of interface files.
 LANGUAGE = "rosmsg"
@@ -83,11 +83,13 @@ def _draft(item: DocumentItem) -> Path | None:
     if scheme != "untitled" or item.language_id != LANGUAGE:
         return None
     if Path(name).suffix in KINDS:
-        return absolute(unquote(name))
+        return Root.here().absolute(unquote(name))
     marks = sum(line.rstrip() == "---" for line in item.text.splitlines())
     kind = ir.KINDS[min(marks, len(ir.KINDS) - 1)]
     stem = re.sub(r"[^A-Za-z0-9]", "", name.rpartition("/")[2])
-    return absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
+    return Root.here().absolute(
+        f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}"
+    )
 
 
 class Documents:
@@ -116,6 +118,6 @@ class Documents:
         """Return the open document of a file: of two URIs for it, that whose text counts."""
         return next((one for one in reversed(self._open.values()) if one.path == path), None)
 
-    def unsaved(self) -> Unsaved:
+    def texts(self) -> dict[Path, bytes]:
         """Return what counts instead of the files on disk."""
-        return Unsaved({one.path: one.data for one in self if one.path is not None})
+        return {one.path: one.data for one in self if one.path is not None}

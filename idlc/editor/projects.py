@@ -75,7 +75,7 @@ class Project:
     def load(self, documents: Documents) -> None:
         """Read what is on disk, unless that was done; raises OSError."""
         if self._documents is None:
-            self.workspace.load(documents.unsaved())
+            self.workspace.load(documents.texts())
             self._documents = documents
 
     def has(self, path: Path) -> bool:

@@ -6,9 +6,11 @@ next load: what an editor has open counts instead of what its file holds.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -19,15 +21,13 @@ from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
-from idlc.project.files import MAX_SIZE, Unsaved, absolute
+from idlc.project.files import MAX_SIZE
 from idlc.project.find import Found, Picture, look, root_of
-from idlc.project.inputs import locks, places
-from idlc.project.package_xml import MANIFEST, manifest
-from idlc.project.settings import load_settings, scope, working_in
+from idlc.project.inputs import places
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from idlc.check.select import Selection
     from idlc.compare.breaking import Earlier, Side
     from idlc.diagnostics.report import Diagnostic, Edit
@@ -59,6 +59,7 @@ class State(msgspec.Struct, frozen=True, dict=True):
     """
 
     folder: Path
+    root: Root
     problems: tuple[Diagnostic, ...]
     models: Mapping[str, Model]
     library: Library
@@ -95,12 +96,11 @@ class State(msgspec.Struct, frozen=True, dict=True):
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface of any package."""
-        with working_in(self.folder):
-            return self.library.source(name)
+        return self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""
-        return absolute(self.folder / source.path)
+        return Path(os.path.normpath(self.folder / source.path))
 
 
 class Workspace:
@@ -115,7 +115,7 @@ class Workspace:
         self._paths = paths
         self._earlier: dict[str, Earlier] = {}
 
-    def load(self, unsaved: Unsaved) -> None:
+    def load(self, texts: Mapping[Path, bytes]) -> None:
         """Read what there is; problems that do not depend on texts are remembered.
 
         Raises OSError if the folder is gone.
@@ -125,32 +125,36 @@ class Workspace:
         self._packages: tuple[inputs.Inputs, ...] = ()
         there = Found((), (), (), {})
         begun = time.time_ns()
-        with working_in(self.folder), without_options():
+        self._root = root = Root.at(self.folder, texts)
+        with without_options():
             wishes = self._wishes
-            self._settings = settings = load_settings(report, unsaved)
+            self._settings = settings = load_settings(root, report)
             selected = select.selection(settings, report)
             self._selection = selected.with_lists(wishes.select, wishes.ignore)
-            found = scope(
+            self._scope = scope(
                 settings, wishes.package or None, wishes.include, wishes.exclude, wishes.distro
             )
-            self._scope = msgspec.structs.replace(found, unsaved=unsaved)
             # a mistake in the settings stops the command line, too
             if not report.had_errors:
                 paths = self._paths or settings.paths or (".",)
-                there = look(paths, report, found.exclude, unsaved)
+                there = look(paths, root, report, self._scope.exclude)
                 self._packages = inputs.packages(there.files, self._scope, report, there.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
-            files = (path for path in self._read(there) if not unsaved.has(path))
+            files = (path for path in self._read(there) if not root.is_open(path))
             self._picture = Picture(there.folders, files, begun)
         self._places = {
-            absolute(self.folder / one.file.path): (number, at)
+            self._absolute(one.file.shown): (number, at)
             for number, given in enumerate(self._packages)
             for at, one in enumerate(given.files)
         }
 
+    def _absolute(self, path: str) -> Path:
+        """Return the path of a file as the editor spells the folder, which may be a link."""
+        return Path(os.path.normpath(self.folder / path))
+
     def _read(self, there: Found) -> Iterator[Path]:
         """Yield the absolute paths of the files that a load reads in packages and for settings."""
-        yield from (absolute(one.path) for one in there.files)
+        yield from (self._root.absolute(one.path) for one in there.files)
         homes = {self.folder, *there.packages, *(one.root for one in there.files)}
         homes |= {self._settings.folder} if self._settings.folder else set()
         yield from (home / name for home in homes for name in AROUND)
@@ -190,8 +194,8 @@ class Workspace:
     def _is_named_by_lock(self, number: int) -> bool:
         """Return whether the texts of a package may decide what it is called."""
         home = self._packages[number].home
-        with working_in(self.folder):
-            return not manifest(home) and any(map(locks, places(home)))
+        root = self._root
+        return not root.manifest(home) and any(map(root.locks, places(home, root)))
 
     def concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change what is known."""
@@ -199,7 +203,7 @@ class Workspace:
             path.parent
         ):
             return True
-        folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
+        folders = (self.folder, *(self._absolute(one) for one in self._scope.include))
         return any(path.is_relative_to(one) for one in (*folders, *prefixes.ament_prefixes()))
 
     def name_of(self, path: Path) -> ir.TypeName:
@@ -238,8 +242,7 @@ class Workspace:
 
     def _around(self, path: Path) -> Facts | None:
         given = self._packages[self._places[path][0]]
-        with working_in(self.folder):
-            return next(iter(self._checkers.values())).around(given)
+        return next(iter(self._checkers.values())).around(given)
 
     def earlier(self, against: str = "") -> Earlier:
         """Return what the packages are compared with: `against`, or what pyproject.toml says."""
@@ -263,7 +266,7 @@ class Workspace:
         """Return what is known now."""
         found: dict[str, Report] = {}
         models: dict[str, list[Model]] = {}
-        with working_in(self.folder), without_options():
+        with without_options():
             for distro, checker in self._checkers.items():
                 found[distro] = Report()
                 models[distro] = checker.check(self._packages, self._selection, found[distro])
@@ -272,6 +275,7 @@ class Workspace:
         first = next(iter(self._checkers))
         return State(
             self.folder,
+            self._root,
             tuple(problems),
             {model.package: model for model in models[first]},
             self._checkers[first].library,
@@ -284,9 +288,8 @@ def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
 
     That is its package; without a package.xml, only the file with those that it refers to.
     """
-    root = root_of(str(path.parent))
-    manifest.cache_clear()  # there may be another since the last look
-    declared = manifest(root)
+    folder = root_of(str(path.parent))
+    declared = Root(folder).manifest(folder)
     if declared is None:
-        return root, (path.relative_to(root).as_posix(),)
+        return folder, (path.relative_to(folder).as_posix(),)
     return declared.parent, (".", path.relative_to(declared.parent).as_posix())

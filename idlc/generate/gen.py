@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
+
 from idlc.check.compiler import Compiler, library_for
 from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
@@ -16,13 +18,14 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
-from idlc.project.files import absolute, is_file, shown
+from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import resolve
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import declared_name, manifest
-from idlc.project.settings import Config, Scope, load_settings, scope, working_in
-from idlc.recordings.find import divided
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
+from idlc.project.settings import Config, Scope, load_settings, scope
+from idlc.recordings.find import divided, is_recording
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -37,9 +40,9 @@ class GenOptions(NamedTuple):
     """
 
     paths: tuple[str, ...]
+    scope: Scope
     out: str = ""
     topics: tuple[str, ...] = ()
-    scope: Scope = Scope()
     check: bool = False
     vendor_deps: bool = False
     force: bool = False
@@ -63,16 +66,17 @@ def in_package(wanted: GenOptions) -> GenOptions:
     """
     if wanted.ament or (wanted.out and wanted.paths) or len(wanted.paths) > 1:
         return wanted
-    given = absolute(next(iter(wanted.paths), "."))
-    path = manifest(given)
+    root = wanted.scope.root
+    given = root.absolute(next(iter(wanted.paths), "."))
+    path = root.manifest(given)
     if path is None or (wanted.paths and path.parent != given):
         return wanted
-    name = declared_name(path, shown(path), Report())
+    name = declared_name(path, root, Report())
     if not name or not is_file(path.parent / "setup.py"):
         return wanted
     return wanted._replace(
-        paths=wanted.paths or (shown(path.parent),),
-        out=wanted.out or shown(home_of(path.parent, wanted.scope.package or name)),
+        paths=wanted.paths or (root.shown(path.parent),),
+        out=wanted.out or root.shown(home_of(path.parent, wanted.scope.package or name, root)),
     )
 
 
@@ -82,15 +86,19 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     runs += [options] if options.ament else []  # OUT may give the package its name
     done: list[Generated] = []
     for run in runs:
-        done += () if report.had_errors else _written(run, report)
+        if not report.had_errors:
+            root = options.scope.root.on_disk()  # a run sees what the one before it wrote
+            scope = msgspec.structs.replace(options.scope, root=root)
+            done += _written(run._replace(scope=scope), report)
     report.notes[:] = dict.fromkeys(report.notes)
     return () if report.had_errors else tuple(done)
 
 
 def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    recordings, others = divided(options.paths)
-    paths = [word for word in others if not is_name(word)]
-    words = [word for word in others if is_name(word)]
+    root = options.scope.root
+    recordings, others = divided(options.paths, root)
+    paths = [word for word in others if not is_name(word, root)]
+    words = [word for word in others if is_name(word, root)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: Mapping[ir.TypeName, Source] = {}
     if recordings and not report.had_errors:
@@ -103,7 +111,7 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     given = wanted(paths, named, options.out, options.scope, report)
-    whole = {one.package for one in given if one.is_whole or options.ament}.union(words)
+    whole = {one.package for one in given if one.is_whole(root) or options.ament}.union(words)
     _note_idl((one for one in given if one.package in whole), options.scope, report)
     found = _targets(given, options, report) if given else ()
     if not found:
@@ -132,7 +140,7 @@ def _targets(
 ) -> tuple[Target, ...]:
     """Return the folder that each package is written to."""
     if not options.ament:
-        return targets(given, options.out, report, force=options.force)
+        return targets(given, options.out, options.scope.root, report, force=options.force)
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
     prefix = options.ament.rstrip("/") or "/"
@@ -142,16 +150,18 @@ def _targets(
     )
     distros = [one.name for one in options.scope.distros]
     found = [
-        Overlay(prefix, name, home, report, force=options.force, distros=distros)
+        Overlay(
+            prefix, name, home, options.scope.root, report, force=options.force, distros=distros
+        )
         for name, home in homes
     ]
     return tuple(found) if found[0].usable() else ()
 
 
-def is_name(word: str) -> bool:
+def is_name(word: str, root: Root) -> bool:
     """Return whether a word means a type, or a package, rather than a path that is not there."""
     last = word.rpartition("/")[2]
-    return not is_path(word) and ("/" not in word or not last[:1].islower())
+    return not is_path(word, root) and ("/" not in word or not last[:1].islower())
 
 
 def named_packages(
@@ -239,8 +249,12 @@ class Run(NamedTuple):
 
     def make(self, report: Report) -> tuple[Generated, ...]:
         """Write, and return what was done; empty after an error. Raises OSError."""
-        with working_in(self.folder):
-            return gen(self.options, report)
+        root = Root.at(self.folder)
+        paths = tuple(
+            root.path(word) if is_recording(word, root) else word for word in self.options.paths
+        )
+        scope = msgspec.structs.replace(self.options.scope, root=root)
+        return gen(self.options._replace(paths=paths, scope=scope), report)
 
 
 def run_for(path: Path, package: str) -> Run | None:
@@ -257,10 +271,10 @@ def run_for(path: Path, package: str) -> Run | None:
 
 def _by_settings(folder: Path, path: Path) -> Run | None:
     report = Report()
-    with working_in(folder):
-        settings = load_settings(report)
-        wanted = with_settings(GenOptions((), scope=scope(settings)), settings)
-        covered = any(path.is_relative_to(absolute(one)) for one in wanted.paths)
+    root = Root.at(folder)
+    settings = load_settings(root, report)
+    wanted = with_settings(GenOptions((), scope(settings)), settings)
+    covered = any(path.is_relative_to(root.absolute(one)) for one in wanted.paths)
     return Run(folder, wanted) if wanted.out and covered and not report.had_errors else None
 
 
@@ -269,8 +283,7 @@ def _by_lock(path: Path, package: str) -> Run | None:
     for out in (home / package, home):
         lock = load_lock(out, "", Report())
         if lock is not None and lock.package == package:
-            with working_in(home):
-                found = scope(load_settings(Report()), package)
+            found = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), name, scope=found, vendor_deps=lock.vendor_deps))
+            return Run(home, GenOptions((".",), found, name, vendor_deps=lock.vendor_deps))
     return None

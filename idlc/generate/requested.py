@@ -14,12 +14,13 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.generate.target import Target
 from idlc.model import catalog, ir
 from idlc.project import inputs
-from idlc.project.files import absolute, is_file, shown
+from idlc.project.files import is_file
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, places, several
 from idlc.project.library import Library
 from idlc.project.lock import FILE
-from idlc.project.package_xml import declared_name, manifest
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 
@@ -34,34 +35,35 @@ def wanted(
 
     Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
     """
-    files = find(paths, report, scope.exclude) if paths else ()
+    files = find(paths, scope.root, report, scope.exclude) if paths else ()
     found = list(named)
     for one in named:
         accept_name(one.package, "the command line", report)
     if files and not report.had_errors:
         found += _from_files(files, "" if found else out, scope, report)
     usage = [one for one in report if one.code in codes.USAGE]
-    return () if usage else inputs.without_duplicates(found, report)
+    return () if usage else inputs.without_duplicates(found, scope.root, report)
 
 
 def _from_files(
     files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
     """Return files by package: as one that is called like `out` if nothing says otherwise."""
-    homes = by_home(files)
-    apart = [] if scope.package else several(homes)
-    if _mixed(apart, report):
+    root = scope.root
+    homes = by_home(files, root)
+    apart = [] if scope.package else several(homes, root)
+    if _mixed(apart, root, report):
         return ()
-    declared = next((path for home in homes if (path := manifest(home))), None)
+    declared = next((path for home in homes if (path := root.manifest(home))), None)
     if apart or not out:
         found = inputs.packages(files, scope, report)
-        origins = ["package.xml" if manifest(one.home) else "its folder" for one in found]
+        origins = ["package.xml" if root.manifest(one.home) else "its folder" for one in found]
     else:
         name, origins = scope.package, ["--package"]
         if name is None and declared:
-            name, origins = declared_name(declared, shown(declared), report), ["package.xml"]
+            name, origins = declared_name(declared, root, report), ["package.xml"]
         if name is None:
-            name, origins = absolute(out).name, ["the folder given with -o"]
+            name, origins = root.absolute(out).name, ["the folder given with -o"]
             if catalog.is_standard(name) and min(homes).name != name:
                 report.add(
                     codes.UNIMPORTABLE_PACKAGE.of(
@@ -70,9 +72,9 @@ def _from_files(
                         hint=f"choose another folder; add `--package {name}` if they are its files",
                     )
                 )
-            _tell(name, min(homes), out, report)
-        found = (inputs.load(name, files, min(homes), report),)
-    if out and any(absolute(str(file.path.parent)) == absolute(out) for file in files):
+            _tell(name, min(homes), out, root, report)
+        found = (inputs.load(name, files, min(homes), root, report),)
+    if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
                 out,
@@ -85,24 +87,24 @@ def _from_files(
     return found
 
 
-def _tell(name: str, home: Path, out: str, report: Report) -> None:
+def _tell(name: str, home: Path, out: str, root: Root, report: Report) -> None:
     """Note a name that other commands cannot know."""
-    if name != home.name and absolute(out).parent not in places(home):
+    if name != home.name and root.absolute(out).parent not in places(home, root):
         report.notes.append(
             f"the package is called `{name}`, as the folder given with -o; other commands need "
             f"`--package {name}`, or a package.xml beside the interfaces"
         )
 
 
-def _mixed(homes: Sequence[Path], report: Report) -> bool:
+def _mixed(homes: Sequence[Path], root: Root, report: Report) -> bool:
     """Report folders of interfaces within each other that no package.xml tells apart."""
-    loose = [home for home in homes if not manifest(home)]
+    loose = [home for home in homes if not root.manifest(home)]
     if not any(set(home.parents) & set(homes) for home in loose):
         return False
-    names = first_few((f"`{shown(home)}`" for home in homes), 5)
+    names = first_few((f"`{root.shown(home)}`" for home in homes), 5)
     report.add(
         codes.SEVERAL_PACKAGES.of(
-            shown(homes[0]),
+            root.shown(homes[0]),
             f"these may be one package or {len(homes)}: {names}",
             hint="give --package NAME to compile them as one, or each folder a package.xml",
         )
@@ -162,18 +164,18 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
 
 
 def targets(
-    given: Sequence[inputs.Inputs], out: str, report: Report, *, force: bool
+    given: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
     Reports IDL608 where a package of an earlier run is in the way, IDL612 for what is no folder.
     """
-    top = absolute(out)
+    top = root.absolute(out)
     if len(given) == 1:
         package = given[0].package
         beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
         folder = f"{out}/{package}" if beside_others else out
-        found = [Target(folder, package, report, force=force)]
+        found = [Target(folder, package, root, report, force=force)]
     elif is_file(top / FILE):
         message = f"`{out}` holds one package, and these are {len(given)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
@@ -181,5 +183,5 @@ def targets(
         return ()
     else:
         base = out.rstrip("/") or out
-        found = [Target(f"{base}/{g.package}", g.package, report, force=force) for g in given]
+        found = [Target(f"{base}/{g.package}", g.package, root, report, force=force) for g in given]
     return tuple(found) if all(one.usable() for one in found) else ()

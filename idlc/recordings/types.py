@@ -43,8 +43,10 @@ class Around:
     """The types that are known here without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
-        self.near = inputs.near()
-        self.library = Library(scope.include, report, own=self.near, distro=scope.distro)
+        self.near = inputs.near(scope.root)
+        self.library = Library(
+            scope.include, scope.root, report, own=self.near, distro=scope.distro
+        )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
 
@@ -112,7 +114,12 @@ class RecordedTypes:
         texts = {name: one for name, one in version.texts.items() if name not in broken}
         texts |= _empty_ones(version.topics, texts, around)
         self.library = Library(
-            scope.include, Report(), own=around.near, distro=scope.distro, texts=texts
+            scope.include,
+            scope.root,
+            Report(),
+            own=around.near,
+            distro=scope.distro,
+            texts=texts,
         )
         self.topics = tuple(_typed(version.topics, texts, around, report))
         self._compiler = Compiler(self.library)

@@ -206,13 +206,13 @@ def package(
     files that stay as they are say otherwise.
     """
     name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
-    project = Project(name, report, force=settings.force)
+    project = Project(name, settings.root, report, force=settings.force)
     used = templates(settings, report)
     if report.had_errors:
         return None
     files: dict[str, str] = {}
     with rendering(wanted.name, report):
-        there = catalog.packages(scope(load_settings(report)).distro)
+        there = catalog.packages(scope(load_settings(settings.root, report)).distro)
         depends = tuple(name for name in wanted.depends if name in there)  # Humble lacks one
         files = package_files(wanted._replace(depends=depends), used)
     if not any(project.names(kind) for kind in ir.KINDS):

@@ -4,7 +4,6 @@ import pytest
 
 from idlc.check.registry import Memory
 from idlc.editor.workspace import Wishes, Workspace
-from idlc.project.files import NOTHING_OPEN
 
 FILES = {
     "A.msg": "B b\n",
@@ -37,7 +36,7 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
     folder, monkeypatch, changed, text, kept
 ):
     workspace = Workspace(folder, Wishes())
-    workspace.load(NOTHING_OPEN)
+    workspace.load({})
     workspace.state()
     seen = []
 
@@ -53,7 +52,7 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
     assert set(seen) == {kept}
     fresh = Workspace(folder, Wishes())
     (folder / "msg" / changed).write_text(text)
-    fresh.load(NOTHING_OPEN)
+    fresh.load({})
     told, expected = (
         [(one.code, one.message, one.where) for one in state.problems]
         for state in (after, fresh.state())

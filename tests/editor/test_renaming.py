@@ -13,7 +13,6 @@ from lsprotocol import types as lsp
 from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
 from idlc.editor.protocol.framing import RequestError
 from idlc.editor.workspace import Wishes, Workspace
-from idlc.project.files import Unsaved
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 
@@ -506,7 +505,7 @@ class Sequence:
         named = set(re.findall(r'"(msg/\w+\.msg)"', texts["base/CMakeLists.txt"]))
         there = {one.removeprefix("base/") for one in texts if one.startswith("base/msg/")}
         assert named == there, step
-        overlaid = Unsaved({path: text.encode() for path, text in self.client.texts.items()})
+        overlaid = {path: text.encode() for path, text in self.client.texts.items()}
         workspace = Workspace(self.folder, Wishes())
         workspace.load(overlaid)
         state = workspace.state()

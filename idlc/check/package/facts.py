@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 from idlc.check.package.cmake import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.project import lock
-from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, shown
-from idlc.project.find import CLOSING, KINDS, NOTHING, SKIPPED, Exclusions
+from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import Facts, GeneratedOutput, manifest, statements
+from idlc.project.package_xml import Facts, GeneratedOutput, statements
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
+    from idlc.project.root import Root
 
 #: Python packages of ROS 2 that have no interfaces.
 _LIBRARIES = frozenset(
@@ -29,47 +30,43 @@ _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
 
-def facts(
-    given: Inputs,
-    known: Callable[[], Iterable[str]],
-    exclude: Exclusions = NOTHING,
-    unsaved: Unsaved = NOTHING_OPEN,
-) -> Facts | None:
+def facts(given: Inputs, known: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
     """Return what surrounds a package's interfaces; `None` without a package.xml.
 
     `known` tells the names of ROS packages; it is asked only for a package with Python code.
     """
-    path = manifest(next(iter(given.folders), given.home))
-    source = unsaved.read_source(path, shown(path), Report()) if path else None
+    root = scope.root
+    path = root.manifest(next(iter(given.folders), given.home))
+    source = root.read_source(path, root.shown(path), Report()) if path else None
     if path is None or source is None or not (said := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))
     locks = _locks(files)
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
-    cmake = _optional(folder / "CMakeLists.txt", unsaved)
-    modules = dict(_modules(folder, files, generated, unsaved))
+    cmake = _optional(folder / "CMakeLists.txt", root)
+    modules = dict(_modules(folder, files, generated, root))
     return Facts(
         name=given.package,
         manifest=source,
         statements=said,
         inputs=given.digests if locks else {},
         modules=modules,
-        setup_py=_optional(folder / "setup.py", unsaved),
-        setup_cfg=_optional(folder / "setup.cfg", unsaved),
-        pyproject=_optional(folder / "pyproject.toml", unsaved),
+        setup_py=_optional(folder / "setup.py", root),
+        setup_cfg=_optional(folder / "setup.cfg", root),
+        pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
         generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=_whole(given, files, exclude),
+        whole=_whole(given, files, scope.exclude),
         marker=(folder / "resource" / given.package).is_file(),
         outputs=tuple(
-            GeneratedOutput(shown(at), one.package, one.inputs) for at, one in locks.items()
+            GeneratedOutput(root.shown(at), one.package, one.inputs) for at, one in locks.items()
         ),
         files={
             one.file.key: place.relative_to(folder).as_posix()
             for one in given.files
-            if (place := absolute(one.file.path)).is_relative_to(folder)
+            if (place := root.absolute(one.file.path)).is_relative_to(folder)
         },
         folders=_by_name(folder, files),
         known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
@@ -81,13 +78,13 @@ def folders(folder: Path) -> dict[str, bool]:
     return _by_name(folder, _files(folder))
 
 
-def home_of(folder: Path, package: str) -> Path:
+def home_of(folder: Path, package: str, root: Root) -> Path:
     """Return the folder from which setup.py takes a package, or where idlc compiled it before."""
     homes = (folder / package, folder / "src" / package)
     for home in homes:
         if (home / lock.FILE).is_file():
             return home
-    files = (_optional(folder / name, NOTHING_OPEN) for name in _SETUP_FILES)
+    files = (_optional(folder / name, root) for name in _SETUP_FILES)
     setup, cfg, pyproject = files
     if setup is not None:
         from idlc.check.package.python_packages import layout
@@ -152,7 +149,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _modules(
-    folder: Path, files: Iterable[Path], generated: Container[Path], unsaved: Unsaved
+    folder: Path, files: Iterable[Path], generated: Container[Path], root: Root
 ) -> Iterator[tuple[str, Source]]:
     """Yield a package's own Python files by their dotted names, without tests and the like.
 
@@ -161,10 +158,10 @@ def _modules(
     for file in files:
         parts = file.relative_to(folder).parts
         ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and file not in generated and (source := _optional(file, unsaved)):
+        if ours and file not in generated and (source := _optional(file, root)):
             yield ".".join((*parts[:-1], file.stem)), source
 
 
-def _optional(path: Path, unsaved: Unsaved) -> Source | None:
+def _optional(path: Path, root: Root) -> Source | None:
     """Return a file's text, `None` if it is not there or no text, which others complain about."""
-    return unsaved.read_source(path, shown(path), Report()) if unsaved.is_file(path) else None
+    return root.read_source(path, root.shown(path), Report()) if root.is_file(path) else None

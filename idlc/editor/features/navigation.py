@@ -26,9 +26,9 @@ from idlc.editor.world import Known, World
 from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME
 from idlc.project.files import is_file
-from idlc.project.package_xml import MANIFEST, manifest, statements
+from idlc.project.package_xml import statements
 from idlc.project.prefixes import ament_prefixes
-from idlc.project.settings import working_in
+from idlc.project.root import MANIFEST, Root
 
 _TOP = Range(Position(0, 0), Position(0, 0))
 
@@ -71,7 +71,7 @@ def manifest_references(package: str, asked: AskedReferences, world: World) -> l
 
 def _source(path: Path, world: World) -> Source | None:
     """Return the text of a package.xml, as an editor has it if it is open."""
-    return world.documents.unsaved().read_source(path, str(path), Report())
+    return Root(path.parent, world.documents.texts()).read_source(path, str(path), Report())
 
 
 def _packages(source: Source) -> Iterator[tuple[str, Span]]:
@@ -87,15 +87,14 @@ def _manifests(world: World) -> Iterator[Path]:
     """Yield the package.xml files of the packages in all folders."""
     for state in states(world):
         for path in state.interfaces:
-            if declared := manifest(path.parent.parent):
+            if declared := state.root.manifest(path.parent.parent):
                 yield declared
 
 
 def _file(package: str, state: State) -> Path | None:
     """Return the package.xml of a package that is in a folder, beside it, or installed."""
-    with working_in(state.folder):
-        home = state.library.home(package)
-        declared = manifest(home) if home else None
+    home = state.library.home(package)
+    declared = state.root.manifest(home) if home else None
     installed = (prefix / "share" / package / MANIFEST for prefix in ament_prefixes())
     found = (declared and state.folder / declared, *installed)
     return next((one for one in found if one and is_file(one)), None)

@@ -32,6 +32,7 @@ from idlc.editor.users import states, users, uses
 from idlc.editor.world import Known, Renaming, World
 from idlc.model import ir, names
 from idlc.project.files import is_file
+from idlc.project.root import Root
 
 #: The file that lists the interface files of a package.
 BUILD = "CMakeLists.txt"
@@ -251,10 +252,10 @@ def _edits_of_users(
 def _in_cmake(name: ir.TypeName, path: Path, report: Report, world: World) -> Iterator[Span]:
     """Yield where CMakeLists.txt of a package names an interface file."""
     cmake = path.parent.parent / BUILD
-    unsaved = world.documents.unsaved()
-    if not unsaved.is_file(cmake):
+    root = Root(cmake.parent, world.documents.texts())
+    if not root.is_file(cmake):
         return
-    source = unsaved.read_source(cmake, str(cmake), report)
+    source = root.read_source(cmake, str(cmake), report)
     pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?![.-]?\w)")
     for place in (place for one in calls(source) for place in one.places) if source else ():
         if match := pattern.search(place.text):
