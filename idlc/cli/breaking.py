@@ -11,7 +11,6 @@ import click
 from idlc.cli import options
 
 if TYPE_CHECKING:
-
     from idlc.compare.breaking import BreakingOptions, Verdict
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict

@@ -3,7 +3,7 @@
 import pytest
 
 from idlc.check.registry import Memory
-from idlc.editor.workspace import Wishes, Workspace
+from idlc.editor.workspace import EditorOptions, Workspace
 
 FILES = {
     "A.msg": "B b\n",
@@ -35,9 +35,8 @@ def folder(tmp_path):
 def test_only_what_depends_on_a_change_is_asked_about_again(
     folder, monkeypatch, changed, text, kept
 ):
-    workspace = Workspace(folder, Wishes())
-    workspace.load({})
-    workspace.state()
+    workspace = Workspace(folder, EditorOptions(), dict)
+    workspace.snapshot()
     seen = []
 
     def of(self, model):
@@ -47,14 +46,13 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
 
     real = Memory.of
     monkeypatch.setattr(Memory, "of", of)
-    assert workspace.change(folder / "msg" / changed, text.encode())
-    after = workspace.state()
+    workspace.follow(folder / "msg" / changed, text.encode())
+    after = workspace.snapshot()
     assert set(seen) == {kept}
-    fresh = Workspace(folder, Wishes())
+    fresh = Workspace(folder, EditorOptions(), dict)
     (folder / "msg" / changed).write_text(text)
-    fresh.load({})
     told, expected = (
         [(one.code, one.message, one.where) for one in state.problems]
-        for state in (after, fresh.state())
+        for state in (after, fresh.snapshot())
     )
     assert told == expected

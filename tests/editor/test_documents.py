@@ -11,6 +11,7 @@ from lsprotocol import types as lsp
 from idlc.cli.main import main
 from idlc.editor.documents import Documents
 from idlc.editor.protocol.parts import DocumentItem
+from idlc.project.root import Root
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -311,7 +312,7 @@ def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
 
 def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
     """Of a file that is open by two spellings of its URI."""
-    documents = Documents()
+    documents = Documents(Root.here())
     for name in ("A", "%41"):
         documents.open(DocumentItem(f"file:///x/{name}.msg", "rosmsg", 1, f"# {name}\n"))
     path = Path("/x/A.msg")
