@@ -122,20 +122,24 @@ class Server:
         self._lock = threading.Lock()
         self._count = 0
         self._asked: dict[int, Answer] = {}
-        #: The parameters of `initialize`, after which there is a state as soon as it is needed.
-        self._initialize: dict[str, Any] | None = None
+        #: Makes the state after `initialize`, when it is needed: what it imports takes long.
+        self._make_state: Callable[[], ServerState] | None = None
         self._state: ServerState | None = None
+        self._client_process: object = None
         self._is_shut_down = False
 
     @property
     def state(self) -> ServerState:
         """The state, made when it is asked for first; only after `initialize`."""
         if self._state is None:
-            from idlc.editor.state import ServerState
-
-            assert self._initialize is not None
-            self._state = ServerState(self._initialize, self.notify, self.ask)
+            assert self._make_state is not None
+            self._state = self._make_state()
         return self._state
+
+    def _begin(self, initialize: dict[str, Any]) -> ServerState:
+        from idlc.editor.state import ServerState
+
+        return ServerState(initialize, self.notify, self.ask)
 
     @property
     def _live_state(self) -> ServerState | None:
@@ -178,15 +182,16 @@ class Server:
 
     def answer(self, name: str, params: object) -> object:
         """Return the answer to a request; raises RequestError."""
-        if self._is_shut_down or (self._initialize is not None and name == "initialize"):
+        if self._is_shut_down or (self._make_state is not None and name == "initialize"):
             raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
         if name == "initialize":
             if not isinstance(params, dict):
                 raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
-            self._initialize = params
+            self._make_state = lambda: self._begin(params)
+            self._client_process = params.get("processId")
             client = params.get("capabilities")
             return capabilities.answer(client if isinstance(client, dict) else {})
-        if self._initialize is None:
+        if self._make_state is None:
             raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
         if name == "shutdown":
             self._is_shut_down = True
@@ -197,7 +202,7 @@ class Server:
 
     def take(self, name: str, params: object) -> None:
         """Take a notification; those that are not known, or not for now, are passed over."""
-        if self._initialize is not None and not self._is_shut_down:
+        if self._make_state is not None and not self._is_shut_down:
             self.state.take(name, params)
 
     def encode(self, message: object) -> bytes:
@@ -238,7 +243,7 @@ class Server:
 
     def _client_is_gone(self) -> bool:
         """Return whether the process of the client has ended; where that can be asked."""
-        client = (self._initialize or {}).get("processId")
+        client = self._client_process
         if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
             return False
         try:
