@@ -9,7 +9,7 @@
 #   TOOLS=yes           fail where a tool for machine code is missing, instead of leaving a test out:
 #                       elfutils, patchelf, valgrind, qemu-user, g++-aarch64-linux-gnu, libfastcdr1
 #   WAYS='user root-gcc' the ways in which `make test-bare` runs the README's commands; all four otherwise
-#   LOCKED=yes          install what requirements/ names and no other, as CI does on Linux x86-64
+#   LOCKED=yes          install what maintenance/requirements/ names and no other, as CI does on Linux x86-64
 #   ARGS='-k name'      more words for pytest, or for the benchmarks
 #   SEED=2 FUZZ=5000    where `make fuzz` searches, and how many inputs it tries of each kind, with
 #                       twenty times as many recordings
@@ -137,22 +137,22 @@ bench: $(BENCH_ENV)/installed ## measure against all peers; ARGS='--help' says w
 	@$(BENCH_ENV)/bin/python -m benchmarks --json build/benchmarks.json $(ARGS)
 
 site: $(SITE_ENV)/installed ## write the documentation site into build/site
-	$(SITE_ENV)/bin/python -m website build/site
+	$(SITE_ENV)/bin/python -m maintenance.website build/site
 
 release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
-	$(RELEASE_ENV)/bin/python -m release check $(ARGS)
+	$(RELEASE_ENV)/bin/python -m maintenance.release check $(ARGS)
 
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'
-	$(UV_COMPILE) pyproject.toml --extra test-ros --output-file requirements/test-ros.txt
-	$(UV_COMPILE) pyproject.toml --extra test-kilted --output-file requirements/test-kilted.txt
+	$(UV_COMPILE) pyproject.toml --extra test-ros --output-file maintenance/requirements/test-ros.txt
+	$(UV_COMPILE) pyproject.toml --extra test-kilted --output-file maintenance/requirements/test-kilted.txt
 	$(UV_COMPILE) pyproject.toml --extra test --resolution lowest-direct \
-	    --output-file requirements/test-lowest.txt
-	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints requirements/test-ros.txt \
-	    --output-file requirements/build.txt
-	$(UV_COMPILE) pyproject.toml --extra release --constraints requirements/build.txt \
-	    --output-file requirements/release.txt
+	    --output-file maintenance/requirements/test-lowest.txt
+	echo 'setuptools>=77' | $(UV_COMPILE) - --constraints maintenance/requirements/test-ros.txt \
+	    --output-file maintenance/requirements/build.txt
+	$(UV_COMPILE) pyproject.toml --extra release --constraints maintenance/requirements/build.txt \
+	    --output-file maintenance/requirements/release.txt
 
 clean: ## remove environments and everything that was built
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
@@ -167,14 +167,14 @@ $(RELEASE_ENV)/installed: EXTRA := release
 
 # One pip call per environment: the resolver sees everything at once. An environment that is
 # there already is brought up to date.
-.venv/%/installed: pyproject.toml $(LOCKS:%=requirements/%.txt)
+.venv/%/installed: pyproject.toml $(LOCKS:%=maintenance/requirements/%.txt)
 	@echo 'preparing .venv/$* ...'
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "idlc needs Python 3.10 or newer, $(PYTHON) is " + sys.version)'
 	@$(PYTHON) -m venv .venv/$*
 ifeq ($(LOCKED),yes)
-	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --requirement requirements/build.txt
+	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --requirement maintenance/requirements/build.txt
 	@.venv/$*/bin/python $(PIP_INSTALL) --require-hashes --no-build-isolation \
-	    --requirement requirements/$(EXTRA).txt
+	    --requirement maintenance/requirements/$(EXTRA).txt
 	@.venv/$*/bin/python $(PIP_INSTALL) --no-deps --no-build-isolation --editable .
 else
 	@.venv/$*/bin/python $(PIP_INSTALL) --editable '.[$(EXTRA)]' || { \

@@ -1,1 +1,1 @@
-"""Tests of idlc, in folders by stage; `support` has what several of them need."""
+"""Tests of idlc, in folders by room; `support` has what several of them need."""

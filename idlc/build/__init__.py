@@ -1,4 +1,4 @@
-"""What the setup.py of a scaffolded package calls: its interfaces compiled before it is built."""
+"""The function that setup.py calls: it compiles interfaces before a package is built."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def compile_interfaces(package: str) -> dict[str, type]:
     """
     if "--dry-run" in sys.argv:
         return {}  # colcon asks setup.py for the package's name whatever it is to do, to test too
-    here, source = Path.cwd(), Path("setup.py").resolve().parent
+    working_folder, source = Path.cwd(), Path("setup.py").resolve().parent
     os.chdir(source)
     try:
         with without_options():
             return {"distclass": _compiled(package)}
     finally:
-        os.chdir(here)
+        os.chdir(working_folder)
 
 
 def _compiled(package: str) -> type:
@@ -48,8 +48,8 @@ def _compiled(package: str) -> type:
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package)
-    given = packages(look((".",), where.root, Report(), where.exclude).files, where, report)
-    if not given:
+    inputs = packages(look((".",), where.root, Report(), where.exclude).files, where, report)
+    if not inputs:
         return distribution_class(package, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
     gen(GenOptions((".",), where, home, vendor_deps=settings.vendor_deps), report)
@@ -57,11 +57,11 @@ def _compiled(package: str) -> type:
     if report.had_errors:
         output.show(report, "text", sys.stderr)
         raise SystemExit(f"{package}: the interfaces cannot be compiled, see above")
-    ((_, model),) = models_of(given, where, Report())
+    ((_, model),) = models_of(inputs, where, Report())
     libraries = libraries_of(model)
     files = shared(model, manifest, libraries, report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
-    parts = {*support_packages(), *(key.partition("/")[0] for key in given[0].digests)}
+    parts = {*support_packages(), *(key.partition("/")[0] for key in inputs[0].digests)}
     generated = (package, *(f"{package}.{part}" for part in parts))
     return distribution_class(package, files, generated, libraries.build_tag)

@@ -1,4 +1,4 @@
-"""What is installed for a package: its classes, and what ROS 2's tools look for in a prefix."""
+"""The installed files of a package: its classes, and the files that tools of ROS 2 look for."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from idlc.project.settings import Place, Scope, load_settings, scope
 
 
 class Options(NamedTuple):
-    """What a frontend says: for which distribution libraries are, and whether there are any."""
+    """The settings of a frontend: the distribution of libraries, and whether there are any."""
 
     distribution: Distribution | None
     libraries: bool = True
@@ -62,18 +62,19 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     where = msgspec.structs.replace(
         settings, package=None, include=(*settings.include, *_required_prefixes())
     )
-    given = _package(name, where, report)
-    if given is None:
+    package = _package(name, where, report)
+    if package is None:
         return None
     _refuse_code(name, root, report)
-    made = Report()
-    gen(GenOptions((".",), where, str(classes)), made)
-    # who builds a package need not be able to import it
-    report.extend(one for one in made if one.code != codes.DEPENDENCY_NOT_IMPORTABLE.id)
+    generated = Report()
+    gen(GenOptions((".",), where, str(classes)), generated)
+    # the environment of a build need not be able to import the package
+    unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
+    report.extend(each for each in generated if each.code != unimportable)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report)
     if report.had_errors or manifest is None:
         return None
-    ((_, model),) = models_of((given,), where, Report())
+    ((_, model),) = models_of((package,), where, Report())
     if options.libraries:
         libraries = libraries_of(model, options.distribution)
     else:
@@ -84,7 +85,7 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
 def _refuse_code(name: str, root: Root, report: Report) -> None:
     """Report Python modules beside committed classes: the wheel would not have them."""
     lock = load_lock(Path(name), name, report)
-    # where classes are committed, people write what the package is for into the first of these
+    # where classes are committed, people describe the package in the first of these
     generated = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
     own = sorted({*Path(name).rglob("*.py")} - generated)
     if own:
@@ -102,19 +103,19 @@ def _required_prefixes() -> list[str]:
     ends = ("site-packages", "dist-packages")
     places = dict.fromkeys(Path(path) for path in sys.path if path.endswith(ends))
     prefixes = [place.parents[2] for place in places if len(place.parents) > 2]
-    found = [path for path in prefixes if is_folder(path / INDEX)]
-    return [f"{path}/share" for path in found if path != Path(sys.prefix)]
+    installed = [path for path in prefixes if is_folder(path / INDEX)]
+    return [f"{path}/share" for path in installed if path != Path(sys.prefix)]
 
 
 def _package(name: str, where: Scope, report: Report) -> Inputs | None:
     """Return the files of the package in the working folder; report IDL606 or IDL608 for none."""
-    found = look((".",), where.root, report, where.exclude)
-    if found.empty:
+    files = look((".",), where.root, report, where.exclude)
+    if files.empty:
         report.add(nothing_in(".", where.root, where.exclude))
-    given = () if report.had_errors else packages(found.files, where, report)
-    if given and [one.package for one in given] != [name]:
-        others = ", ".join(f"`{one.package}`" for one in given)
+    inputs = () if report.had_errors else packages(files.files, where, report)
+    if inputs and [package.package for package in inputs] != [name]:
+        others = ", ".join(f"`{package.package}`" for package in inputs)
         message = f"the wheel is of `{name}`, and the interfaces in this folder are of {others}"
         hint = "build each in its own folder; `exclude` in [tool.idlc] leaves files out"
         report.add(codes.SEVERAL_PACKAGES.of(".", message, hint=hint))
-    return None if report.had_errors else given[0]
+    return None if report.had_errors else inputs[0]

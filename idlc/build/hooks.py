@@ -30,9 +30,9 @@ if TYPE_CHECKING:
 
     from idlc.build.content import Content, Options
 
-#: What a workspace or an earlier build left in the folder.
+#: Outputs of a workspace or an earlier build in the folder.
 _NO_SOURCES = ["/build", "/dist", "/install", "/log"]
-#: What is needed even if version control ignores it.
+#: Files that are needed even if version control ignores them.
 _SOURCES = ["/package.xml", "/msg/*.msg", "/srv/*.srv", "/action/*.action"]
 
 
@@ -72,21 +72,21 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
     """
     from hatchling.builders.sdist import SdistBuilder, SdistBuilderConfig
 
-    here = Path.cwd().resolve()
+    root = Path.cwd().resolve()
     outside: set[str] = set()
 
     def leads_out(path: str) -> bool:
-        is_outside = not Path(os.path.realpath(path)).is_relative_to(here)  # of circles, too
+        is_outside = not Path(os.path.realpath(path)).is_relative_to(root)  # of circles, too
         if is_outside:
-            outside.add(Path(os.path.relpath(path, here)).as_posix())
+            outside.add(Path(os.path.relpath(path, root)).as_posix())
         return is_outside
 
     class Config(SdistBuilderConfig):
         def directory_is_excluded(self, name: str, relative_path: str) -> bool:
             left_out: bool = super().directory_is_excluded(name, relative_path)
-            return left_out or leads_out(str(here / relative_path / name))
+            return left_out or leads_out(str(root / relative_path / name))
 
-    class Builder(SdistBuilder):
+    class PackageSdist(SdistBuilder):
         @classmethod
         def get_config_class(cls) -> type[SdistBuilderConfig]:
             return Config
@@ -95,13 +95,13 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
             files = super().recurse_included_files()
             yield from (file for file in files if not leads_out(file.path))
 
-    found, _ = _declared(report), _options(settings, report)
-    if found is None or report.had_errors:
+    declared, _ = _declared(report), _options(settings, report)
+    if declared is None or report.had_errors:
         return None
-    settings = {"project": found[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
-    name = _written(Builder(str(here), config=settings), directory, report)
+    settings = {"project": declared[1], **_target("sdist", exclude=_NO_SOURCES, artifacts=_SOURCES)}
+    name = _written(PackageSdist(str(root), config=settings), directory, report)
     if outside:
-        names = first_few((f"`{one}`" for one in sorted(outside)), 5)
+        names = first_few((f"`{path}`" for path in sorted(outside)), 5)
         report.notes.append(f"left out, because they lead out of the project: {names}")
     return name
 
@@ -110,10 +110,10 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
     """Compile the package in the working folder into a wheel."""
     from idlc.build.content import compiled
 
-    found, options = _declared(report), _options(settings, report)
-    if found is None or report.had_errors:
+    declared, options = _declared(report), _options(settings, report)
+    if declared is None or report.had_errors:
         return None
-    name, project = found
+    name, project = declared
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
         content = compiled(name, Path(folder) / "classes" / name, options, report)
         if content is None:
@@ -143,17 +143,17 @@ def _options(settings: Mapping[str, Any], report: Report) -> Options:
     from idlc.build.content import Options
     from idlc.generate.native.layouts import LAYOUTS
 
-    known = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
+    choices = {"distro": tuple(LAYOUTS), "libraries": ("yes", "no")}
     for key, value in settings.items():
-        if key not in known:
+        if key not in choices:
             message = f"unknown setting `{key}` of idlc.backend"
-            hint = did_you_mean(key, known) or f"the settings are {', '.join(known)}"
+            hint = did_you_mean(key, choices) or f"the settings are {', '.join(choices)}"
             report.add(codes.BAD_CONFIG.of("", message, hint=hint))
-        elif value not in known[key]:
+        elif value not in choices[key]:
             message = f"the setting `{key}` is {value!r}, which idlc does not know"
-            report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(known[key])}"))
-    wanted = settings.get("distro")
-    distribution = Distribution(wanted, f"distro={wanted}") if wanted else None
+            report.add(codes.BAD_CONFIG.of("", message, hint=f"use {', '.join(choices[key])}"))
+    distro = settings.get("distro")
+    distribution = Distribution(distro, f"distro={distro}") if distro else None
     return Options(distribution, settings.get("libraries") != "no")
 
 
@@ -168,7 +168,7 @@ def _packed(
     """Write the wheel of a compiled package."""
     from hatchling.builders.wheel import WheelBuilder
 
-    class Builder(WheelBuilder):
+    class PackageWheel(WheelBuilder):
         def get_default_build_data(self) -> dict[str, Any]:
             native = content.libraries.files
             tag = f"py3-none-{prefixes.wheel_platform() if native else 'any'}"
@@ -186,7 +186,7 @@ def _packed(
             "shared-data": {str(prefix / path): path for path in sorted(content.prefix)},
         },
     )
-    builder = Builder(str(Path.cwd()), config={"project": project, **target})
+    builder = PackageWheel(str(Path.cwd()), config={"project": project, **target})
     # hatchling knows no build tags, and its file must not replace a wheel without one
     Path(directory).mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".idlc-", dir=directory) as beside:

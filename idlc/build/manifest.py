@@ -1,4 +1,4 @@
-"""What a package.xml says of a package, as the `[project]` table of a pyproject.toml."""
+"""The declarations of a package.xml, as the `[project]` table of a pyproject.toml."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from idlc.project.package_xml import Statement, declared_name, read_statements
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE
 
-#: What every generated package needs of others on PyPI. The packages of ROS 2 that it imports are
-#: no such names: who has ROS 2 has them, and `std-msgs` may be anybody's there.
+#: The packages on PyPI that every generated package needs. The packages of ROS 2 that it imports
+#: are not among them: ROS 2 installs them, and anybody could register `std-msgs` there.
 DEPENDENCIES = ("numpy",)
 PYTHON = ">=3.10"
 _VERSION = re.compile(r"\d+\.\d+\.\d+", re.ASCII)
@@ -26,7 +26,7 @@ _READMES = ("README.md", "README.rst", "README.txt")
 
 
 def project(report: Report) -> dict[str, Any]:
-    """Return what the working folder's package.xml gives; empty after a problem."""
+    """Return the table by the working folder's package.xml; empty after a problem."""
     root = Root.here()
     name = declared_name(root.base / MANIFEST, root, report)
     if name is None:
@@ -35,40 +35,40 @@ def project(report: Report) -> dict[str, Any]:
         hint = "change `<name>`, and its uses in other packages"
         report.add(codes.UNIMPORTABLE_PACKAGE.of(MANIFEST, f"`{name}` {why}", hint=hint))
         return {}
-    said = read_statements(root.base / MANIFEST, MANIFEST, root, report)
-    version = None if report.had_errors else _version(said, report)
+    statements = read_statements(root.base / MANIFEST, MANIFEST, root, report)
+    version = None if report.had_errors else _version(statements, report)
     if version is None:
         return {}
-    found = {
+    table = {
         "name": name,
         "version": version,
-        "description": next(iter(_texts(said, "description")), ""),
+        "description": next(iter(_texts(statements, "description")), ""),
         "readme": next(filter(lambda readme: Path(readme).is_file(), _READMES), None),
         "requires-python": PYTHON,
-        "license": _license(_texts(said, "license")),
-        "authors": _people(said, "author"),
-        "maintainers": _people(said, "maintainer"),
-        "urls": _urls(said),
+        "license": _license(_texts(statements, "license")),
+        "authors": _people(statements, "author"),
+        "maintainers": _people(statements, "maintainer"),
+        "urls": _urls(statements),
         "dependencies": list(DEPENDENCIES),
     }
-    return {key: value for key, value in found.items() if value}
+    return {key: value for key, value in table.items() if value}
 
 
-def _texts(said: Iterable[Statement], tag: str) -> list[str]:
+def _texts(statements: Iterable[Statement], tag: str) -> list[str]:
     """Return the texts of all statements with a tag, each on one line."""
-    texts = (" ".join(one.text.split()) for one in said if one.tag == tag)
+    texts = (" ".join(statement.text.split()) for statement in statements if statement.tag == tag)
     return list(dict.fromkeys(filter(None, texts)))
 
 
-def _version(said: Iterable[Statement], report: Report) -> str | None:
+def _version(statements: Iterable[Statement], report: Report) -> str | None:
     """Return the version; report IDL610 if there is none, or one that ROS 2 does not know."""
     hint = "it is three numbers, as in `<version>0.1.0</version>`"
-    for one in said:
-        if one.tag == "version":
-            if _VERSION.fullmatch(one.text):
-                return one.text
-            message = f"`{one.text}` is no version of a ROS 2 package"
-            report.add(codes.BAD_PACKAGE_XML.at(one.span, message, hint=hint))
+    for statement in statements:
+        if statement.tag == "version":
+            if _VERSION.fullmatch(statement.text):
+                return statement.text
+            message = f"`{statement.text}` is no version of a ROS 2 package"
+            report.add(codes.BAD_PACKAGE_XML.at(statement.span, message, hint=hint))
             return None
     report.add(codes.BAD_PACKAGE_XML.of(MANIFEST, "no version in this file", hint=hint))
     return None
@@ -85,26 +85,26 @@ def _license(names: Sequence[str]) -> str | dict[str, str] | None:
         return {"text": ", ".join(names)}
 
 
-def _people(said: Iterable[Statement], tag: str) -> list[dict[str, str]]:
-    """Return people; an address that mail programs would not take is left out."""
-    found = []
-    for one in said:
-        if one.tag == tag:
-            address = one.attributes.get("email", "").strip()
+def _people(statements: Iterable[Statement], tag: str) -> list[dict[str, str]]:
+    """Return people; an address that mail programs would reject is left out."""
+    people = []
+    for statement in statements:
+        if statement.tag == tag:
+            address = statement.attributes.get("email", "").strip()
             email = address if _ADDRESS.fullmatch(address) else ""
-            person = {"name": " ".join(one.text.split()), "email": email}
-            found.append({key: value for key, value in person.items() if value})
-    return list(filter(None, found))
+            person = {"name": " ".join(statement.text.split()), "email": email}
+            people.append({key: value for key, value in person.items() if value})
+    return list(filter(None, people))
 
 
-def _urls(said: Iterable[Statement]) -> dict[str, str]:
+def _urls(statements: Iterable[Statement]) -> dict[str, str]:
     """Return the first address of each kind."""
-    found: dict[str, str] = {}
-    for one in said:
-        label = _URLS.get(one.attributes.get("type", "website"))
-        if one.tag == "url" and label and len(one.text.split()) == 1:
-            found.setdefault(label, one.text)
-    return found
+    urls: dict[str, str] = {}
+    for statement in statements:
+        label = _URLS.get(statement.attributes.get("type", "website"))
+        if statement.tag == "url" and label and len(statement.text.split()) == 1:
+            urls.setdefault(label, statement.text)
+    return urls
 
 
 if sys.version_info >= (3, 11):
@@ -116,8 +116,8 @@ else:
 def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     """Return the table with what package.xml declares in place of what is absent or dynamic.
 
-    Without a table all of it is taken. With one it is what the standard demands: the table alone
-    says what holds, and `dynamic` names what is taken from elsewhere.
+    Without a table all of it is taken. With one, as the standard demands, only the fields that
+    `dynamic` names are taken.
     """
     document = (
         tomllib.loads(Path(SETTINGS_FILE).read_text(encoding="utf-8"))
@@ -135,7 +135,7 @@ def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     for key in dynamic:
         if key not in _DYNAMIC:
             message = f"`dynamic` in [project] names `{key}`, which no package.xml tells"
-            hint = f"it may name {', '.join(f'`{known}`' for known in _DYNAMIC)}"
+            hint = f"it may name {', '.join(f'`{name}`' for name in _DYNAMIC)}"
             report.add(codes.BAD_CONFIG.of(SETTINGS_FILE, message, hint=hint))
         elif key in table:
             message = f"`{key}` is both in [project] and in its `dynamic`"
@@ -144,7 +144,7 @@ def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     return {**table, **taken, "dynamic": []}
 
 
-#: What package.xml, and what lies beside it, can tell.
+#: Fields that package.xml, and files beside it, can provide.
 _DYNAMIC = (
     *("version", "description", "readme", "requires-python", "license"),
     *("authors", "maintainers", "urls", "dependencies"),

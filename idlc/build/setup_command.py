@@ -1,4 +1,4 @@
-"""What a setup.py installs besides what it lists: what ROS 2 installs of interfaces, commands.
+"""Files that a setup.py installs besides those it lists: of interfaces, and commands.
 
 All of it is written into the build folder, and is not part of a source distribution.
 """
@@ -15,9 +15,9 @@ from typing import Any, TypeAlias
 from idlc.project import prefixes
 from idlc.project.files import is_file, reason
 
-#: How a file is called until it is whole.
+#: The temporary suffix of a file while it is written.
 NEW = ".new"
-#: The commands of setup.py by which pip installs.
+#: The commands of setup.py that pip runs.
 _WHEELS = frozenset({"bdist_wheel", "editable_wheel"})
 _BUILDS = _WHEELS | {"build", "build_py", "develop", "install", "install_lib"}
 _NOT_INSTALLED = """\
@@ -30,7 +30,7 @@ _LAUNCHER = """\
 # pip installs commands into bin, and ROS 2 starts what is here.
 exec "$(dirname "$0")/../../bin/{name}" "$@"
 """
-#: What setup() takes as `data_files`: files for the prefix itself, or a folder in it and its files.
+#: An entry of `data_files` in setup(): a file for the prefix, or a folder in it and its files.
 _DataFile: TypeAlias = str | tuple[str, Iterable[str]]
 
 
@@ -63,10 +63,10 @@ def distribution_class(
             if build_tag:
                 options.setdefault("build_number", ("idlc", build_tag))
         try:
-            made = _made(place, added)
+            installed = _write_files(place, added)
         except OSError as error:
             raise SystemExit(f"{package}: cannot write to `{place}`: {reason(error)}") from None
-        self.data_files = made + listed
+        self.data_files = installed + listed
         self.cmdclass["install_data"] = _whole(self.get_command_class("install_data"))
         base.run_commands(self)
 
@@ -86,7 +86,7 @@ def distribution_class(
 def _merged(
     listed: Iterable[_DataFile], files: Mapping[str, bytes], index: set[str]
 ) -> tuple[list[_DataFile], dict[str, bytes]]:
-    """Return `data_files` without those that others replace, and these others.
+    """Return `data_files` without those that new files replace, and the new files.
 
     A listed file that has the content already stays: colcon's links lead to it. Without a new
     entry in the index there is no old one either.
@@ -113,12 +113,12 @@ def _launchers(package: str, entry_points: Any) -> dict[str, bytes]:
     """Return a file for each command of a package where `ros2 run` and launch files look for it."""
     scripts = (entry_points or {}).get("console_scripts", ())
     lines = scripts.splitlines() if isinstance(scripts, str) else scripts
-    names = [found[1] for found in map(_COMMAND.match, lines) if found]
+    names = [match[1] for match in map(_COMMAND.match, lines) if match]
     return {f"lib/{package}/{name}": _LAUNCHER.format(name=name).encode() for name in names}
 
 
-def _made(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]]:
-    """Write files below a folder; return what setup() is to install, in its own words."""
+def _write_files(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]]:
+    """Write files below a folder; return the `data_files` of setup() that install them."""
     for path, content in files.items():
         target = place / path
         if not target.is_file() or target.read_bytes() != content:
@@ -133,7 +133,7 @@ def _made(place: Path, files: Mapping[str, bytes]) -> list[tuple[str, list[str]]
 def _whole(copying: Any) -> type:
     """Return a command that installs each file as a whole or not at all.
 
-    A program that has the old one open goes on with it.
+    Programs that have the old file open keep it.
     """
 
     def copy_file(self: Any, source: str, folder: str, *rest: Any, **named: Any) -> tuple[str, int]:

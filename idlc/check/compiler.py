@@ -20,13 +20,13 @@ from idlc.project.library import Library
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
-    from idlc.check.registry import Memory
+    from idlc.check.registry import IncrementalFindings
     from idlc.model import link
     from idlc.model.link import Model, Pool
 
 
 class InternalError(Exception):
-    """Something failed that is idlc's own fault: in which stage, and at what."""
+    """A failure that is idlc's own fault, with its stage and subject."""
 
     def __init__(self, stage: str, subject: str) -> None:
         super().__init__(stage, subject)
@@ -36,7 +36,7 @@ class InternalError(Exception):
 
 @contextmanager
 def stage(name: str, subject: str) -> Iterator[None]:
-    """Turn whatever goes wrong within into an InternalError that says where it did."""
+    """Turn any exception inside into an InternalError with the stage and subject."""
     try:
         yield
     except InternalError:
@@ -46,17 +46,17 @@ def stage(name: str, subject: str) -> Iterator[None]:
 
 
 class Compiler:
-    """Compiles the packages of one run; what several of them use is read and lowered once.
+    """Compiles the packages of one run; files that several of them use are lowered once.
 
-    Runs that share memories and a library do only what changed from one to the next: `memory`
-    is of what was lowered, `checked` of what rules found.
+    Runs that share a library, a `memory` of lowered files and the findings in `checked` repeat
+    only the work on changed files.
     """
 
     def __init__(
         self,
         library: Library,
         memory: link.Memory | None = None,
-        checked: Memory | None = None,
+        checked: IncrementalFindings | None = None,
     ) -> None:
         self.library = library
         self._memory = memory
@@ -71,7 +71,7 @@ class Compiler:
     def add(
         self, sources: Iterable[tuple[ir.TypeName, Source]], report: Report
     ) -> tuple[ir.Interface, ...]:
-        """Return what texts define; from now on, references to their names mean these."""
+        """Return the interfaces of texts; from now on, references resolve to them."""
         from idlc.language.parse import parse_any
         from idlc.model.lower import lower
 
@@ -82,9 +82,9 @@ class Compiler:
                 with stage("parse", source.path):
                     tree = parse_any(source)
                 with stage("lower", source.path):
-                    found = Report()
-                    interface = lower(tree, name, found, self.library.distro)
-                    lowered = self._pool.learn(interface, found)
+                    problems = Report()
+                    interface = lower(tree, name, problems, self.library.distro)
+                    lowered = self._pool.remember(interface, problems)
             own.append(lowered.interface)
             report.extend(lowered.problems)
         return tuple(own)
@@ -92,25 +92,25 @@ class Compiler:
     def model(self, package: str, own: Sequence[ir.Interface], report: Report) -> Model:
         """Return the linked and checked model of a package; every problem is reported."""
         from idlc.check.registry import check
-        from idlc.model.link import link as link_packages
+        from idlc.model import link
 
         with stage("link", package):
-            model = link_packages(package, own, self.library, report, self._pool)
+            model = link.link(package, own, self.library, report, self._pool)
         with stage("check", package):
             check(model, report, self._checked)
         return model
 
     def reached(self, names: Iterable[ir.TypeName]) -> dict[ir.TypeName, ir.Interface]:
-        """Return interfaces and all that they refer to, but for what is nowhere to be found."""
-        found: dict[ir.TypeName, ir.Interface] = {}
+        """Return interfaces and all that they refer to, without missing ones."""
+        interfaces: dict[ir.TypeName, ir.Interface] = {}
         waiting = list(names)
         while waiting:
             name = waiting.pop()
-            entry = None if name in found else self._pool.get(name)
+            entry = None if name in interfaces else self._pool.get(name)
             if entry is not None:
-                found[name] = entry.interface
+                interfaces[name] = entry.interface
                 waiting += (target for _, target in entry.references)
-        return found
+        return interfaces
 
     def all(
         self, packages: Iterable[inputs.Inputs], report: Report
@@ -118,9 +118,9 @@ class Compiler:
         """Yield the model of each package; all of them see each other."""
         from idlc.model.link import check_packages
 
-        added = [(one, self.add(sources_of(one, report), report)) for one in packages]
-        for given, own in added:
-            yield given, self.model(given.package, own, report)
+        added = [(package, self.add(sources_of(package, report), report)) for package in packages]
+        for package, own in added:
+            yield package, self.model(package.package, own, report)
         check_packages(self._pool, report)
 
 
@@ -135,12 +135,12 @@ def compile_package(
     return compiler.model(package, compiler.add(sources, report), report)
 
 
-def sources_of(given: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeName, Source]]:
-    """Yield the texts of a package's files; those that are not text are reported."""
-    for one in given.files:
-        source = one.source(report)
+def sources_of(package: inputs.Inputs, report: Report) -> Iterator[tuple[ir.TypeName, Source]]:
+    """Yield the texts of a package's files; reports files that are not text."""
+    for entry in package.files:
+        source = entry.source(report)
         if source is not None:
-            yield ir.TypeName(given.package, one.file.kind, one.file.name), source
+            yield ir.TypeName(package.package, entry.file.kind, entry.file.name), source
 
 
 def library_for(
@@ -149,8 +149,8 @@ def library_for(
     report: Report,
     texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
 ) -> Library:
-    """Return the library from which packages that are compiled take what they refer to."""
-    own = {given.package: given.folders for given in packages}
+    """Return the library in which compiled packages look up their references."""
+    own = {package.package: package.folders for package in packages}
     return Library(
         scope.include,
         scope.root,
@@ -172,20 +172,22 @@ def models_of(
 def sound_models(
     packages: Sequence[inputs.Inputs], scope: Scope, report: Report
 ) -> list[tuple[Model, list[str]]]:
-    """Return each package's model and the names of what its files define, derived ones included.
+    """Return each package's model and the names of its files' types, derived ones included.
 
-    Interfaces with errors, and those that hold them, are left out, which is noted.
+    Interfaces with errors, and interfaces that hold these, are left out, with a note.
     """
     models = list(models_of(packages, scope, report))
-    found, left_out = [], []
-    for (given, _), sound in zip(models, without_errors(models, report), strict=True):
-        mine = sound.only(given.names).own
-        found.append((sound, [name for one in mine for name in derived_names(one)]))
-        left_out += sorted(given.names - {one.name for one in mine})
+    sound_packages, left_out = [], []
+    for (package, _), sound in zip(models, without_errors(models, report), strict=True):
+        mine = sound.only(package.names).own
+        sound_packages.append(
+            (sound, [name for interface in mine for name in derived_names(interface)])
+        )
+        left_out += sorted(package.names - {interface.name for interface in mine})
     if left_out:
         names = first_few((f"`{name}`" for name in left_out), 5)
         report.notes.append(f"left out, because of errors: {names}")
-    return found
+    return sound_packages
 
 
 def without_errors(
@@ -193,14 +195,14 @@ def without_errors(
     report: Report,
     also: Mapping[str, str] = MappingProxyType({}),
 ) -> Iterator[Model]:
-    """Yield models without the interfaces that a report has errors of, and those that hold them.
+    """Yield models without the interfaces that a report has errors of, and their users.
 
-    An error in a file counts for the file that `also` has for it, too.
+    An error in a file counts for its file in `also` as well.
     """
-    errors = [one for one in report if one.severity is Severity.ERROR]
-    broken = {one.where[0] for one in errors}
+    errors = [problem for problem in report if problem.severity is Severity.ERROR]
+    broken = {problem.where[0] for problem in errors}
     broken |= {also[path] for path in broken & also.keys()}
-    is_all = any(one.code == codes.INVALID_PACKAGE_NAME.id for one in errors)
+    is_all = any(problem.code == codes.INVALID_PACKAGE_NAME.id for problem in errors)
     for _, model in models:
         sound = model.sound(broken) if errors else model
         yield sound.only(()) if is_all or model.package in broken else sound

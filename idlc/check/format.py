@@ -1,4 +1,4 @@
-"""The canonical layout of a file, which means what the file meant."""
+"""The canonical layout of a file, which keeps its meaning."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from idlc.model.distros import NEWEST
 from idlc.model.ir import meaning
 from idlc.model.lower import lower
 
-#: How the codes begin of syntax errors, and of files that are too large.
+#: Prefixes of the codes of syntax errors, and of files that are too large.
 _UNREADABLE = ("IDL1", "IDL6")
 
 
@@ -20,8 +20,8 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     problems, again = Report(), Report()
     tree = parse(source)
     before = lower(tree, name, problems, NEWEST)
-    errors = [one for one in problems if one.severity is Severity.ERROR]
-    unreadable = [one for one in errors if one.code.startswith(_UNREADABLE)]
+    errors = [problem for problem in problems if problem.severity is Severity.ERROR]
+    unreadable = [problem for problem in errors if problem.code.startswith(_UNREADABLE)]
     if unreadable:
         report.extend(unreadable)
         return None
@@ -29,11 +29,11 @@ def laid_out(source: Source, name: ir.TypeName, report: Report) -> str | None:
     if new == source.text:
         return new
     after = lower(parse(Source(source.path, new)), name, again, NEWEST)
-    same = [one.code for one in errors] == [
-        one.code for one in again if one.severity is Severity.ERROR
+    same = [problem.code for problem in errors] == [
+        problem.code for problem in again if problem.severity is Severity.ERROR
     ]
     if same and meaning(after) == meaning(before):
         return new
-    if errors:  # what a wrong definition means cannot be compared for sure
+    if errors:  # the meaning of a wrong definition cannot be compared reliably
         return source.text
     raise AssertionError("the layout would change the meaning; the file was left alone")

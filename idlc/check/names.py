@@ -131,8 +131,8 @@ def reserved_field_names(model: Model, report: Report) -> None:
         for field in message.fields:
             if field.name_span is None:
                 continue
-            if (what := _python_clash(field, message)) is not None:
-                text = f"`{field.name}` is {what}; the Python code that rosidl generates fails"
+            if (clash := _python_clash(field, message)) is not None:
+                text = f"`{field.name}` is {clash}; the Python code that rosidl generates fails"
                 hint = "rename it if colcon may ever build this package; idlc's Python copes"
                 report.add(codes.BREAKS_ROSIDL_PYTHON.at(field.name_span, text, hint=hint))
             if (native := _native_clash(field.name)) is not None:

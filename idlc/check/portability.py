@@ -1,4 +1,4 @@
-"""What ROS 2 accepts and then treats differently here and there."""
+"""Rules on constructs that ROS 2 accepts, and treats differently from place to place."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def _mangled_text(value: str, span: Span) -> list[Diagnostic]:
 
 
 def _odd_text(span: Span) -> list[Diagnostic]:
-    """Find what looks like quotes or a comment and is part of the text."""
+    """Return the problem of quotes or a comment that ROS 2 takes as part of the text."""
     text = span.text
     one_sided = text[:1] in ('"', "'") and (len(text) == 1 or text[-1] != text[0])
     if lower_types.has_comment(text) and (one_sided or lower_types.is_comment(text)):
@@ -89,14 +89,14 @@ def _rest_of_line(span: Span) -> str:
     return span.source.line_text(line)[column - 1 :]
 
 
-def _breaks_python(span: Span, what: str) -> Diagnostic:
-    message = f"{what} breaks the Python code that rosidl generates"
+def _breaks_python(span: Span, subject: str) -> Diagnostic:
+    message = f"{subject} breaks the Python code that rosidl generates"
     return codes.BREAKS_ROSIDL_PYTHON.at(span, message, hint="remove it, and set the value in code")
 
 
 #: Pairs of brackets that a message names.
 SHOWN = 5
-#: What ROS 2 says to use instead of what it removed.
+#: ROS 2's replacements for removed types.
 _INSTEAD = {
     "actionlib_msgs": "actions are defined in .action files, and ROS 2 makes messages for them",
     "geometry_msgs/msg/Pose2D": "use `geometry_msgs/Pose`, or fields `x`, `y` and `theta`",
@@ -126,15 +126,17 @@ def chars(model: Model, report: Report) -> None:
     """`char` is not used: it is a uint8 that looks like a text."""
     for message in sections(model):
         spans = [field.type_span for field in message.fields if _is_char(field.type)]
-        spans += [_constant_type(one) for one in message.constants if _is_char(one.type)]
+        spans += [
+            _constant_type(constant) for constant in message.constants if _is_char(constant.type)
+        ]
         for span in spans:
             if span is not None:
-                found = codes.CHAR_TYPE.at(
+                diagnostic = codes.CHAR_TYPE.at(
                     span,
                     "`char` is an unsigned number of one byte in ROS 2, not a character",
                     hint="write `uint8`; bytes, hash and code stay the same",
                 )
-                report.add(msgspec.structs.replace(found, edits=(_as_uint8(span),)))
+                report.add(msgspec.structs.replace(diagnostic, edits=(_as_uint8(span),)))
 
 
 def _as_uint8(span: Span) -> Edit:
@@ -161,7 +163,7 @@ def _constant_type(constant: ir.Constant) -> Span | None:
 
 
 def nested_bounds(model: Model, report: Report) -> None:
-    """Bounded texts are not elements of arrays: no middleware looks at their length there."""
+    """Bounded texts are not elements of arrays: no middleware checks their length there."""
     for message in sections(model):
         for field in message.fields:
             element = ir.element_of(field.type)
@@ -181,16 +183,17 @@ def several_units(model: Model, report: Report) -> None:
     for message in sections(model):
         for field in message.fields:
             text = "\n".join(field.comment)
-            found = [inside for _, inside in brackets(text)]
-            meant = sum(map(is_unit, found))
+            contents = [content for _, content in brackets(text)]
+            units = sum(map(is_unit, contents))
             # a remark such as [0..1] beside the unit leaves it clear to readers
-            unclear = meant > 1 or (meant and REMARK.search(text))
-            if len(found) > 1 and unclear and field.unit is None and field.name_span:
+            unclear = units > 1 or (units and REMARK.search(text))
+            shown = first_few((f"[{unit}]" for unit in contents), SHOWN)
+            if len(contents) > 1 and unclear and field.unit is None and field.name_span:
                 report.add(
                     codes.SEVERAL_UNITS.at(
                         field.name_span,
                         f"`{field.name}` has no unit for ROS 2, because its comment has several "
-                        f"pairs of brackets: {first_few((f'[{one}]' for one in found), SHOWN)}",
+                        f"pairs of brackets: {shown}",
                         hint="write the remark with round ones, as in `ignore(IDL405)`"
                         if REMARK.search(text)
                         else "put one unit in brackets, and what else there is in words",
@@ -199,21 +202,21 @@ def several_units(model: Model, report: Report) -> None:
 
 
 def removed_types(model: Model, report: Report) -> None:
-    """What is used stays: a later distribution has no such type."""
+    """Used types exist in all later distributions."""
     for target, span in _used(model):
-        gone = catalog.removed(target, model.distro)
-        if gone is not None:
+        since = catalog.removed(target, model.distro)
+        if since is not None:
             report.add(
                 codes.REMOVED_STANDARD_TYPE.at(
                     span,
-                    f"ROS 2 {gone.title} removed `{target}`",
+                    f"ROS 2 {since.title} removed `{target}`",
                     hint=_INSTEAD.get(str(target)) or _INSTEAD.get(target.package),
                 )
             )
 
 
 def changed_types(model: Model, report: Report) -> None:
-    """What is used stays what it is: in a later distribution it has other fields."""
+    """Used types have the same fields in all later distributions."""
     for target, span in _used(model):
         other = catalog.changed(target, model.distro)
         if other is not None:
@@ -229,7 +232,7 @@ def changed_types(model: Model, report: Report) -> None:
 
 
 def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span]]:
-    """Yield the messages of other packages that fields hold, and where they are named."""
+    """Yield the messages of other packages that fields hold, with the range of their names."""
     for message in sections(model):
         for field in message.fields:
             element, span = ir.element_of(field.type), field.type_span

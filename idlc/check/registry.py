@@ -1,6 +1,6 @@
-"""Every rule, with the codes that it reports; a rule whose codes nobody wants is not asked.
+"""Every rule, with the codes that it reports; rules run only if one of their codes is selected.
 
-Each list is a function, so that a run imports only the rules that it asks.
+Each list is a function, so that a run imports only the rules that it needs.
 """
 
 from __future__ import annotations
@@ -17,22 +17,25 @@ if TYPE_CHECKING:
     from idlc.check.select import Selection
     from idlc.project.package_xml import Facts
 
-Found: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]
+Findings: TypeAlias = dict[ir.TypeName, tuple[Diagnostic, ...]]
 
 
-class Memory:
-    """What was found in the interfaces of each package, with all that these referred to then."""
+class IncrementalFindings:
+    """The findings of earlier runs, kept for interfaces that did not change since.
+
+    An interface has changed if it, or any interface that it refers to, is another object.
+    """
 
     def __init__(self) -> None:
-        self._packages: dict[str, tuple[dict[ir.TypeName, ir.Interface | None], Found]] = {}
+        self._packages: dict[str, tuple[dict[ir.TypeName, ir.Interface | None], Findings]] = {}
 
-    def of(self, model: Model) -> Found:
-        """Return what still holds of a package's own interfaces; what is added is remembered.
+    def still_valid(self, model: Model) -> Findings:
+        """Return the findings of a package's unchanged interfaces; the caller adds the others.
 
-        The time is that of looking at each interface and reference once, circles or not.
+        Takes linear time in interfaces and references, circles or not.
         """
         graph = model.graph()
-        before, found = self._packages.get(model.package, ({}, {}))
+        before, findings = self._packages.get(model.package, ({}, {}))
         waiting = [
             name
             for name, (now, _) in graph.items()
@@ -48,8 +51,8 @@ class Memory:
             if name not in changed:
                 changed.add(name)
                 waiting += users.get(name, ())
-        own = (one.name for one in model.own)
-        kept = {name: found[name] for name in own if name in found and name not in changed}
+        own = (interface.name for interface in model.own)
+        kept = {name: findings[name] for name in own if name in findings and name not in changed}
         self._packages[model.package] = {name: now for name, (now, _) in graph.items()}, kept
         return kept
 
@@ -59,9 +62,9 @@ PackageCheck: TypeAlias = "Callable[[Facts, Model, Report], None]"
 
 
 class Rule(NamedTuple):
-    """A function that looks at a model, and what it may report.
+    """A function that checks a model, and the codes that it may report.
 
-    `together` is whether it looks at more than each interface with what that refers to.
+    `together`: it needs all interfaces at once, not each with its references.
     """
 
     check: Check
@@ -70,14 +73,14 @@ class Rule(NamedTuple):
 
 
 class PackageRule(NamedTuple):
-    """A function that looks at the package around a model, and what it may report."""
+    """A function that checks the package of a model, and the codes that it may report."""
 
     check: PackageCheck
     codes: tuple[codes.Code, ...]
 
 
 def verdicts() -> tuple[Rule, ...]:
-    """Return the rules that every command asks, those with the most helpful messages first."""
+    """Return the rules that every command runs, the most helpful messages first."""
     from idlc.check import names, portability
     from idlc.check.names import (
         derived_suffixes,
@@ -119,7 +122,7 @@ def verdicts() -> tuple[Rule, ...]:
 
 
 def advice() -> tuple[Rule, ...]:
-    """Return the rules that only `idlc check` asks; all of them warn."""
+    """Return the rules that only `idlc check` runs; all of them warn."""
     from idlc.check import portability, style
 
     return (
@@ -140,7 +143,7 @@ def advice() -> tuple[Rule, ...]:
 
 
 def package_advice() -> tuple[PackageRule, ...]:
-    """Return the rules on the package around the interfaces: the tutorials' troubleshooting."""
+    """Return the rules on the package of the interfaces: the tutorials' troubleshooting."""
     from idlc.check.package import cmake, installation, manifest
 
     return (
@@ -158,40 +161,45 @@ def package_advice() -> tuple[PackageRule, ...]:
     )
 
 
-def check(model: Model, report: Report, memory: Memory | None = None) -> None:
-    """Report what the rules on meaning find in the model's own interfaces."""
-    _ask(verdicts(), model, report, memory)
+def check(model: Model, report: Report, incremental: IncrementalFindings | None = None) -> None:
+    """Report the problems that every command reports in the model's own interfaces."""
+    _ask(verdicts(), model, report, incremental)
 
 
 def advise(
-    model: Model, report: Report, selection: Selection, memory: Memory | None = None
+    model: Model,
+    report: Report,
+    selection: Selection,
+    incremental: IncrementalFindings | None = None,
 ) -> None:
-    """Report what wanted advice there is on the model's own interfaces."""
+    """Report the selected warnings about the model's own interfaces."""
     rules = [rule for rule in advice() if any(map(selection.has, rule.codes))]
-    _ask(rules, model, report, memory)
+    _ask(rules, model, report, incremental)
 
 
-def _ask(rules: Sequence[Rule], model: Model, report: Report, memory: Memory | None) -> None:
-    """Ask rules; with a memory, only on interfaces that are not as they were."""
+def _ask(
+    rules: Sequence[Rule], model: Model, report: Report, incremental: IncrementalFindings | None
+) -> None:
+    """Run rules; with `incremental`, only on changed interfaces."""
     for rule in rules:
-        if rule.together or memory is None:
+        if rule.together or incremental is None:
             rule.check(model, report)
-    if memory is None:
+    if incremental is None:
         return
-    known = memory.of(model)
-    for one in model.each():
-        name = one.own[0].name
-        if name not in known:
-            found = Report()
+    findings = incremental.still_valid(model)
+    for part in model.per_interface():
+        name = part.own[0].name
+        if name not in findings:
+            problems = Report()
             for rule in rules:
                 if not rule.together:
-                    rule.check(one, found)
-            known[name] = tuple(found)
-        report.extend(known[name])
+                    rule.check(part, problems)
+            findings[name] = tuple(problems)
+        report.extend(findings[name])
 
 
 def check_package(facts: Facts, model: Model, report: Report, selection: Selection) -> None:
-    """Report what wanted advice there is on the package that holds a model's interfaces."""
+    """Report the selected warnings about the package of a model's interfaces."""
     for rule in package_advice():
         if any(map(selection.has, rule.codes)):
             rule.check(facts, model, report)

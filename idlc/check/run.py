@@ -16,18 +16,18 @@ from idlc.project.find import KINDS, look, nothing_in
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
-    from idlc.check.registry import Memory
+    from idlc.check.registry import IncrementalFindings
     from idlc.diagnostics.source import Source
     from idlc.model import link
     from idlc.model.link import Model
     from idlc.project.package_xml import Facts
 
-#: How often fixes are made: one may be what another needs, or edit the place of another.
+#: Rounds of fixes: one may depend on another, or edit the same range.
 _ROUNDS = 5
 
 
 class CheckOptions(msgspec.Struct, frozen=True):
-    """What `idlc check` was asked to do."""
+    """The options of `idlc check`."""
 
     paths: tuple[str, ...]
     scope: Scope
@@ -36,9 +36,9 @@ class CheckOptions(msgspec.Struct, frozen=True):
 
 
 class Checked(msgspec.Struct, frozen=True):
-    """The files and packages that were looked at, and how many edits were made.
+    """The checked files and packages, and the number of edits that were made.
 
-    `distros` are the distributions that they were checked for, if those are several.
+    `distros` are the distributions that they were checked for, if there are several.
     """
 
     files: tuple[str, ...]
@@ -48,9 +48,9 @@ class Checked(msgspec.Struct, frozen=True):
 
 
 def check(options: CheckOptions, report: Report) -> Checked:
-    """Report what is wrong with the files that paths mean, and with their packages.
+    """Report the problems of the files in paths, and of their packages.
 
-    With `fix`, what can be fixed without harm is fixed, and the rest reported.
+    With `fix`, problems with a harmless edit are fixed, and the others reported.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
         from idlc.recordings.find import divided
@@ -61,8 +61,8 @@ def check(options: CheckOptions, report: Report) -> Checked:
     fixed = 0
     for rounds_left in reversed(range(_ROUNDS + 1)):
         looked = Report()
-        checked, found = _once(options, looked)
-        edits = [one for problem in found for one in problem.edits]
+        checked, problems = _once(options, looked)
+        edits = [change for problem in problems for change in problem.edits]
         if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
             break
         from idlc.project.atomic import edit
@@ -71,7 +71,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
         fixed += done
         if not done:
             break
-    report.extend((*looked, *found))
+    report.extend((*looked, *problems))
     report.notes += looked.notes
     return msgspec.structs.replace(checked, fixed=fixed)
 
@@ -79,13 +79,13 @@ def check(options: CheckOptions, report: Report) -> Checked:
 def _with_recordings(
     recordings: Sequence[str], others: Sequence[str], options: CheckOptions, report: Report
 ) -> Checked:
-    """Report what is wrong with recordings, and with other paths if there are any."""
+    """Report the problems of recordings, and of other paths if there are any."""
     from idlc.recordings.packages import check_recordings
 
-    found = Report()
-    check_recordings(recordings, options.scope, found)
-    report.extend(one for one in found if options.selection.wants(one))
-    report.notes += found.notes
+    problems = Report()
+    check_recordings(recordings, options.scope, problems)
+    report.extend(problem for problem in problems if options.selection.wants(problem))
+    report.notes += problems.notes
     checked = Checked(())
     if others:
         checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
@@ -93,7 +93,7 @@ def _with_recordings(
 
 
 def tidied(name: str, old: str, new: str) -> str:
-    """Return an edited file laid out as it was: by `idlc fmt`, or a setup.py without long lines."""
+    """Return an edited file in its old layout: that of `idlc fmt`, or without long lines."""
     if name.endswith("setup.py"):
         from idlc.check.package.setup_edits import wrapped
 
@@ -111,43 +111,45 @@ def tidied(name: str, old: str, new: str) -> str:
 def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
     root = scope.root
-    there = look(options.paths, root, report, scope.exclude)
-    packages = inputs.packages(there.files, scope, report, there.packages)
-    for path in there.empty:
-        if not any(one.home.is_relative_to(root.absolute(path)) for one in packages):
+    listing = look(options.paths, root, report, scope.exclude)
+    packages = inputs.packages(listing.files, scope, report, listing.packages)
+    for path in listing.empty:
+        if not any(package.home.is_relative_to(root.absolute(path)) for package in packages):
             report.add(nothing_in(path, root, scope.exclude, also="package.xml and no "))
-    found: dict[str, Report] = {}
+    reports: dict[str, Report] = {}
     models: list[Model] = []
     for distro, checker in checkers(packages, scope).items():
-        found[distro] = Report()
-        models += checker.check(packages, options.selection, found[distro])
-    files = tuple(file.shown for file in there.files)
-    distros = tuple(found) if len(found) > 1 else ()
+        reports[distro] = Report()
+        models += checker.check(packages, options.selection, reports[distro])
+    files = tuple(file.shown for file in listing.files)
+    distros = tuple(reports) if len(reports) > 1 else ()
     checked = Checked(files, len(packages), distros=distros)
-    return checked, judged(found, models, options.selection)
+    return checked, judged(reports, models, options.selection)
 
 
 def checkers(
     packages: Sequence[inputs.Inputs], scope: Scope, *, again: bool = False
 ) -> dict[str, Checker]:
-    """Return what checks packages, for each distribution by its name; `again`: more than once."""
+    """Return the checker of packages for each distribution; `again`: they check repeatedly."""
     distros = scope.distros or (scope.distro,)
     return {
-        one.name: Checker(packages, msgspec.structs.replace(scope, distros=(one,)), again=again)
-        for one in distros
+        distro.name: Checker(
+            packages, msgspec.structs.replace(scope, distros=(distro,)), again=again
+        )
+        for distro in distros
     }
 
 
-def _memory() -> Memory:
-    from idlc.check.registry import Memory
+def _findings() -> IncrementalFindings:
+    from idlc.check.registry import IncrementalFindings
 
-    return Memory()
+    return IncrementalFindings()
 
 
 class Checker:
-    """Checks packages for one distribution, also again after some of their texts changed.
+    """Checks packages for one distribution, repeatedly as some of their texts change.
 
-    Everything else on disk is as it was when it was first looked at.
+    Everything else on disk is assumed unchanged since it was first read.
     """
 
     def __init__(
@@ -156,67 +158,72 @@ class Checker:
         self._scope = scope
         self.library = library_for(packages, scope, Report())
         self._lowered: link.Memory = {}
-        # what each interface depends on is only worth remembering if there is a next time
-        self._checked = _memory() if again else None
-        self._advised = _memory() if again else None
+        # dependencies between interfaces are only worth remembering for a next run
+        self._checked = _findings() if again else None
+        self._advised = _findings() if again else None
         self._facts: dict[str, Facts | None] = {}
 
     def check(
         self, packages: Sequence[inputs.Inputs], selection: Selection, report: Report
     ) -> list[Model]:
-        """Report what is wrong; return the model of each package, with only the given files."""
+        """Report problems; return the model of each package, limited to the checked files."""
         self.library.report_to(report)
         models = []
         compiler = Compiler(self.library, self._lowered, self._checked)
-        for given, model in compiler.all(packages, report):
-            models.append(model.only(given.names))
-            self._advise(given, models[-1], selection, report)
+        for package, model in compiler.all(packages, report):
+            models.append(model.only(package.names))
+            self._advise(package, models[-1], selection, report)
         return models
 
     def _advise(
-        self, given: inputs.Inputs, model: Model, selection: Selection, report: Report
+        self, package: inputs.Inputs, model: Model, selection: Selection, report: Report
     ) -> None:
-        """Report what only `check` looks at: style, portability and the package around."""
+        """Report the rules of `check` alone: on style, portability and the package."""
         from idlc.check.registry import advise, check_package
 
-        with stage("advise", given.package):
+        with stage("advise", package.package):
             advise(model, report, selection, self._advised)
-        surroundings = self.around(given)
+        surroundings = self.package_facts(package)
         if surroundings is not None:
-            with stage("check package", given.package):
+            with stage("check package", package.package):
                 check_package(surroundings, model, report, selection)
 
-    def around(self, given: inputs.Inputs) -> Facts | None:
-        """Return what surrounds a package, with the texts that it has now."""
-        if given.package not in self._facts:
-            found = facts(given, self.library.packages, self._scope)
-            self._facts[given.package] = found
-        known = self._facts[given.package]
-        if known is None or not known.inputs:
-            return known
-        return msgspec.structs.replace(known, inputs=given.digests)
+    def package_facts(self, package: inputs.Inputs) -> Facts | None:
+        """Return the facts about a package, with its current texts."""
+        if package.package not in self._facts:
+            new = facts(package, self.library.packages, self._scope)
+            self._facts[package.package] = new
+        current = self._facts[package.package]
+        if current is None or not current.inputs:
+            return current
+        return msgspec.structs.replace(current, inputs=package.digests)
 
 
 def judged(
-    found: Mapping[str, Report], models: Iterable[Model], selection: Selection
+    reports: Mapping[str, Report], models: Iterable[Model], selection: Selection
 ) -> list[Diagnostic]:
-    """Return the problems to be shown of those that were found for distributions, each once."""
-    texts = {one.source.path: one.source for model in models for one in model.own if one.source}
+    """Return the problems to show from the reports of all distributions, each once."""
+    texts = {
+        interface.source.path: interface.source
+        for model in models
+        for interface in model.own
+        if interface.source
+    }
     sources = list(texts.values())
-    if len(found) == 1:
-        (everything,) = found.values()
-        return _wanted(everything, sources, selection)
+    if len(reports) == 1:
+        (everything,) = reports.values()
+        return _selected(everything, sources, selection)
     from idlc.diagnostics.report import merged, without_overruled
 
-    return list(without_overruled(_wanted(merged(found), sources, selection)))
+    return list(without_overruled(_selected(merged(reports), sources, selection)))
 
 
-def _wanted(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:
+def _selected(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:
     from idlc.check.select import switched_off, without_ignored
 
-    wanted = [one for one in report if selection.wants(one)]
+    selected = [problem for problem in report if selection.wants(problem)]
     return [
-        one
-        for one in without_ignored(wanted, sources)
-        if selection.wants(one) and not switched_off(one, selection)
+        problem
+        for problem in without_ignored(selected, sources)
+        if selection.wants(problem) and not switched_off(problem, selection)
     ]

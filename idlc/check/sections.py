@@ -1,4 +1,4 @@
-"""What rules look at."""
+"""The structures that rules check."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from idlc.model.link import Model
 
 
 def sections(model: Model) -> Iterable[ir.Message]:
-    """Return every structure that stands in the model's own files."""
+    """Return every structure of the model's own files."""
     return (part for interface in model.own for part in derive.sections(interface))

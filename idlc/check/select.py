@@ -1,4 +1,4 @@
-"""Which warnings a team wants to see: by category, code or path. Errors are always seen."""
+"""The selection of warnings by category, code or path. Errors are always reported."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def is_selector(word: str) -> bool:
-    """Return whether a word means any code: `all`, a category, an id, its start or a slug."""
+    """Return whether a word selects any code: `all`, a category, an id, its start or a slug."""
     return any(_means(word, code) for code in codes.CODES.values())
 
 
@@ -37,9 +37,9 @@ def _means(word: str, code: codes.Code) -> bool:
 
 
 class Selection(msgspec.Struct, frozen=True):
-    """What is wanted; `select` replaces what is on by default, `ignore` takes away from it.
+    """The selected codes; `select` replaces the default ones, `ignore` removes some.
 
-    `per_path` are pairs of a path, in which `*` and `?` stand for any text, and what to ignore
+    `per_path` are pairs of a path, in which `*` and `?` match any text, and the codes to ignore
     there.
     """
 
@@ -48,7 +48,7 @@ class Selection(msgspec.Struct, frozen=True):
     per_path: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def with_lists(self, select: str | None, ignore: str | None) -> Selection:
-        """Return what lists of rules with commas change of it: typed ones come after a file's."""
+        """Return the selection changed by comma-separated lists from the command line."""
         chosen = tuple(select.split(",")) if select else self.select
         ignored = (*self.ignore, *(ignore.split(",") if ignore else ()))
         return Selection(chosen, ignored, self.per_path)
@@ -61,12 +61,12 @@ class Selection(msgspec.Struct, frozen=True):
             chosen = any(_means(word, code) for word in self.select)
         return chosen and not any(_means(word, code) for word in self.ignore)
 
-    def wants(self, found: Diagnostic) -> bool:
+    def wants(self, diagnostic: Diagnostic) -> bool:
         """Return whether a problem is to be shown."""
-        code = codes.CODES[found.code]
-        if found.severity is Severity.ERROR or code is codes.IGNORE_WITHOUT_REASON:
+        code = codes.CODES[diagnostic.code]
+        if diagnostic.severity is Severity.ERROR or code is codes.IGNORE_WITHOUT_REASON:
             return True
-        path = found.where[0]
+        path = diagnostic.where[0]
         return self.has(code) and not any(
             any(_means(word, code) for word in ignored)
             for pattern, ignored in self.per_path
@@ -74,12 +74,12 @@ class Selection(msgspec.Struct, frozen=True):
         )
 
 
-# the lengths are bounded, or a long comment without an end would take for ever
+# the lengths are bounded, or a long comment without an end would take forever
 REMARK = r"idlc:\s{0,20}ignore\s{0,20}[\[(]([^\])]{0,200})[\])]\s*(.*)"
 
 
 class Remark(msgspec.Struct, frozen=True):
-    """One code that a remark names; `lines` are those that it is about, `None` for the file."""
+    """One code that a remark names; `lines` are the lines it applies to, `None` for the file."""
 
     code: str
     reason: str
@@ -87,27 +87,29 @@ class Remark(msgspec.Struct, frozen=True):
     lines: frozenset[int] | None
     edit: Edit | None
 
-    def silences(self, found: Diagnostic) -> bool:
-        """Return whether a problem is what the remark is about."""
-        if found.code != self.code or found.severity is Severity.ERROR or not self.reason:
+    def silences(self, diagnostic: Diagnostic) -> bool:
+        """Return whether the remark applies to a problem."""
+        if diagnostic.code != self.code or diagnostic.severity is Severity.ERROR or not self.reason:
             return False
-        if found.span is None:
-            return self.lines is None and found.path == self.span.source.path
-        if found.span.source.path != self.span.source.path:
+        if diagnostic.span is None:
+            return self.lines is None and diagnostic.path == self.span.source.path
+        if diagnostic.span.source.path != self.span.source.path:
             return False
-        line, _ = found.span.source.position(found.span.start)
+        line, _ = diagnostic.span.source.position(diagnostic.span.start)
         return self.lines is None or line in self.lines
 
 
-def without_ignored(found: Iterable[Diagnostic], sources: Iterable[Source]) -> Iterator[Diagnostic]:
-    """Yield the problems that no remark silences, then what is wrong with remarks."""
+def without_ignored(
+    diagnostics: Iterable[Diagnostic], sources: Iterable[Source]
+) -> Iterator[Diagnostic]:
+    """Yield the problems that no remark silences, then the problems of remarks."""
     remarks = [remark for source in sources for remark in _remarks(source)]
     used: set[int] = set()
-    for one in found:
-        silent = {at for at, remark in enumerate(remarks) if remark.silences(one)}
+    for diagnostic in diagnostics:
+        silent = {at for at, remark in enumerate(remarks) if remark.silences(diagnostic)}
         used |= silent
         if not silent:
-            yield one
+            yield diagnostic
     for at, remark in enumerate(remarks):
         if not remark.reason:
             yield codes.IGNORE_WITHOUT_REASON.at(
@@ -120,25 +122,25 @@ def without_ignored(found: Iterable[Diagnostic], sources: Iterable[Source]) -> I
 
 
 def _unused(remark: Remark) -> Diagnostic:
-    known = codes.CODES.get(remark.code)
-    if known is None:
+    code = codes.CODES.get(remark.code)
+    if code is None:
         message = f"there is no code `{remark.code}`"
-    elif known.severity is Severity.ERROR:
+    elif code.severity is Severity.ERROR:
         message = f"`{remark.code}` is an error, which cannot be ignored"
     else:
         message = f"there is no `{remark.code}` here to ignore"
-    found = codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark")
-    return msgspec.structs.replace(found, edits=(remark.edit,)) if remark.edit else found
+    diagnostic = codes.UNUSED_IGNORE.at(remark.span, message, hint="remove the remark")
+    return msgspec.structs.replace(diagnostic, edits=(remark.edit,)) if remark.edit else diagnostic
 
 
-def switched_off(found: Diagnostic, selection: Selection) -> bool:
-    """Return whether an unused remark is about a rule that was not asked."""
-    if found.code != codes.UNUSED_IGNORE.id or found.span is None:
+def switched_off(diagnostic: Diagnostic, selection: Selection) -> bool:
+    """Return whether an unused remark names a rule that did not run."""
+    if diagnostic.code != codes.UNUSED_IGNORE.id or diagnostic.span is None:
         return False
-    known = codes.find(found.span.text)
-    if known is None or known.severity is Severity.ERROR:
+    code = codes.find(diagnostic.span.text)
+    if code is None or code.severity is Severity.ERROR:
         return False
-    return not selection.has(known)
+    return not selection.has(code)
 
 
 def _remarks(source: Source) -> Iterator[Remark]:
@@ -150,15 +152,15 @@ def _remarks(source: Source) -> Iterator[Remark]:
         waiting: list[Remark] = []
         for line in section.lines:
             in_head = in_head and bool(line.comment) and not line.code
-            here, _ = source.position(line.start)
-            found = list(_in_line(source, line, here, in_head))
+            line_number, _ = source.position(line.start)
+            in_line = list(_in_line(source, line, line_number, in_head))
             if not line.definition and not in_head:
-                waiting += found
+                waiting += in_line
             else:
-                yield from found
+                yield from in_line
             if line.definition:
-                lines = frozenset({here})
-                yield from (msgspec.structs.replace(one, lines=lines) for one in waiting)
+                lines = frozenset({line_number})
+                yield from (msgspec.structs.replace(remark, lines=lines) for remark in waiting)
                 waiting = []
         yield from waiting
 
@@ -174,13 +176,13 @@ def _in_line(source: Source, line: tree.Line, number: int, in_head: bool) -> Ite
     for name, at in names:
         span = Span(source, at, at + len(name))
         lines = None if in_head else frozenset({number})
-        known = codes.find(name)
-        code = known.id if known else name
+        named = codes.find(name)
+        code = named.id if named else name
         yield Remark(code, match.group(2).strip(), span, lines, edit)
 
 
 def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | None:
-    """Return the edit that removes a comment that is nothing but the remark."""
+    """Return the edit that removes a comment that holds only the remark."""
     if line.comment[: match.start()].strip("# \t"):
         return None
     code = len(line.code.rstrip())
@@ -191,7 +193,7 @@ def _removal(source: Source, line: tree.Line, match: re.Match[str]) -> Edit | No
 
 
 class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):
-    """`[tool.idlc.check]`; without `select`, what is on by default is meant."""
+    """`[tool.idlc.check]`; without `select`, the default codes apply."""
 
     select: Annotated[tuple[str, ...] | None, Meta(title="a list of strings")] = None
     ignore: Texts = ()
@@ -199,7 +201,7 @@ class CheckSettings(msgspec.Struct, frozen=True, rename="kebab"):
 
 
 def selection(config: Config, report: Report) -> Selection:
-    """Return which warnings `[tool.idlc.check]` asks for."""
+    """Return the selection in `[tool.idlc.check]`."""
     table, place = command_table(config, "check", CheckSettings, report)
     if place is None:
         return Selection()
@@ -209,7 +211,7 @@ def selection(config: Config, report: Report) -> Selection:
         for path, words in table.per_path.items()
     }
     lists = [(place, "select", table.select or ()), (place, "ignore", table.ignore)]
-    for where, key, words in (*lists, *((paths, *one) for one in per_path.items())):
+    for where, key, words in (*lists, *((paths, *entry) for entry in per_path.items())):
         for word in words:
             if not is_selector(word):
                 message = f"`{key}` in {where.shown} has `{word}`, which means no rule"

@@ -1,4 +1,4 @@
-"""Advice on names, comments and units; nothing of it changes what a file means."""
+"""Rules on names, comments and units, which do not affect the meaning of a file."""
 
 from __future__ import annotations
 
@@ -115,26 +115,26 @@ def expects_unit(name: str) -> str | None:
         "gain",
     ):
         return None
-    found = next((QUANTITIES[word] for word in reversed(words) if word in QUANTITIES), None)
-    if found == "m/s" and "angular" in words:
+    unit = next((QUANTITIES[word] for word in reversed(words) if word in QUANTITIES), None)
+    if unit == "m/s" and "angular" in words:
         return "rad/s"
-    return "rad/s^2" if found == "m/s^2" and "angular" in words else found
+    return "rad/s^2" if unit == "m/s^2" and "angular" in words else unit
 
 
 def unit_of(field: ir.Field) -> str | None:
-    """Return a field's unit as its writer meant it.
+    """Return a field's unit as its author intended it.
 
-    The brackets of `# idlc: ignore[IDL405]` hide it from ROS 2, or are taken for it.
+    The brackets of `# idlc: ignore[IDL405]` hide it from ROS 2, or ROS 2 takes them for it.
     """
     if field.unit is not None and not field.unit.startswith("IDL"):
         return field.unit
     pairs = brackets(REMARK.sub("", "\n".join(field.comment)))
-    found = [inside for _, inside in islice(pairs, 2)]
-    return found[0] if len(found) == 1 else None
+    units = [inside for _, inside in islice(pairs, 2)]
+    return units[0] if len(units) == 1 else None
 
 
 def is_known_by(name: str, unit: str) -> bool:
-    """Return whether a field's name says its unit, or is of what has that unit in ROS as well."""
+    """Return whether a field's name has its unit, or is a quantity that ROS itself has in it."""
     words = name.split("_")
     if unit in words or re.sub(r"\W", "_", unit) in name:
         return True
@@ -142,13 +142,13 @@ def is_known_by(name: str, unit: str) -> bool:
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a unit that one meets, of REP 103 or not."""
-    known = {*QUANTITIES.values(), *_USUAL, *_USUAL.values(), "rad/s^2", "m^2", "m^3", "T", "lx"}
-    return text in known
+    """Return whether a text is a common unit, of REP 103 or not."""
+    units = {*QUANTITIES.values(), *_USUAL, *_USUAL.values(), "rad/s^2", "m^2", "m^3", "T", "lx"}
+    return text in units
 
 
 def usual_unit(unit: str) -> str | None:
-    """Return the unit of REP 103 for one that is not of it, `None` for any other text."""
+    """Return the unit of REP 103 for an unusual one, `None` for any other text."""
     text = re.sub(r"\s+", "", unit)
     return _USUAL.get(text) or _USUAL.get(text.lower() if len(text) > 2 else text)
 
@@ -180,7 +180,7 @@ def stamped(model: Model, report: Report) -> None:
 
 
 def _is_stamp(field: ir.Field, model: Model) -> bool:
-    """Return whether a field is a stamp, or of a type that is an error anyway."""
+    """Return whether a field is a stamp, or has an erroneous type anyway."""
     if isinstance(field.type, ir.Ref) and field.type.target not in model.interfaces:
         return True
     is_header = field.type == HEADER and field.name == "header"
@@ -198,18 +198,18 @@ def documented_interfaces(model: Model, report: Report) -> None:
     """Every file begins with a comment that says what it is for."""
     for interface in model.own:
         if interface.source and not any(part.comment for part in derive.sections(interface)):
-            what = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
+            noun = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
             report.add(
                 codes.UNDOCUMENTED_INTERFACE.at(
                     _top(interface),
-                    f"nothing says what {what} `{interface.name.name}` is for",
+                    f"nothing says what {noun} `{interface.name.name}` is for",
                     hint="begin the file with a comment and an empty line",
                 )
             )
 
 
 def documented_fields(model: Model, report: Report) -> None:
-    """Every field has a comment or a unit, or stands in a message whose comment is all there is."""
+    """Every field has a comment or a unit."""
     for message in sections(model):
         for field in message.fields:
             if not field.comment and not unit_of(field) and field.name_span:
@@ -230,7 +230,7 @@ def _quantities(model: Model) -> Iterable[ir.Field]:
 
 
 def missing_units(model: Model, report: Report) -> None:
-    """A number that is a physical quantity by its name says its unit."""
+    """A number whose name is a physical quantity has a unit."""
     for field in _quantities(model):
         unit = expects_unit(field.name)
         if unit and not unit_of(field) and field.name_span and not _says(field.comment, unit):
@@ -286,7 +286,9 @@ def suffixes(model: Model, report: Report) -> None:
     """The name of a file does not repeat what its extension says."""
     for interface in model.own:
         name, kind = interface.name.name, interface.name.kind
-        suffix = next((one for one in _SUFFIXES[kind] if name.endswith(one) and name != one), None)
+        suffix = next(
+            (ending for ending in _SUFFIXES[kind] if name.endswith(ending) and name != ending), None
+        )
         if suffix and interface.source:
             report.add(
                 codes.REDUNDANT_SUFFIX.of(

@@ -1,4 +1,4 @@
-"""The list of commands; each is imported when it is asked for."""
+"""The list of commands; each is imported when it is invoked."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from idlc.version import __version__
 class LazyGroup(click.Group):
     """A group of commands, each with its line in the overview.
 
-    The module of a command is `modules` with its name; `meant` are words of other tools, each with
-    the command that is suggested for it.
+    The module of a command is `modules` with its name; `synonyms` are words of other tools with
+    the commands that are suggested for them.
     """
 
     def __init__(
@@ -26,13 +26,13 @@ class LazyGroup(click.Group):
         *args: Any,
         overview: Mapping[str, str],
         modules: str,
-        meant: Mapping[str, str] | None = None,
+        synonyms: Mapping[str, str] | None = None,
         **more: Any,
     ) -> None:
         super().__init__(*args, **more)
         self._overview = overview
         self._modules = modules
-        self._meant = meant or {}
+        self._synonyms = synonyms or {}
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Return the names in the order in which people need them."""
@@ -48,7 +48,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for; suggest one for a name that there is not."""
+        """Return the invoked command; suggest one for an unknown name."""
         name = args[0]
         unknown = name not in self._overview and not name.startswith("-")
         if unknown and not ctx.resilient_parsing:
@@ -58,8 +58,8 @@ class LazyGroup(click.Group):
     def _hint(self, name: str) -> str:
         from idlc.diagnostics.text import did_you_mean
 
-        known = self._meant.get(name.lower())
-        close = f"did you mean `{known}`?" if known else did_you_mean(name, self._overview)
+        synonym = self._synonyms.get(name.lower())
+        close = f"did you mean `{synonym}`?" if synonym else did_you_mean(name, self._overview)
         return close or f"the commands are {', '.join(self._overview)}"
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
@@ -86,8 +86,8 @@ COMMANDS = {
 }
 
 
-#: What people type who know other tools, and what it is called here.
-MEANT = {
+#: Words of other tools, with the names of the commands here.
+SYNONYMS = {
     **dict.fromkeys(("generate", "compile", "build", "codegen", "make"), "gen"),
     **dict.fromkeys(("new", "create", "init", "add"), "scaffold"),
     **dict.fromkeys(("lint", "validate", "verify", "test"), "check"),
@@ -105,7 +105,7 @@ class App(LazyGroup):
     """The group of all commands, which `idlc help` explains too."""
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command that was asked for."""
+        """Run the invoked command."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError as error:
@@ -114,7 +114,7 @@ class App(LazyGroup):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for; `help` is another way to write `--help`."""
+        """Return the invoked command; `help` is another way to write `--help`."""
         if args[0] == "help" and len(args) > 1:
             args = [*args[1:], *([] if ctx.resilient_parsing else ["--help"])]
         elif args[0] == "help" and not ctx.resilient_parsing:
@@ -144,7 +144,7 @@ Completion of commands, options, types and codes, for bash, zsh and fish:
     cls=App,
     overview=COMMANDS,
     modules="idlc.cli.",
-    meant=MEANT,
+    synonyms=SYNONYMS,
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=EPILOG,
     no_args_is_help=True,

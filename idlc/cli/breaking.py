@@ -20,8 +20,8 @@ GRAPH = "graph"
 PATIENCE = 5.0
 
 
-class BreakingWishes(NamedTuple):
-    """What was typed."""
+class BreakingArguments(NamedTuple):
+    """The arguments of `idlc breaking`."""
 
     paths: tuple[str, ...]
     against: str | None
@@ -34,7 +34,7 @@ class BreakingWishes(NamedTuple):
     style: str
 
 
-def compare(typed: BreakingWishes) -> int:
+def compare(typed: BreakingArguments) -> int:
     """Compare versions, show what breaks and return the exit status."""
     from idlc.cli import output
     from idlc.compare import packages
@@ -59,7 +59,7 @@ def compare(typed: BreakingWishes) -> int:
     if against is not None and not report.had_errors:
         recordings, paths = _recordings(against, typed.paths, settings.root)
         needs_none = recordings or is_distro(against)
-        wanted = BreakingOptions(
+        comparison = BreakingOptions(
             paths=paths or settings.paths or (() if needs_none else (".",)),
             against=against,
             scope=scope(settings, typed.package, typed.include, typed.exclude, typed.distro),
@@ -68,7 +68,7 @@ def compare(typed: BreakingWishes) -> int:
             allowed_in=settings.source.path if settings.source else "",
             today=datetime.datetime.now().astimezone().date().isoformat(),
         )
-        verdict = _compared(wanted, recordings, typed, report)
+        verdict = _compared(comparison, recordings, typed, report)
         if recordings:
             output.notes(report, sys.stderr)
     _show(report, verdict, typed)
@@ -90,26 +90,29 @@ def _recordings(
 
 
 def _compared(
-    wanted: BreakingOptions, recordings: tuple[str, ...], typed: BreakingWishes, report: Report
+    comparison: BreakingOptions,
+    recordings: tuple[str, ...],
+    typed: BreakingArguments,
+    report: Report,
 ) -> Verdict | GraphVerdict | RecordedVerdict | None:
     from idlc.compare.breaking import breaking
 
     if recordings:
         from idlc.compare.recording import compare_with_recordings
 
-        return compare_with_recordings(wanted, recordings, report)
-    if wanted.against != GRAPH:
-        return breaking(wanted, report)
+        return compare_with_recordings(comparison, recordings, report)
+    if comparison.against != GRAPH:
+        return breaking(comparison, report)
     from idlc.compare.running import compare_with_graph
 
     patience = typed.timeout or PATIENCE
-    return compare_with_graph(wanted, patience, report, is_given=bool(typed.paths))
+    return compare_with_graph(comparison, patience, report, has_paths=bool(typed.paths))
 
 
 def _show(
     report: Report,
     verdict: Verdict | GraphVerdict | RecordedVerdict | None,
-    typed: BreakingWishes,
+    typed: BreakingArguments,
 ) -> None:
     from idlc.check.run import Checked
     from idlc.cli import output, reports
@@ -135,7 +138,7 @@ def _show(
 def _summary(
     verdict: Verdict | GraphVerdict | RecordedVerdict, levels: tuple[str, ...] = ()
 ) -> str:
-    """Return the last line of the text: it says what was not looked at, or not shown."""
+    """Return the last line of the text, with what was not compared or not shown."""
     from idlc.compare.breaking import Verdict
     from idlc.diagnostics.terminal import counted
 
@@ -154,7 +157,7 @@ def _summary(
 
 
 def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
-    """Return what was looked at, and what of it was not told."""
+    """Return the numbers of compared things, and of changes that are not reported."""
     from idlc.diagnostics.terminal import counted
 
     seen = [counted(number, noun) for noun, number in verdict.seen.items()]
@@ -168,7 +171,7 @@ def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
 
 
 def _next(verdict: Verdict) -> str:
-    """Return what was added, and which version comes next."""
+    """Return the added interfaces, and the next version."""
     from idlc.diagnostics.report import first_few
 
     text = f"; added: {first_few(verdict.added, 5)}" if verdict.added else ""
@@ -257,7 +260,7 @@ def command(
     Against the graph, it reports the types of which running nodes have several versions, or
     another one than the files here or the installed packages.
     """
-    typed = BreakingWishes(
+    typed = BreakingArguments(
         paths, against, timeout, levels, package, include, exclude, distro, style
     )
     return compare(typed)

@@ -1,4 +1,4 @@
-"""What a word on the command line may become: names only, nothing is parsed."""
+"""Completions of a word on the command line: names only, nothing is parsed."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def types(
 ) -> list[str]:
     """Return the types that a word begins, written as it is.
 
-    `package/Name` and `package/kind/Name` are both known. A name without package may be `bare`:
-    that of any type for `all`, otherwise that of a type of the packages around.
+    `package/Name` and `package/kind/Name` are both known. Names without a package are of any
+    type if `bare` is `all`, otherwise of types in the workspace.
     """
     library = _library(include, distro)
     package, slash, rest = word.partition("/")
@@ -37,15 +37,16 @@ def types(
         return sorted(_within(package, rest, library, kinds))
     near = list(inputs.near(Root.here()))
     named = {
-        one.name
+        interface.name
         for name in (library.packages() if bare == "all" else near)
-        for one in library.interfaces(name)
-        if word and one.kind in kinds and one.name.startswith(word)
+        for interface in library.interfaces(name)
+        if word and interface.kind in kinds and interface.name.startswith(word)
     }
+    packages = (name for name in library.packages() if name.startswith(word))
     holding = [
         name
-        for name in library.packages()
-        if name.startswith(word) and any(one.kind in kinds for one in library.interfaces(name))
+        for name in packages
+        if any(interface.kind in kinds for interface in library.interfaces(name))
     ]
     if len(holding) == 1 and not named:
         return sorted(_within(holding[0], "", library, kinds))
@@ -53,29 +54,29 @@ def types(
 
 
 def topics(word: str, paths: Sequence[str]) -> list[str]:
-    """Return the topics of recordings that a beginning fits."""
+    """Return the topics of recordings that begin with a word."""
     from idlc.recordings.find import divided
     from idlc.recordings.versions import read
 
-    found = (read(path, Report()) for path in divided(paths, Root.here())[0])
-    names = {one.topic.name for recording in found if recording for one in recording.topics}
+    recordings = filter(None, (read(path, Report()) for path in divided(paths, Root.here())[0]))
+    names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 
 
 def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind]) -> Iterator[str]:
-    """Yield the types of a package that a beginning fits, with their kind if it names one."""
-    for one in library.interfaces(package):
-        full = f"{one.kind}/{one.name}"
-        if one.kind in kinds:
-            if one.name.startswith(rest):
-                yield f"{package}/{one.name}"
+    """Yield the types of a package that begin with `rest`, with their kind if it names one."""
+    for interface in library.interfaces(package):
+        full = f"{interface.kind}/{interface.name}"
+        if interface.kind in kinds:
+            if interface.name.startswith(rest):
+                yield f"{package}/{interface.name}"
             elif full.startswith(rest):
                 yield f"{package}/{full}"
 
 
 def _library(include: Sequence[str], distro: str | None) -> Library:
-    """Return what is there for the distribution that was typed, else for the one that is meant."""
+    """Return the library for a distribution, by default for the one in the settings."""
     report, root = Report(), Root.here()
-    known = distro if distro in BY_NAME else None
-    meant = scope(load_settings(root, report), distro=known).distro
-    return Library(include, root, report, own=inputs.near(root), distro=meant)
+    name = distro if distro in BY_NAME else None
+    selected = scope(load_settings(root, report), distro=name).distro
+    return Library(include, root, report, own=inputs.near(root), distro=selected)

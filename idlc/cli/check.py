@@ -62,12 +62,12 @@ def command(
 
     Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
     """
-    from idlc.cli.direct import Wishes, check_paths
+    from idlc.cli.direct import CheckArguments, check_paths
 
     options.check_rules(select, ignore)
     if prefix is not None and (paths or fix):
         raise click.UsageError("--prefix looks at what is installed, without PATH and --fix")
-    wishes = Wishes(
+    arguments = CheckArguments(
         select, ignore, fix, strict, package, include, exclude, style, statistics, prefix, distro
     )
-    return check_paths(paths, wishes)
+    return check_paths(paths, arguments)

@@ -20,7 +20,7 @@ Example:
 
 
 @click.command("columns", epilog=EPILOG)
-@click.argument("wanted", metavar="REC", type=click.Path())
+@click.argument("subject", metavar="REC", type=click.Path())
 @click.argument("topics", metavar="[TOPIC]...", nargs=-1, shell_complete=completion.topics)
 @click.option(
     "-o",
@@ -64,7 +64,7 @@ Example:
 )
 @options.include
 @click.option("--force", is_flag=True, help="Replace files that exist.")
-def command(wanted: str, fields: str | None, **given: Any) -> int:
+def command(subject: str, fields: str | None, **arguments: Any) -> int:
     """Write topics of a recording as columns, for pandas, DuckDB and others.
 
     REC is an .mcap or .db3 file, or the folder of a bag; several, or a pattern such as
@@ -79,14 +79,14 @@ def command(wanted: str, fields: str | None, **given: Any) -> int:
     from idlc.recordings.find import divided, expanded
 
     report = Report()
-    names = None if fields is None else tuple(one.strip() for one in fields.split(","))
-    recordings, topics = divided(given.pop("topics"), Root.here())
-    paths = (*expanded(wanted), *recordings)
-    asked = ColumnsOptions(paths or (wanted,), tuple(topics), fields=names, **given)
-    with shown(sys.stderr) as tell:
-        written = columns(asked, report, tell)
-    for one in written:
-        sys.stderr.write(f"{one.topic}: {one.rows:,} messages → {one.path}\n")
+    names = None if fields is None else tuple(name.strip() for name in fields.split(","))
+    recordings, topics = divided(arguments.pop("topics"), Root.here())
+    paths = (*expanded(subject), *recordings)
+    request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
+    with shown(sys.stderr) as update:
+        written = columns(request, report, update)
+    for file in written:
+        sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     return output.status(report)

@@ -1,4 +1,4 @@
-"""What shells offer for words that are not options: types, packages, codes."""
+"""Shell completion of words that are not options: types, packages, codes."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ def types_and_paths(
     """Offer types and, in the shell's own way, files."""
     from idlc.cli import candidates
 
-    found = candidates.types(word, _include(context), distro=context.params.get("distro"))
-    # bash forgets what was offered before files
-    return [_item(word, "file"), *map(_item, found)]
+    names = candidates.types(word, _include(context), distro=context.params.get("distro"))
+    # bash forgets items before files
+    return [_item(word, "file"), *map(_item, names)]
 
 
 def topics(context: click.Context, _: click.Parameter, word: str) -> list[str]:
     """Offer the topics of the recordings that were typed."""
     from idlc.cli import candidates
 
-    typed: Any = context.params.get("paths") or (context.params.get("wanted"),)
-    # what comes before an option without its value is left as it was typed
+    typed: Any = context.params.get("paths") or (context.params.get("subject"),)
+    # arguments before an option without its value are not parsed
     return candidates.topics(word, [path for path in (*typed, *context.args) if path])
 
 
@@ -59,23 +59,23 @@ def codes(_: click.Context, __: click.Parameter, word: str) -> list[CompletionIt
 
     ids = [_item(code.id, about=code.slug) for code in CODES.values()]
     names = [_item(code.slug, about=code.id) for code in CODES.values()]
-    return [one for one in (*ids, *names) if one.value.startswith(word)]
+    return [item for item in (*ids, *names) if item.value.startswith(word)]
 
 
 def rules(context: click.Context, option: click.Parameter, word: str) -> list[CompletionItem[str]]:
-    """Offer what a list of rules can go on with."""
+    """Offer the next names in a list of rules."""
     from idlc.diagnostics.codes import CATEGORIES
 
     before, comma, last = word.rpartition(",")
     groups = [_item(name) for name in ("all", *CATEGORIES) if name.startswith(last)]
     return [
-        _item(f"{before}{comma}{one.value}", about=one.help)
-        for one in (*groups, *codes(context, option, last))
+        _item(f"{before}{comma}{item.value}", about=item.help)
+        for item in (*groups, *codes(context, option, last))
     ]
 
 
 def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
-    """Offer what a list of distributions can go on with."""
+    """Offer the next names in a list of distributions."""
     from idlc.model.distros import BY_NAME
 
     before, comma, last = word.rpartition(",")
@@ -83,11 +83,11 @@ def distros(_: click.Context, __: click.Parameter, word: str) -> list[str]:
 
 
 def _include(context: click.Context) -> tuple[str, ...]:
-    given: Any = context.params.get("include")
-    return tuple(given or ())
+    folders: Any = context.params.get("include")
+    return tuple(folders or ())
 
 
 def _item(value: str, kind: str = "plain", about: str | None = None) -> CompletionItem[str]:
-    from click.shell_completion import CompletionItem  # no run but a shell's needs it
+    from click.shell_completion import CompletionItem  # only shells need it
 
     return CompletionItem(value, kind, about)

@@ -18,7 +18,7 @@ Example:
 
 @click.command("describe", epilog=EPILOG)
 @click.argument(
-    "wanted",
+    "subject",
     metavar="TYPE|PATH",
     type=click.Path(),
     shell_complete=completion.types_and_paths,
@@ -26,7 +26,7 @@ Example:
 @options.package
 @options.include
 @options.distro
-def command(wanted: str, package: str | None, include: tuple[str, ...], distro: str | None) -> int:
+def command(subject: str, package: str | None, include: tuple[str, ...], distro: str | None) -> int:
     """Print a type description with its hashes: the JSON that ROS 2 installs."""
     import json
 
@@ -39,7 +39,7 @@ def command(wanted: str, package: str | None, include: tuple[str, ...], distro: 
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package, include, distro=distro)
-    content = None if report.had_errors else describe(wanted, where, report)
+    content = None if report.had_errors else describe(subject, where, report)
     if content is not None:
         sys.stdout.write(json.dumps(content, indent=2) + "\n")
     output.show(report, "text", sys.stderr)

@@ -14,8 +14,8 @@ from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 
 
-class Wishes(msgspec.Struct, frozen=True):
-    """What was typed besides paths; `select` and `ignore` are lists of rules with commas."""
+class CheckArguments(msgspec.Struct, frozen=True):
+    """The arguments besides paths; `select` and `ignore` are lists of rules with commas."""
 
     select: str | None = None
     ignore: str | None = None
@@ -30,32 +30,39 @@ class Wishes(msgspec.Struct, frozen=True):
     distro: str | None = None
 
 
-def check_paths(paths: tuple[str, ...], wishes: Wishes | None = None) -> int:
-    """Check what paths mean, or pyproject.toml, or the working folder; return the exit status."""
-    wishes = wishes or Wishes()
+def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None) -> int:
+    """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
+    arguments = arguments or CheckArguments()
     report = Report()
     settings = load_settings(Root.here(), report)
     configured = select.selection(settings, report)
-    chosen = configured.with_lists(wishes.select, wishes.ignore)
+    chosen = configured.with_lists(arguments.select, arguments.ignore)
     checked = Checked(())
-    if wishes.prefix is not None:
+    if arguments.prefix is not None:
         from idlc.check.prefix import check_prefix
 
-        checked = check_prefix(wishes.prefix, settings.root, report)
+        checked = check_prefix(arguments.prefix, settings.root, report)
     elif not report.had_errors:
-        wanted = CheckOptions(
-            paths=paths or settings.paths or (".",),
-            scope=scope(settings, wishes.package, wishes.include, wishes.exclude, wishes.distro),
-            selection=chosen,
-            fix=wishes.fix,
+        where = scope(
+            settings,
+            arguments.package,
+            arguments.include,
+            arguments.exclude,
+            arguments.distro,
         )
-        checked = check(wanted, report)
-    numbers, strict = wishes.statistics, wishes.strict
-    reports.write(report, wishes.style, checked, sys.stdout, numbers=numbers, strict=strict)
-    return output.status(report) or int(wishes.strict and bool(len(report)))
+        options = CheckOptions(
+            paths=paths or settings.paths or (".",),
+            scope=where,
+            selection=chosen,
+            fix=arguments.fix,
+        )
+        checked = check(options, report)
+    numbers, strict = arguments.statistics, arguments.strict
+    reports.write(report, arguments.style, checked, sys.stdout, numbers=numbers, strict=strict)
+    return output.status(report) or int(arguments.strict and bool(len(report)))
 
 
-def run() -> int:
+def serve_editor() -> int:
     """Serve the client at the other end of standard input and output; return the exit status."""
     from idlc.editor.server import serve
 

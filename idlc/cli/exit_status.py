@@ -1,4 +1,4 @@
-"""How a command ends, whatever happens in it."""
+"""The exit status of a command, also after exceptions."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import os
 import sys
 from collections.abc import Callable
 
-#: What stands for signs that an encoding does not have.
+#: Replacements of characters that an encoding does not have.
 _PLAIN = {"→": "->", "…": "..."}
 
 
 def set_up() -> None:
-    """Let no text stop a command, and let what Windows redirects be what others redirect.
+    """Replace characters that cannot be encoded, and redirect output on Windows as elsewhere.
 
-    There, files and pipes would get the encoding of the country and other line ends, so that no
-    program could read them. PYTHONIOENCODING has the last word.
+    There, files and pipes would get a local encoding and other line ends, which other programs
+    cannot read. PYTHONIOENCODING takes precedence.
     """
     codecs.register_error("idlc", _readable)
     for stream in (sys.stdout, sys.stderr):
@@ -32,7 +32,7 @@ def set_up() -> None:
 
 
 def _readable(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Return what stands for the first sign that cannot be encoded, and where to go on."""
+    """Return the replacement of the first character that cannot be encoded, and its end."""
     if isinstance(error, UnicodeEncodeError) and (plain := _PLAIN.get(error.object[error.start])):
         return plain, error.start + 1
     if isinstance(error, UnicodeEncodeError):
@@ -47,7 +47,7 @@ INTERNAL = 3
 
 
 class PipeClosedError(Exception):
-    """Nobody reads what idlc writes any more; click would end the process itself."""
+    """The reader of the output is gone; click would end the process itself."""
 
 
 def ended(command: Callable[[], object]) -> int:
@@ -65,7 +65,7 @@ def ended(command: Callable[[], object]) -> int:
         sys.stderr.write("interrupted\n")
         return INTERRUPTED
     except (BrokenPipeError, PipeClosedError):
-        # what is still buffered would fail again when Python closes the stream
+        # buffered output would fail again when Python closes the stream
         with contextlib.suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return PIPE_CLOSED
@@ -75,7 +75,7 @@ def ended(command: Callable[[], object]) -> int:
 
 
 def _internal(error: Exception) -> int:
-    """Show what must not happen as IDL901."""
+    """Show an unexpected exception as IDL901."""
     from idlc.check.compiler import InternalError
     from idlc.cli import output
     from idlc.diagnostics import codes

@@ -26,7 +26,7 @@ class Formatted(NamedTuple):
 
     @property
     def changed(self) -> bool:
-        """Whether its layout is not the canonical one."""
+        """True if its layout is not the canonical one."""
         return self.old != self.new
 
 
@@ -47,10 +47,10 @@ def fmt(
         if source is None:
             continue
         with stage("format", file.shown):
-            found = _format(file, source, report)
-        if write and found.changed and found.new is not None:
-            rewrite(file.path, file.shown, source.text, found.new, report)
-        yield found
+            formatted = _format(file, source, report)
+        if write and formatted.changed and formatted.new is not None:
+            rewrite(file.path, file.shown, source.text, formatted.new, report)
+        yield formatted
 
 
 def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
@@ -103,7 +103,7 @@ def _summary(files: Sequence[Formatted], done: str) -> str:
 
 
 def _diff(file: Formatted, stream: TextIO) -> Iterator[str]:
-    """Yield a unified diff: for a program as it is, for a terminal without what would harm it."""
+    """Yield a unified diff: for a program as it is, for a terminal without control characters."""
     from difflib import unified_diff
 
     from idlc.cli import output

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def refuse(report: Report, style: str) -> None:
-    """Show problems that leave nothing to be done."""
+    """Show problems that prevent a run."""
     from idlc.cli import output
 
     if style == "text":
@@ -29,25 +29,25 @@ def refuse(report: Report, style: str) -> None:
         _document(report, style)
 
 
-def once(wanted: GenOptions, style: str) -> int:
-    """Run once, show what happened and return the exit status."""
+def once(request: GenOptions, style: str) -> int:
+    """Run once, show the outcome and return the exit status."""
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import gen
 
     report = Report()
-    packages = gen(wanted, report)
+    packages = gen(request, report)
     if style == "text":
-        _tell(report, packages, wanted.check)
+        _show_outcome(report, packages, request.check)
     else:
-        _document(report, style, packages, check=wanted.check)
+        _document(report, style, packages, check=request.check)
     return output.status(report)
 
 
 def _document(
     report: Report, style: str, packages: Sequence[Generated] = (), *, check: bool = False
 ) -> None:
-    """Write what happened in a format for programs."""
+    """Write the outcome in a format for programs."""
     from idlc.cli import output, reports
 
     if style != "json":
@@ -62,7 +62,7 @@ def _document(
     output.fact(sys.stdout, "summary", **output.counts(report))
 
 
-def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
+def _show_outcome(report: Report, packages: Sequence[Generated], check: bool) -> None:
     from idlc.cli import output
     from idlc.diagnostics.terminal import summary
 
@@ -77,7 +77,7 @@ def _tell(report: Report, packages: Sequence[Generated], check: bool) -> None:
 
 
 def _line(package: Generated, check: bool) -> str:
-    """Return the line about a package: what it is, and what was done if only a part was written."""
+    """Return the line about a package: its size, and the changes if only a part was written."""
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
 
@@ -100,42 +100,42 @@ def _line(package: Generated, check: bool) -> str:
 INTERVAL = 0.25
 
 
-def run_again(wanted: GenOptions, style: str) -> int:
-    """Run now and after each change of what is compiled; Ctrl-C ends it with status 0."""
+def run_again(request: GenOptions, style: str) -> int:
+    """Run now and after each change of a compiled file; Ctrl-C ends it with status 0."""
     from idlc.diagnostics.text import one_line
 
     try:
-        seen = _snapshot(wanted)
-        once(wanted, style)
-        sys.stderr.write(f"watching {one_line(', '.join(wanted.paths))}; Ctrl-C ends\n")
+        seen = _snapshot(request)
+        once(request, style)
+        sys.stderr.write(f"watching {one_line(', '.join(request.paths))}; Ctrl-C ends\n")
         while True:
             sys.stdout.flush()
             sys.stderr.flush()
             time.sleep(INTERVAL)
-            now = _snapshot(wanted)
+            now = _snapshot(request)
             if now == seen:
                 continue
-            while (later := _after(wanted)) != now:
+            while (later := _after(request)) != now:
                 now = later
             seen = now
-            once(wanted, style)
+            once(request, style)
     except KeyboardInterrupt:
         sys.stderr.write("\n")
         return 0
 
 
-def _after(wanted: GenOptions) -> dict[str, Stamp]:
+def _after(request: GenOptions) -> dict[str, Stamp]:
     """Return a snapshot from a moment later, so that a burst of changes counts as one."""
     time.sleep(INTERVAL)
-    return _snapshot(wanted)
+    return _snapshot(request)
 
 
-def _snapshot(wanted: GenOptions) -> dict[str, Stamp]:
+def _snapshot(request: GenOptions) -> dict[str, Stamp]:
     from idlc.project.find import snapshot, stamps
     from idlc.recordings.find import files
 
-    root = wanted.scope.root
-    return snapshot(wanted.paths, wanted.scope.include, root) | stamps(files(wanted.paths, root))
+    root = request.scope.root
+    return snapshot(request.paths, request.scope.include, root) | stamps(files(request.paths, root))
 
 
 EPILOG = """\
@@ -184,7 +184,7 @@ All options can be kept in pyproject.toml:
 )
 @click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
 @options.report_style
-def command(style: str, watch: bool, **given: Any) -> int:
+def command(style: str, watch: bool, **arguments: Any) -> int:
     """Compile interface files into a Python package.
 
     PATH is a package folder, a folder of interface files, a .msg, .srv or .action file, a folder of
@@ -207,34 +207,34 @@ def command(style: str, watch: bool, **given: Any) -> int:
     if report.had_errors:
         refuse(report, style)
         return output.status(report)
-    package = given["package"]
-    words = [given.pop(name) for name in ("package", "include", "exclude", "distro")]
+    package = arguments["package"]
+    words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
     again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
-    asked = GenOptions(**given, scope=scope(settings, *words), again=again)
-    wanted = in_package(with_settings(asked, settings))
-    if not wanted.paths or not (wanted.out or wanted.ament):
-        missing = "-o OUT or --ament PREFIX" if wanted.paths else "PATH"
+    typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
+    request = in_package(with_settings(typed, settings))
+    if not request.paths or not (request.out or request.ament):
+        missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    _refuse_in_vain(wanted, package)
-    if wanted.check and (watch or wanted.force):
+    _refuse_useless(request, package)
+    if request.check and (watch or request.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
         )
     if watch and style in options.DOCUMENTS:
         raise click.UsageError("--watch goes with --format text and json only")
     if watch:
-        return run_again(wanted, style)
-    return once(wanted, style)
+        return run_again(request, style)
+    return once(request, style)
 
 
-def _refuse_in_vain(wanted: GenOptions, package: str | None) -> None:
-    """Refuse options that mean nothing for what was given."""
+def _refuse_useless(request: GenOptions, package: str | None) -> None:
+    """Refuse options that have no effect on the paths."""
     from idlc.project.find import is_path
     from idlc.recordings.find import divided
 
-    root = wanted.scope.root
-    recordings, others = divided(wanted.paths, root) if package or wanted.topics else ((), ())
-    if wanted.topics and not recordings:
+    root = request.scope.root
+    recordings, others = divided(request.paths, root) if package or request.topics else ((), ())
+    if request.topics and not recordings:
         raise click.UsageError("--topic is for recordings, and none was given")
     if package and not any(is_path(word, root) for word in others):
         what = "what was recorded" if recordings else "what is installed"

@@ -18,7 +18,7 @@ Example:
 
 @click.command("hash", epilog=EPILOG)
 @click.argument(
-    "wanted",
+    "subjects",
     metavar="PATH|TYPE...",
     nargs=-1,
     required=True,
@@ -30,7 +30,7 @@ Example:
 @options.exclude
 @options.distro
 def command(
-    wanted: tuple[str, ...],
+    subjects: tuple[str, ...],
     package: str | None,
     include: tuple[str, ...],
     exclude: tuple[str, ...],
@@ -50,7 +50,7 @@ def command(
     settings = load_settings(Root.here(), report)
     if not report.had_errors:
         where = scope(settings, package, include, exclude, distro)
-        for value, name in hashes(wanted, where, report):
+        for value, name in hashes(subjects, where, report):
             sys.stdout.write(f"{value}  {name}\n")
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)

@@ -39,16 +39,16 @@ def command(
 
     report = Report()
     where = scope(load_settings(Root.here(), report), include=include, distro=distro)
-    found = [] if packages else library.packages(where, report)
+    listed = [] if packages else library.packages(where, report)
     names = library.interfaces(packages, where, report) if packages else []
     if style == "json":
-        for package in found:
+        for package in listed:
             output.fact(sys.stdout, "package", **package._asdict())
         for name in names:
             output.fact(sys.stdout, "interface", name=name)
     else:
-        width = max((len(package.name) for package in found), default=0)
-        for name, number, path in found:
+        width = max((len(package.name) for package in listed), default=0)
+        for name, number, path in listed:
             place = one_line(path) if path else "built in"
             count = counted(number, "interface")
             sys.stdout.write(f"{name:{width}}  {count:>14}  {place}\n")

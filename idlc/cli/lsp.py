@@ -38,6 +38,6 @@ def command(check: bool) -> int:
 
         sys.stdout.write(json.dumps(answer({}), indent=2) + "\n")
         return 0
-    from idlc.cli.direct import run
+    from idlc.cli.direct import serve_editor
 
-    return run()
+    return serve_editor()

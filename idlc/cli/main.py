@@ -1,4 +1,4 @@
-"""The entry point: what hooks call at once, everything else through click."""
+"""The entry point: commands of hooks at once, all others through click."""
 
 import gc
 import sys
@@ -14,15 +14,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if sys.argv[1:] != ["lsp"]:  # which stays
         look_for_garbage_seldom()
     status = _run(sys.argv[1:])
-    # the program ends: to look for garbage once more takes longer than to check a file
+    # the program ends: another garbage collection would take longer than checking a file
     gc.freeze()
     return status
 
 
 def look_for_garbage_seldom() -> None:
-    """Let the interpreter keep more garbage: a run makes little, and to look for it takes time.
+    """Let the interpreter keep more garbage: a run makes little, and collecting it takes time.
 
-    That is a fifteenth of all, most of it while modules are imported.
+    It takes a fifteenth of a run, most of it while modules are imported.
     """
     gc.set_threshold(200_000, 30, 30)
 
@@ -32,21 +32,21 @@ def _run(words: list[str]) -> int:
         sys.stdout.write(f"idlc {__version__}\n")
         return 0
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
-        # hooks call this for each commit, and to import click takes longer than to check a file
+        # hooks call this for each commit, and importing click takes longer than checking a file
         from idlc.cli.direct import check_paths
         from idlc.cli.exit_status import ended
 
         return ended(lambda: check_paths(tuple(words[1:])))
     if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
-        from idlc.cli.direct import run as serve
+        from idlc.cli.direct import serve_editor
         from idlc.cli.exit_status import ended
 
-        return ended(serve)
+        return ended(serve_editor)
     from idlc.cli.app import run
 
     return run(words)
 
 
 def _is_added_by_clients(word: str) -> bool:
-    """Return whether many editors add a word to a server's command; it changes nothing."""
+    """Return whether a word is one that editors add to a server's command, without effect."""
     return word == "--stdio" or word.startswith("--clientProcessId=")

@@ -73,7 +73,7 @@ def exclude(command: Command) -> Command:
 
 def distro(command: Command) -> Command:
     """Add --distro with one name."""
-    return _distro(command, "NAME", "The distribution of ROS 2 to work for.", _one)
+    return _distro(command, "NAME", "The distribution of ROS 2 to work for.", _single)
 
 
 def distros(command: Command) -> Command:
@@ -92,7 +92,7 @@ def _distro(command: Command, metavar: str, text: str, callback: Any) -> Command
     )(command)
 
 
-def _one(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
+def _single(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
     if value and "," in value:
         raise click.UsageError("--distro takes one name here; only `idlc check` takes several")
     return _several(context, option, value)
@@ -132,7 +132,7 @@ def report_style(command: Command) -> Command:
 
 
 def check_rules(*lists: str | None) -> None:
-    """Refuse lists of rules that name one that there is not."""
+    """Refuse lists of rules with an unknown name."""
     from idlc.check.select import is_selector
 
     for words in lists:
@@ -141,6 +141,6 @@ def check_rules(*lists: str | None) -> None:
                 from idlc.diagnostics.codes import CATEGORIES, CODES
                 from idlc.diagnostics.text import did_you_mean
 
-                hint = did_you_mean(word, (*CATEGORIES, *(one.slug for one in CODES.values())))
+                hint = did_you_mean(word, (*CATEGORIES, *(code.slug for code in CODES.values())))
                 hint = hint or "`idlc explain` lists the codes"
                 raise click.UsageError(f"{word!r} means no rule; {hint}")

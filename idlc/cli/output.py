@@ -21,8 +21,8 @@ _OURS = b"idlc.cli.main"
 def program() -> str:
     """Return `idlc` if that is this program, else another name for it."""
     for name in ("idlc", "rosidlc"):
-        found = shutil.which(name)
-        if found and _is_ours(Path(found)):
+        path = shutil.which(name)
+        if path and _is_ours(Path(path)):
             return name
     return f"{Path(sys.executable).name} -m idlc"
 
@@ -39,13 +39,13 @@ WIDTH = 30
 
 @contextmanager
 def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
-    """Give a function to tell what is done of how many; the bar goes away at the end."""
+    """Give a function that updates a progress bar; the bar is erased at the end."""
     if not stream.isatty():
         yield lambda _what, _done, _total: None
         return
     size = 0
 
-    def tell(what: str, done: int, total: int) -> None:
+    def update(what: str, done: int, total: int) -> None:
         nonlocal size
         full = WIDTH * min(done, total) // max(total, 1)
         line = f"{'█' * full}{'░' * (WIDTH - full)} {done:,} of {total:,}  {one_line(what)[:40]}"
@@ -54,7 +54,7 @@ def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
         size = len(line)
 
     try:
-        yield tell
+        yield update
     finally:
         stream.write(f"\r{' ' * size}\r")
 
@@ -79,7 +79,7 @@ def _spaced(report: Report, stream: TextIO) -> list[str]:
 
 
 def notes(report: Report, stream: TextIO) -> None:
-    """Write what is worth knowing and no problem."""
+    """Write notes, which are not problems."""
     stream.writelines(f"note: {one_line(note)}\n" for note in dict.fromkeys(report.notes))
 
 
@@ -90,9 +90,9 @@ def fact(stream: TextIO, kind: str, **facts: object) -> None:
     stream.write(json.dumps({"type": kind, **facts}) + "\n")
 
 
-def texts(found: Iterable[str], style: str, stream: TextIO) -> None:
+def texts(parts: Iterable[str], style: str, stream: TextIO) -> None:
     """Write interfaces, one after the other."""
-    text = "\n".join(found)
+    text = "\n".join(parts)
     if style == "text" or stream.isatty():  # other formats are for other tools
         text = "\n".join(map(visible, text.split("\n")))
     stream.write(text)
@@ -100,13 +100,13 @@ def texts(found: Iterable[str], style: str, stream: TextIO) -> None:
 
 def counts(report: Report) -> dict[str, int]:
     """Return the number of errors and warnings."""
-    errors = sum(found.severity is Severity.ERROR for found in report)
+    errors = sum(diagnostic.severity is Severity.ERROR for diagnostic in report)
     return {"errors": errors, "warnings": len(report) - errors}
 
 
 def status(report: Report) -> int:
     """Return the exit status: 0 clean, 1 findings, 2 usage or configuration."""
-    errors = [found for found in report if found.severity is Severity.ERROR]
-    if any(found.code in codes.USAGE for found in errors):
+    errors = [diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR]
+    if any(diagnostic.code in codes.USAGE for diagnostic in errors):
         return 2
     return 1 if errors else 0

@@ -51,15 +51,15 @@ def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str]
     if op != "==" or base is None or type(left) is not type(right):
         return None
     try:  # a field may have the name of a method
-        found = _differences(base.to_dict(left), base.to_dict(right), "")
+        differences = _differences(base.to_dict(left), base.to_dict(right), "")
     except (AttributeError, TypeError, ValueError):  # values that the fields cannot hold
         return None
     name = type(left).__name__
-    return [f"{name}(...) == {name}(...)", "", "Differing fields:", *islice(found, MOST)]
+    return [f"{name}(...) == {name}(...)", "", "Differing fields:", *islice(differences, MOST)]
 
 
 def _differences(left: object, right: object, path: str) -> Iterator[str]:
-    """Yield where two messages differ, given as dictionaries."""
+    """Yield the differences of two messages, as dictionaries."""
     if isinstance(left, dict) and isinstance(right, dict):
         for name in left:
             yield from _differences(left[name], right[name], f"{path}.{name}" if path else name)
@@ -89,16 +89,16 @@ class InterfaceItem(pytest.Item):
     """The check of one interface file."""
 
     def runtest(self) -> None:
-        """Fail with what idlc says about the file."""
+        """Fail with the errors that idlc reports for the file."""
         from idlc.diagnostics.report import Severity
         from idlc.diagnostics.terminal import text
 
-        found = _problems(self.path)
+        problems = _problems(self.path)
         strict = self.config.getoption("--idlc-strict")
-        errors = [one for one in found if strict or one.severity is Severity.ERROR]
-        for one in found:
-            if one not in errors:
-                place = f"{one.where[0]}: {one.code}: {one.message}"
+        errors = [problem for problem in problems if strict or problem.severity is Severity.ERROR]
+        for problem in problems:
+            if problem not in errors:
+                place = f"{problem.where[0]}: {problem.code}: {problem.message}"
                 warnings.warn(place, InterfaceWarning, stacklevel=1)
         if errors:
             raise InterfaceError("\n".join(text(errors)))
@@ -112,7 +112,7 @@ class InterfaceItem(pytest.Item):
         return str(super().repr_failure(excinfo, style))  # type: ignore[arg-type]
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
-        """Return how the test is called."""
+        """Return the name of the test."""
         return self.path, None, f"idlc {self.path.name}"
 
 

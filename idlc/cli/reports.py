@@ -1,4 +1,4 @@
-"""A report in the format that was asked for."""
+"""Writing a report in one of the formats."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def write(
     numbers: bool = False,
     strict: bool = False,
 ) -> None:
-    """Write a report on what was looked at; formats for machines are one whole document.
+    """Write a report on checked files; formats for machines are one whole document.
 
-    `numbers` leaves out of the text what was found, and only says how often; with `strict`,
+    With `numbers`, the text has the number of problems by code instead of each; with `strict`,
     warnings fail as errors do.
     """
     files, fixed = checked.files, checked.fixed

@@ -34,8 +34,8 @@ COMMANDS = {
 }
 
 
-#: What people type for them, too.
-MEANT = {
+#: Other words for them.
+SYNONYMS = {
     **dict.fromkeys(("pkg", "project", "workspace"), "package"),
     **dict.fromkeys(("msg", "srv", "action", "message", "service", "type"), "interface"),
     **dict.fromkeys(("publisher", "subscriber", "client", "server"), "node"),
@@ -48,7 +48,7 @@ MEANT = {
     cls=LazyGroup,
     overview=COMMANDS,
     modules="idlc.cli.scaffold_",
-    meant=MEANT,
+    synonyms=SYNONYMS,
     epilog=EPILOG,
 )
 def command() -> None:
@@ -79,7 +79,7 @@ def common(function: Command) -> Command:
 
 
 def finish(result: Any, report: Any, hints: tuple[str, ...] = ()) -> int:
-    """Show what a command did and return the exit status; `hints` are the commands after it."""
+    """Show the outcome of a command and return the exit status; `hints` are the next commands."""
     from idlc.cli import output
     from idlc.cli.output import program
     from idlc.diagnostics.terminal import summary

@@ -30,7 +30,7 @@ def command(
     fields: tuple[str, ...],
     comment: str,
     include: tuple[str, ...],
-    **given: Any,
+    **arguments: Any,
 ) -> int:
     """Write an interface of the package that the working folder belongs to.
 
@@ -55,7 +55,7 @@ def command(
         interface_text(kind, fields, comment)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    settings = Settings(Root.here(), include=include, **given)
-    known = KINDS[KINDS.index(kind)]
-    result = interface(known, name, fields, comment, settings, report)
+    settings = Settings(Root.here(), include=include, **arguments)
+    checked_kind = KINDS[KINDS.index(kind)]
+    result = interface(checked_kind, name, fields, comment, settings, report)
     return finish(result, report)

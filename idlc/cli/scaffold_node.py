@@ -28,7 +28,7 @@ _QUESTIONS: dict[ir.Kind, tuple[str, str]] = {
 }
 
 Answer = TypeVar("Answer")
-#: Raises ValueError for an interface that there is not.
+#: Raises ValueError for an interface that does not exist.
 CheckType = Callable[[Role, str], None]
 
 
@@ -51,7 +51,7 @@ def ask(name: str, check_type: CheckType) -> spec.Node:
 def _answer(
     question: str, understand: Callable[[str], Answer], default: str | None = None
 ) -> Answer:
-    """Ask until the answer can be understood; return what it means."""
+    """Ask until the answer is valid; return its value."""
 
     def process(text: str) -> Answer:
         try:
@@ -64,9 +64,9 @@ def _answer(
 
 
 def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
-    """Ask for what the value of the role's option says."""
+    """Ask for the value of the role's option."""
 
-    def known(text: str) -> str:
+    def existing(text: str) -> str:
         check_type(role, text)
         return text
 
@@ -77,7 +77,7 @@ def _endpoint(role: Role, check_type: CheckType) -> Endpoint:
     value = ""
     if role.kind:
         type_question, name_question = _QUESTIONS[role.kind]
-        type_ = _answer(type_question, known)
+        type_ = _answer(type_question, existing)
         value = _answer(name_question, lambda name: checked(f"{type_}:{name}"))
     question = role.question
     if question and not (question.separator and question.separator in value):
@@ -104,7 +104,7 @@ Example, within a package:
 
 
 def interactive() -> bool:
-    """Return whether there is somebody to ask."""
+    """Return whether standard input and output are terminals."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
@@ -112,19 +112,19 @@ class NodeCommand(click.Command):
     """A command whose --qos belongs to the endpoint before it."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Note to which endpoint each quality of service belongs, then go on as usual."""
+        """Assign each quality of service to its endpoint, then parse as usual."""
         if not ctx.resilient_parsing:
             _, _, order = self.make_parser(ctx).parse_args(args=list(args))
-            ctx.meta[_OWNERS] = _owners([one.name or "" for one in order], ctx)
+            ctx.meta[_OWNERS] = _owners([parameter.name or "" for parameter in order], ctx)
         return super().parse_args(ctx, args)
 
 
-#: Where the endpoints that have a --qos are kept: for each, its role and its place in that.
+#: The key of the endpoints with a --qos in the context: for each, its role and its index.
 _OWNERS = "idlc.qos"
 
 
 def _owners(order: list[str], ctx: click.Context) -> list[tuple[str, int]]:
-    """Return which endpoint each --qos comes after; `order` names the options as given."""
+    """Return the endpoint before each --qos; `order` names the options as typed."""
     names = {role.name for role in ROLES if role.kind}
     counts: Counter[str] = Counter()
     last: tuple[str, int] | None = None
@@ -164,13 +164,13 @@ def _role_options(function: Any) -> Any:
     "qos",
     metavar="|".join(QOS_NAMES),
     multiple=True,
-    shell_complete=lambda _, __, word: [one for one in QOS_NAMES if one.startswith(word)],
+    shell_complete=lambda _, __, word: [name for name in QOS_NAMES if name.startswith(word)],
     help="The quality of service of the endpoint before it.",
 )
 @click.option("--lifecycle", is_flag=True, help="Make it a managed node, with states.")
 @click.option("--launch/--no-launch", default=True, help="Enter it in the launch file, or not.")
 @common
-def command(name: str, **given: Any) -> int:
+def command(name: str, **arguments: Any) -> int:
     """Write a node of the package that the working folder belongs to.
 
     Writes the module and its test, and adds the command to setup.py, the packages that it needs
@@ -182,19 +182,20 @@ def command(name: str, **given: Any) -> int:
     from idlc.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
-    settings = Settings(Root.here(), **{key: given[key] for key in shared})
-    asked = any(given[role.name] for role in ROLES) or given["parameters"] or given["lifecycle"]
+    settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
+    described = (*(role.name for role in ROLES), "parameters", "lifecycle")
     try:
         spec.check_name(name)
-        if not asked and interactive():
-            wanted = ask(name, lambda role, type_: changes.check(role, type_, settings))
+        if not any(arguments[option] for option in described) and interactive():
+            requested = ask(name, lambda role, type_: changes.check(role, type_, settings))
         else:
             owners = click.get_current_context().meta[_OWNERS]
-            wanted = _wanted(name, given, dict(zip(owners, given["qos"], strict=True)))
+            presets = dict(zip(owners, arguments["qos"], strict=True))
+            requested = _requested(name, arguments, presets)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report = Report()
-    result = new_node.node(wanted, settings, report)
+    result = new_node.node(requested, settings, report)
     folder = "" if result is None or result.folder == "." else f"{result.folder}/"
     python = Path(sys.executable).name
     install = () if find_spec("pytest") else (f"{python} -m pip install pytest",)
@@ -202,12 +203,14 @@ def command(name: str, **given: Any) -> int:
     return finish(result, report, (*install, test))
 
 
-def _wanted(name: str, given: dict[str, Any], presets: dict[tuple[str, int], str]) -> spec.Node:
+def _requested(
+    name: str, arguments: dict[str, Any], presets: dict[tuple[str, int], str]
+) -> spec.Node:
     """Return the node that the command line describes."""
     endpoints = (
         spec.endpoint(role, value, presets.get((role.name, n)))
         for role in ROLES
-        for n, value in enumerate(given[role.name])
+        for n, value in enumerate(arguments[role.name])
     )
-    parameters = tuple(map(spec.parameter, given["parameters"]))
-    return spec.Node(name, "", tuple(endpoints), parameters, given["lifecycle"])
+    parameters = tuple(map(spec.parameter, arguments["parameters"]))
+    return spec.Node(name, "", tuple(endpoints), parameters, arguments["lifecycle"])

@@ -48,7 +48,7 @@ def command(
     interfaces_only: bool,
     build_type: str | None,
     folder: str,
-    **given: Any,
+    **arguments: Any,
 ) -> int:
     """Write a package that builds with colcon and installs with pip.
 
@@ -76,17 +76,17 @@ def command(
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     report, root = Report(), Root.here()
-    wanted = Package(
+    requested = Package(
         name,
-        given["description"] or f"The package {name}.",
-        given["maintainer"] or setting("user.name", root.base) or "Your Name",
-        given["email"] or setting("user.email", root.base) or "you@example.com",
-        given["licence"] or LICENSES[0],
+        arguments["description"] or f"The package {name}.",
+        arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
+        arguments["email"] or setting("user.email", root.base) or "you@example.com",
+        arguments["licence"] or LICENSES[0],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
-    shared = {key: given[key] for key in ("dry_run", "force", "include", "templates")}
-    chosen = {"license" if key == "licence" else key for key, value in given.items() if value}
+    shared = {key: arguments[key] for key in ("dry_run", "force", "include", "templates")}
+    chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
-    result = package(wanted, folder, Settings(root, **shared), report, examples, chosen)
+    result = package(requested, folder, Settings(root, **shared), report, examples, chosen)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
     return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

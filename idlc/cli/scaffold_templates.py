@@ -23,14 +23,14 @@ Example:
 @click.option("--list", "listing", is_flag=True, help="List the templates; this is the default.")
 @click.option(
     "--copy",
-    "wanted",
+    "copies",
     metavar="NAME",
     multiple=True,
     shell_complete=completion.templates,
     help="Copy one into your folder of templates, to change it there. May be repeated.",
 )
 @writing
-def command(wanted: tuple[str, ...], listing: bool, **given: Any) -> int:
+def command(copies: tuple[str, ...], listing: bool, **arguments: Any) -> int:
     """List the templates of nodes, their tests and packages, or copy some to change them.
 
     Your folder is that of --templates, or of `templates` in [tool.idlc]; otherwise copies go to
@@ -43,20 +43,20 @@ def command(wanted: tuple[str, ...], listing: bool, **given: Any) -> int:
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.templates import names, suggestion
 
-    if listing and wanted:
+    if listing and copies:
         raise click.UsageError("--list and --copy do not go together")
-    for name in wanted:
+    for name in copies:
         if name not in names():
             hint = suggestion(name) or "`idlc scaffold templates` lists them"
             raise click.UsageError(f"there is no template {name!r}; {hint}")
     report = Report()
-    settings = Settings(Root.here(), **given)
-    if wanted:
-        return finish(changes.copied(wanted, settings, report), report)
-    found = changes.listed(settings, report)
+    settings = Settings(Root.here(), **arguments)
+    if copies:
+        return finish(changes.copied(copies, settings, report), report)
+    listed = changes.listed(settings, report)
     output.show(report, "text", sys.stderr)
-    width = max(len(one.name) for one in found)
-    for one in found:
-        replaced = f"  replaced by {one.replaced_by}" if one.replaced_by else ""
-        sys.stdout.write(f"{one.name:{width}}{replaced}".rstrip() + "\n")
+    width = max(len(template.name) for template in listed)
+    for template in listed:
+        replaced = f"  replaced by {template.replaced_by}" if template.replaced_by else ""
+        sys.stdout.write(f"{template.name:{width}}{replaced}".rstrip() + "\n")
     return output.status(report)

@@ -21,46 +21,48 @@ HEAD = ("topic", "type", "messages", "hash", "here")
 
 
 def show_recording(
-    path: str, wanted: Sequence[str], style: str, scope: Scope, report: Report
+    path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
 ) -> int:
-    """Show the topics of a recording, or the definitions of wanted ones; return the exit status."""
+    """Show the topics of a recording, or definitions of selected ones; return the exit status."""
     from idlc.cli import output
     from idlc.recordings.show import definitions, topics
 
-    if wanted:
-        output.texts(definitions(path, wanted, style, scope, report), style, sys.stdout)
+    if selected:
+        output.texts(definitions(path, selected, style, scope, report), style, sys.stdout)
     elif style not in ("text", "json"):
         raise click.UsageError(f"--format {style} shows types: name a topic")
     else:
-        found = topics(path, scope, report)
+        topic_facts = topics(path, scope, report)
         if style == "json":
-            for one in found:
-                output.fact(sys.stdout, "topic", **one._asdict())
+            for facts in topic_facts:
+                output.fact(sys.stdout, "topic", **facts._asdict())
         else:
-            sys.stdout.writelines(_table(found))
+            sys.stdout.writelines(_table(topic_facts))
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
     return output.status(report)
 
 
-def _table(found: Sequence[TopicFacts]) -> list[str]:
+def _table(topic_facts: Sequence[TopicFacts]) -> list[str]:
     from idlc.diagnostics.text import display_width
 
-    rows = [HEAD, *map(_row, found)] if found else []
+    rows = [HEAD, *map(_row, topic_facts)] if topic_facts else []
     widths = [max(map(display_width, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(map(_padded, row, widths, range(len(row)))).rstrip() + "\n" for row in rows]
 
 
-def _row(one: TopicFacts) -> tuple[str, ...]:
+def _row(facts: TopicFacts) -> tuple[str, ...]:
     from idlc.diagnostics.text import one_line
 
-    count = "?" if one.messages is None else str(one.messages)
-    hash_ = one_line(one.hash or "-")
-    here = one.here if one.definition else f"{one.here}; no definition in the recording"
-    name = one_line(one.name)
+    count = "?" if facts.messages is None else str(facts.messages)
+    hash_ = one_line(facts.hash or "-")
+    comparison = facts.here
+    if not facts.definition:
+        comparison += "; no definition in the recording"
+    name = one_line(facts.name)
     # lines that begin with other characters may be commands to a CI system
     name = name if name[:1].isalnum() or name[:1] in ("/", "_") else f"`{name}`"
-    return name, one_line(one.type_name), count, hash_[:SHORT], here
+    return name, one_line(facts.type_name), count, hash_[:SHORT], comparison
 
 
 def _padded(text: str, width: int, column: int) -> str:
@@ -82,7 +84,7 @@ Example:
 
 @click.command("show", epilog=EPILOG)
 @click.argument(
-    "wanted",
+    "subject",
     metavar="TYPE|PATH|REC",
     type=click.Path(),
     shell_complete=completion.types_and_paths,
@@ -100,7 +102,7 @@ Example:
 @options.include
 @options.distro
 def command(
-    wanted: str,
+    subject: str,
     topics: tuple[str, ...],
     style: str,
     package: str | None,
@@ -123,11 +125,11 @@ def command(
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package, include, distro=distro)
-    if is_recording(wanted, settings.root) and not report.had_errors:
-        return show_recording(wanted, topics, style, where, report)
+    if is_recording(subject, settings.root) and not report.had_errors:
+        return show_recording(subject, topics, style, where, report)
     if topics:
-        raise click.UsageError(f"`{wanted}` is no recording, so it has no topics")
-    texts = [] if report.had_errors else show(wanted, style, where, report)
+        raise click.UsageError(f"`{subject}` is no recording, so it has no topics")
+    texts = [] if report.had_errors else show(subject, style, where, report)
     output.texts(texts, style, sys.stdout)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)

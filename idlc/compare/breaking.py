@@ -1,4 +1,4 @@
-"""The pipeline of `idlc breaking`: two versions, compiled alike, and what changed between them."""
+"""The pipeline of `idlc breaking`: compile two versions alike, and report their differences."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import msgspec
 
 from idlc.check.compiler import models_of, stage, without_errors
-from idlc.compare import packages
 from idlc.compare.changes import LEVELS, Change
 from idlc.compare.distribution import compare_with_distro, is_distro
 from idlc.compare.packages import (
     Allowance,
     Comparison,
     added_package,
+    against,
+    allowances,
     compare,
     compare_hashes,
     part_to_raise,
@@ -38,7 +39,7 @@ from idlc.project.lock import load_lock
 from idlc.project.package_xml import read_statements
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope
-from idlc.wire.layout import Extents, oversized
+from idlc.wire.layout import ContentSizes, oversized
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,7 +49,7 @@ _CHECK_OUT = "`git sparse-checkout disable` checks out all files"
 
 
 class BreakingOptions(NamedTuple):
-    """What `idlc breaking` was asked to do; `today` is a day as YYYY-MM-DD."""
+    """The options of `idlc breaking`; `today` is a day as YYYY-MM-DD."""
 
     paths: tuple[str, ...]
     against: str
@@ -60,11 +61,11 @@ class BreakingOptions(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What came out: how many changes break each level, and the version part to raise.
+    """The result: the number of changes by broken level, and the version part to raise.
 
-    `added` breaks nothing, and `not_compared` is what nothing is known of. There is no part to
-    raise without a difference, where that is not known, and for a comparison with a distribution.
-    `hidden` is how many changes break other levels than those that were asked for.
+    `added` breaks nothing; `not_compared` could not be compared. There is no part to raise without
+    a difference, after an incomplete comparison, and for a comparison with a distribution.
+    `hidden` counts changes that break only other levels than the selected ones.
     """
 
     levels: dict[str, int]
@@ -79,16 +80,15 @@ class Verdict(NamedTuple):
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     """Report each change that breaks something; `None` if a version could not be compiled."""
-    there = look(options.paths, options.scope.root, report, options.scope.exclude)
-    given = inputs.packages(there.files, options.scope, report)
-    comparison = None if report.had_errors else _against(options, given, report)
+    root, exclude = options.scope.root, options.scope.exclude
+    listing = look(options.paths, root, report, exclude)
+    packages = inputs.packages(listing.files, options.scope, report)
+    comparison = None if report.had_errors else _against(options, packages, report)
     if comparison is None:
         return None
-    if there.empty and not (comparison.differs or report.had_errors):
-        # of what was removed, there is something to compare with
-        report.extend(
-            nothing_in(one, options.scope.root, options.scope.exclude) for one in there.empty
-        )
+    if listing.empty and not (comparison.differs or report.had_errors):
+        # an empty folder is fine if its interfaces were removed
+        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
         return None
     if comparison.left_out:  # for which allowances may be
         changes = not_allowed(comparison.changes, options, report)
@@ -96,46 +96,46 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
         changes = without_allowed(
             comparison.changes, options.allowed, options.today, options.allowed_in, report
         )
-    wanted = [change for change in changes if change.levels & set(options.levels)]
-    report.extend(change.diagnostic for change in wanted)
+    selected = [change for change in changes if change.levels & set(options.levels)]
+    report.extend(change.diagnostic for change in selected)
     part = None
     if not (comparison.left_out or is_distro(options.against)):
         part = part_to_raise(comparison)
-    version = _version(given, options.scope.root, report)
+    version = _version(packages, root, report)
     return Verdict(
-        {level: sum(level in change.levels for change in wanted) for level in LEVELS},
+        {level: sum(level in change.levels for change in selected) for level in LEVELS},
         len(comparison.changes) - len(changes),
         part,
         version,
         raised(version, part) if version and part else None,
         comparison.additions,
         comparison.left_out,
-        len(changes) - len(wanted),
+        len(changes) - len(selected),
     )
 
 
 def not_allowed(
     changes: Sequence[Change], options: BreakingOptions, report: Report
 ) -> tuple[Change, ...]:
-    """Return the changes that nobody allowed; allowances may be for other comparisons."""
-    found = Report()
-    left = without_allowed(changes, options.allowed, options.today, options.allowed_in, found)
-    report.extend(one for one in found if one.code != codes.UNUSED_ALLOWANCE.id)
+    """Return the changes without an allowance; unused allowances may be for other comparisons."""
+    problems = Report()
+    left = without_allowed(changes, options.allowed, options.today, options.allowed_in, problems)
+    report.extend(problem for problem in problems if problem.code != codes.UNUSED_ALLOWANCE.id)
     return left
 
 
 def _against(
-    options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
+    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
     if is_distro(options.against):
-        return compare_with_distro(options.against, given, options.scope, report)
+        return compare_with_distro(options.against, packages, options.scope, report)
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
         with checked_out(name, options.paths[0], options.scope.root, report) as revision:
-            found = revision and _compare(options, given, revision, report)
-        return found and found.placed(f"{options.against}:")
+            comparison = revision and _compare(options, packages, revision, report)
+        return comparison and comparison.placed(f"{options.against}:")
     if options.against.endswith(lock.FILE):
-        return _compare_with_lock(options, given, report)
+        return _compare_with_lock(options, packages, report)
     if is_revision(options.against, options.paths[0], options.scope.root):
         report.add(
             codes.NO_SUCH_PATH.of(
@@ -145,14 +145,14 @@ def _against(
             )
         )
         return None
-    return _compare(options, given, None, report)
+    return _compare(options, packages, None, report)
 
 
 class Side(NamedTuple):
-    """One of two versions: the models of its packages, without what could not be compiled.
+    """One of two versions: the models of its packages, without broken interfaces.
 
-    `broken` are the interfaces that have errors, and those that hold them; `error` is the first
-    one, in words.
+    `broken` are the interfaces that have errors, and their users; `error` is the first error in
+    words.
     """
 
     models: Mapping[str, Model]
@@ -161,30 +161,32 @@ class Side(NamedTuple):
 
 
 def earlier(
-    options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
+    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
 ) -> Side | None:
     """Return the packages as they are in a folder or git revision; `None` after errors."""
     if not options.against.startswith(GIT):
-        return _before(options, given, None, report)
+        return _before(options, packages, None, report)
     name, root = options.against.removeprefix(GIT), options.scope.root
     with checked_out(name, options.paths[0], root, report) as revision:
-        return _before(options, given, revision, report) if revision else None
+        return _before(options, packages, revision, report) if revision else None
 
 
 def _compare(
     options: BreakingOptions,
-    given: tuple[inputs.Inputs, ...],
+    packages: tuple[inputs.Inputs, ...],
     revision: Revision | None,
     report: Report,
 ) -> Comparison | None:
-    before = _before(options, given, revision, report)
-    found = Report()
-    after = _side(given, {}, options.scope, found)
-    report.extend(one for one in found if one.severity is codes.ERROR)
-    if before is None or any(one.code in codes.USAGE for one in report):
+    before = _before(options, packages, revision, report)
+    problems = Report()
+    after = _side(packages, {}, options.scope, problems)
+    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
+    if before is None or any(problem.code in codes.USAGE for problem in report):
         return None
-    known = {one.name for model in before.models.values() for one in model.own} | before.broken
-    others = _of_others(given, known, revision) if revision else frozenset()
+    earlier_names = {
+        interface.name for model in before.models.values() for interface in model.own
+    } | before.broken
+    others = _of_others(packages, earlier_names, revision) if revision else frozenset()
     submodules = tuple(revision.unknown(options.paths)) if revision else ()
     skipped = _skipped(before, after, revision) if revision else frozenset()
     out = before.broken | after.broken | others | skipped
@@ -217,39 +219,39 @@ def _not_compared(
 
 
 def _of_others(
-    given: Sequence[inputs.Inputs], known: AbstractSet[ir.TypeName], revision: Revision
+    packages: Sequence[inputs.Inputs], earlier_names: AbstractSet[ir.TypeName], revision: Revision
 ) -> frozenset[ir.TypeName]:
     """Return the interfaces that a revision lacks because they are in other repositories."""
     return frozenset(
         name
-        for one in given
-        for file in (each.file for each in one.files)
-        if (name := ir.TypeName(one.package, file.kind, file.name)) not in known
+        for package in packages
+        for file in (entry.file for entry in package.files)
+        if (name := ir.TypeName(package.package, file.kind, file.name)) not in earlier_names
         and not revision.holds(file.path)
     )
 
 
 def _skipped(before: Side, after: Side, revision: Revision) -> frozenset[ir.TypeName]:
     """Return the interfaces that are missing because git did not check out their files."""
-    there = {own.name for model in after.models.values() for own in model.own} | after.broken
+    present = {own.name for model in after.models.values() for own in model.own} | after.broken
     return frozenset(
         own.name
         for model in before.models.values()
         for own in model.own
-        if own.name not in there and own.source and revision.is_skipped(own.source.path)
+        if own.name not in present and own.source and revision.is_skipped(own.source.path)
     )
 
 
 def _without(models: Mapping[str, Model], names: AbstractSet[ir.TypeName]) -> dict[str, Model]:
     return {
-        package: model.only({one.name for one in model.own} - names)
+        package: model.only({interface.name for interface in model.own} - names)
         for package, model in models.items()
     }
 
 
 def _before(
     options: BreakingOptions,
-    given: tuple[inputs.Inputs, ...],
+    packages: tuple[inputs.Inputs, ...],
     revision: Revision | None,
     report: Report,
 ) -> Side | None:
@@ -262,43 +264,45 @@ def _before(
         scope = msgspec.structs.replace(
             scope, include=include, exclude=scope.exclude.seen_from(revision.folder, revision.top)
         )
-    found = Report()
-    old = _named_alike(inputs.packages(files, scope, found), given, files, scope, found)
-    report.extend(one for one in found if one.code in codes.USAGE)
-    if any(one.code in codes.USAGE for one in report):
+    problems = Report()
+    old = _named_alike(inputs.packages(files, scope, problems), packages, files, scope, problems)
+    report.extend(problem for problem in problems if problem.code in codes.USAGE)
+    if any(problem.code in codes.USAGE for problem in report):
         return None
-    homes = {one.home: files for one in old} if scope.package else by_home(files, scope.root)
-    return _side(old, homes, scope, found)
+    homes = (
+        {package.home: files for package in old} if scope.package else by_home(files, scope.root)
+    )
+    return _side(old, homes, scope, problems)
 
 
 def _side(
-    given: Sequence[inputs.Inputs],
+    packages: Sequence[inputs.Inputs],
     files: Mapping[Path, Sequence[InterfaceFile]],
     scope: Scope,
     report: Report,
 ) -> Side:
-    """Compile one version; `files` are those by package that may not have been read."""
+    """Compile one version; `files` are all files by package, including unread ones."""
     compiled = {
-        ir.TypeName(one.package, each.file.kind, each.file.name): each.file.shown
-        for one in given
-        for each in one.files
+        ir.TypeName(package.package, entry.file.kind, entry.file.name): entry.file.shown
+        for package in packages
+        for entry in package.files
     }
     every = {
-        file.shown: ir.TypeName(one.package, file.kind, file.name)
-        for one in given
-        for file in files.get(one.home, ())
+        file.shown: ir.TypeName(package.package, file.kind, file.name)
+        for package in packages
+        for file in files.get(package.home, ())
     }
-    # of a type that is defined twice, nobody knows which definition was meant
+    # a type that is defined twice is ambiguous
     also = {shown: compiled[name] for shown, name in every.items() if name in compiled}
-    pairs = list(models_of(given, scope, report))
-    extents: Extents = {}
+    pairs = list(models_of(packages, scope, report))
+    extents: ContentSizes = {}
     for model in without_errors(pairs, report, also):
         report.extend(oversized(model, extents))
     models = list(without_errors(pairs, report, also))
     names = {*compiled, *every.values()}
     sound = {own.name for model in models for own in model.own}
     error = ""
-    if first := next((one for one in report if one.severity is codes.ERROR), None):
+    if first := next((problem for problem in report if problem.severity is codes.ERROR), None):
         line = first.span.source.position(first.span.start)[0] if first.span else 1
         error = f"the first error is {first.code} at {first.where[0]}:{line}: {first.message}"
     return Side({model.package: model for model in models}, frozenset(names - sound), error)
@@ -314,98 +318,104 @@ def _named_alike(
     """Give two single packages one name, unless both are named by a package.xml."""
     if len(old) != 1 or len(new) != 1 or old[0].package == new[0].package:
         return old
-    if all(scope.root.manifest(one.folders[0]) for one in (old[0], new[0]) if one.folders):
+    if all(
+        scope.root.manifest(package.folders[0]) for package in (old[0], new[0]) if package.folders
+    ):
         return old
     return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
 
-def sound_ones(given: Sequence[inputs.Inputs], scope: Scope, report: Report) -> dict[str, Model]:
-    """Return the packages' models; only errors are reported, warnings are `check`'s."""
-    found = Report()
-    models = {model.package: model for _, model in models_of(given, scope, found)}
-    if not found.had_errors:
-        extents: Extents = {}
+def error_free_models(
+    packages: Sequence[inputs.Inputs], scope: Scope, report: Report
+) -> dict[str, Model]:
+    """Return the packages' models; reports errors only, warnings are reported by `check`."""
+    problems = Report()
+    models = {model.package: model for _, model in models_of(packages, scope, problems)}
+    if not problems.had_errors:
+        extents: ContentSizes = {}
         for model in models.values():
-            found.extend(oversized(model, extents))
-    report.extend(one for one in found if one.severity is codes.ERROR)
+            problems.extend(oversized(model, extents))
+    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
     return models
 
 
 def _compare_with_lock(
-    options: BreakingOptions, given: tuple[inputs.Inputs, ...], report: Report
+    options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
     folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
-    known = load_lock(options.scope.root.absolute(folder), folder, report)
-    if known is None:
+    record = load_lock(options.scope.root.absolute(folder), folder, report)
+    if record is None:
         if not report.had_errors:
             report.add(codes.NO_SUCH_PATH.of(options.against, f"no such file: `{options.against}`"))
         return None
-    mine = [one for one in given if one.package == known.package]
-    if len(given) == 1 and not mine:
-        named = msgspec.structs.replace(options.scope, package=known.package)
+    mine = [package for package in packages if package.package == record.package]
+    if len(packages) == 1 and not mine:
+        named = msgspec.structs.replace(options.scope, package=record.package)
         files = find(options.paths, named.root, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
-    models = sound_ones(mine, options.scope, report)
+    models = error_free_models(mine, options.scope, report)
     if report.had_errors:
         return None
-    model = models.get(known.package) or Model(known.package, (), {})
-    same = bool(mine) and mine[0].digests == known.inputs
+    model = models.get(record.package) or Model(record.package, (), {})
+    same = bool(mine) and mine[0].digests == record.inputs
     with stage("compare", options.against):
-        found = compare_hashes(known.types, model)
-        return found._replace(differs=found.differs or not same)
+        comparison = compare_hashes(record.types, model)
+        return comparison._replace(differs=comparison.differs or not same)
 
 
-def _version(given: tuple[inputs.Inputs, ...], root: Root, report: Report) -> str | None:
+def _version(packages: tuple[inputs.Inputs, ...], root: Root, report: Report) -> str | None:
     """Return the version in the package.xml if there is one package only."""
-    if len(given) != 1 or not given[0].folders:
+    if len(packages) != 1 or not packages[0].folders:
         return None
-    path = root.manifest(given[0].folders[0])
-    found = read_statements(path, path.as_posix(), root, report) if path else ()
-    return next((one.text for one in found if one.tag == "version"), None)
+    path = root.manifest(packages[0].folders[0])
+    statements = read_statements(path, path.as_posix(), root, report) if path else ()
+    return next((statement.text for statement in statements if statement.tag == "version"), None)
 
 
 class Earlier:
     """The version that settings name: a git revision, or a folder; empty for any other.
 
-    It is compiled when it is asked for, and again when the name means another commit.
+    It is compiled on demand, and again when the name refers to another commit.
     """
 
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
-        ignored = Report()  # `idlc breaking` tells what is wrong in its table
-        said = wished or packages.against(settings, ignored) or ""
-        comparable = said.startswith(GIT) or (bool(said) and is_folder(folder / said))
+        ignored = Report()  # `idlc breaking` reports problems of its table
+        version = wished or against(settings, ignored) or ""
+        comparable = version.startswith(GIT) or (bool(version) and is_folder(folder / version))
         self._folder = folder
-        self.name = said if comparable else ""
+        self.name = version if comparable else ""
         self._options = BreakingOptions(
             (),
             self.name,
             scope,
-            allowed=packages.allowances(settings, ignored),
+            allowed=allowances(settings, ignored),
         )
         self.commit: str | None = None
         self._side: Side | None = None
 
     def side(self, packages: Sequence[Inputs]) -> Side:
-        """Return the packages as they were then; of a version that cannot be read, why."""
+        """Return the packages as they were then, or the error if that cannot be read."""
         if self.has_moved() or self._side is None:
             report = Report()
-            paths = tuple(one.home.as_posix() for one in packages)
-            # what is open is what that version is compared with
+            paths = tuple(package.home.as_posix() for package in packages)
+            # open texts are for the version that is compared with this one
             scope = self._options.scope
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = self._options._replace(paths=paths, scope=scope)
-            found = earlier(options, tuple(packages), report) if paths and self.name else None
-            why = next((one.message for one in report if one.severity is Severity.ERROR), "")
-            self._side = found or Side({}, frozenset(), why)
+            side = earlier(options, tuple(packages), report) if paths and self.name else None
+            why = next(
+                (problem.message for problem in report if problem.severity is Severity.ERROR), ""
+            )
+            self._side = side or Side({}, frozenset(), why)
         return self._side
 
     def follow(self, older: Earlier | None) -> None:
-        """Remember which commit the name meant before the folder was read again."""
+        """Take over the commit that the name referred to before the folder was read again."""
         if older is not None and older.name == self.name:
             self.commit = older.commit
 
     def has_moved(self) -> bool:
-        """Return whether the name means another commit than when this was asked last."""
+        """Return whether the name refers to another commit than at the last call."""
         if not self.name.startswith(GIT):
             return False
         name = self.name.removeprefix(GIT)
@@ -416,10 +426,10 @@ class Earlier:
         return before is not None
 
     def repository(self) -> tuple[Path, ...]:
-        """Return the folders in which git notes what a name means; none without a repository."""
+        """Return the folders in which git stores the commits of names, if there is a repository."""
         return git.places(self._folder) if self.name.startswith(GIT) else ()
 
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
-        """Return the changes that nobody allowed in the settings."""
+        """Return the changes that the settings do not allow."""
         today = datetime.datetime.now().astimezone().date().isoformat()
         return not_allowed(changes, self._options._replace(today=today), Report())

@@ -1,4 +1,4 @@
-"""Which elements of two versions are the same: kept, renamed, moved, removed or added."""
+"""Changes, and the pairing of two versions' elements: kept, renamed, moved, removed or added."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ from idlc.model.describe import individual
 
 Level: TypeAlias = Literal["wire", "hash", "source", "behaviour"]
 
-#: What a change can break, the worst first: bytes written before are read wrongly or not at all;
+#: The levels that a change can break, the worst first: earlier bytes are misread or unreadable;
 #: RIHS01 differs, so a middleware may not deliver messages between the two versions; Python or C++
-#: code that used it fails; the same code does something else.
+#: code that used it fails; the same code behaves differently.
 LEVELS: tuple[Level, ...] = ("wire", "hash", "source", "behaviour")
 
 
 class Change(NamedTuple):
-    """A difference that breaks something, with its place in the new version and in the old.
+    """A difference that breaks something, with its range in the new version and in the old.
 
-    `subject` is what changed, such as `pkg/msg/Name.field`; `cause` is the other type whose change
-    it follows from. A change without a `span` has the `path` of its file; `place` is where that
-    would be, if it is not there.
-    `detail` is text of several lines.
+    `subject` is the changed element, such as `pkg/msg/Name.field`; `cause` is the other type whose
+    change it follows from. A change without a `span` has the `path` of its file; `place` is the
+    path of a missing file. `detail` is text of several lines.
     """
 
     code: Code
@@ -44,7 +43,7 @@ class Change(NamedTuple):
     place: str = ""
 
     def without(self, level: Level) -> Change:
-        """Return the change with a level that turned out not to be true."""
+        """Return the change without a level that does not apply after all."""
         return self._replace(levels=self.levels - {level})
 
     @property
@@ -66,7 +65,7 @@ class Change(NamedTuple):
 
 
 class Named(Protocol):
-    """Something that is known by its name."""
+    """An element with a name."""
 
     @property
     def name(self) -> str:
@@ -88,7 +87,7 @@ class Pairing(Generic[T]):
 
 
 def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -> Pairing[T]:
-    """Return what became of the elements of `old`, whose names must differ, in those of `new`.
+    """Return the elements of `old` paired with those of `new`; names in each must differ.
 
     An element that disappeared counts as renamed if one of the same content appeared in its
     place.
@@ -100,15 +99,19 @@ def pair(old: Sequence[T], new: Sequence[T], content: Callable[[T], Hashable]) -
     kept = [(element, new[places[element.name]]) for element in common]
     moved = frozenset(element.name for element in common if places[element.name] not in steady)
     renamed = list(_renamed(old, new, moved, content))
-    gone = {id(one) for one, _ in renamed}
-    come = {id(one) for _, one in renamed}
+    renamed_from = {id(element) for element, _ in renamed}
+    renamed_to = {id(element) for _, element in renamed}
     names = {element.name for element in common}
     return Pairing(
         kept,
         renamed,
         moved,
-        [one for one in old if one.name not in names and id(one) not in gone],
-        [one for one in new if one.name not in names and id(one) not in come],
+        [
+            element
+            for element in old
+            if element.name not in names and id(element) not in renamed_from
+        ],
+        [element for element in new if element.name not in names and id(element) not in renamed_to],
     )
 
 
@@ -122,30 +125,30 @@ def _longest_increasing(numbers: Sequence[int]) -> list[int]:
         before.append(ends[place - 1] if place else None)
         tails[place : place + 1] = [number]
         ends[place : place + 1] = [at]
-    found: list[int] = []
+    positions: list[int] = []
     step = ends[-1] if ends else None
     while step is not None:
-        found.append(step)
+        positions.append(step)
         step = before[step]
-    return found[::-1]
+    return positions[::-1]
 
 
 def _renamed(
     old: Sequence[T], new: Sequence[T], moved: frozenset[str], content: Callable[[T], Hashable]
 ) -> Iterator[tuple[T, T]]:
-    """Yield the pairs of like elements in each gap between those that kept name and order."""
-    for gone, come in _gaps(old, new, moved):
+    """Yield the pairs of like elements in each gap between elements that kept name and order."""
+    for removed, added in _gaps(old, new, moved):
         candidates: dict[Hashable, deque[int]] = {}
-        for at, other in enumerate(come):
+        for at, other in enumerate(added):
             candidates.setdefault(content(other), deque()).append(at)
         first = 0
-        for one in gone:
-            like = candidates.get(content(one), deque())
+        for element in removed:
+            like = candidates.get(content(element), deque())
             while like and like[0] < first:
                 like.popleft()
             if like:
                 first = like[0] + 1
-                yield one, come[like[0]]
+                yield element, added[like[0]]
 
 
 def _gaps(
@@ -168,13 +171,13 @@ def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> It
 
 
 def described(field: ir.Field) -> object:
-    """Return what the type hash sees of a field's type."""
+    """Return a field's type as it enters the type hash."""
     message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
     return individual(message)["fields"][0]["type"]
 
 
 def without_bounds(type_: ir.FieldType) -> ir.FieldType:
-    """Return a type that is equal for types which differ in sizes and bounds only."""
+    """Return a type that is equal for types which differ only in sizes and bounds."""
     match type_:
         case ir.String():
             return ir.String(type_.wide)
@@ -191,7 +194,7 @@ def _element_without_bounds(element: ir.Element) -> ir.Element:
 
 
 def container(type_: ir.FieldType) -> tuple[str, int | None]:
-    """Return what C++ has a type of its own for: sizes and bounds of arrays, not of strings."""
+    """Return the facts that are part of the type in C++: bounds of arrays, not of strings."""
     match type_:
         case ir.Sequence():
             return "sequence", type_.bound

@@ -1,4 +1,4 @@
-"""What differs between the standard interfaces here and those of another distribution."""
+"""The differences between the local standard interfaces and another distribution's."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ PREFIX = "distro:"
 
 
 def is_distro(against: str) -> bool:
-    """Return whether a text that says what to compare with means a distribution."""
+    """Return whether the text of `--against` names a distribution."""
     return against.startswith(PREFIX)
 
 
 def compare_with_distro(
-    against: str, given: Sequence[inputs.Inputs], scope: Scope, report: Report
+    against: str, packages: Sequence[inputs.Inputs], scope: Scope, report: Report
 ) -> Comparison | None:
-    """Return how what is used here differs from a distribution's, which counts as the old version.
+    """Return the changes from a distribution's interfaces, the old version, to the local ones.
 
-    Used is what packages refer to; without any, all that is built in. What changes in the
-    packages themselves because of it is told, too. `None` after an error.
+    They are the interfaces that packages refer to; without packages, all built-in ones. Resulting
+    changes of the packages themselves are included. `None` after an error.
     """
     name = against.removeprefix(PREFIX)
     if name not in BY_NAME:
@@ -38,35 +38,40 @@ def compare_with_distro(
         report.add(codes.NO_SUCH_REVISION.of("", message, hint=unknown_distro(name)))
         return None
     other = BY_NAME[name]
-    here = library_for(given, scope, report)
-    there = _Layered(given, scope, other, other_first=True)
-    own = [one for one in given if not catalog.is_standard(one.package)]
-    after = _models(own, _Layered(given, scope, other), report)
-    before = _models(own, there, Report())
+    library = library_for(packages, scope, report)
+    other_library = _Layered(packages, scope, other, other_first=True)
+    own = [package for package in packages if not catalog.is_standard(package.package)]
+    after = _models(own, _Layered(packages, scope, other), report)
+    before = _models(own, other_library, Report())
     if report.had_errors:
         return None
     with stage("compare", against):
-        used = _used(after).union(*(one.names for one in given if one not in own))
-        found = [compare(old, new) for old, new in zip(before, after, strict=True)]
-        return together([*found, *_of_packages(used if given else _all(here, other), here, there)])
+        used = _used(after).union(*(package.names for package in packages if package not in own))
+        comparisons = [compare(old, new) for old, new in zip(before, after, strict=True)]
+        return together(
+            [
+                *comparisons,
+                *_of_packages(used if packages else _all(library, other), library, other_library),
+            ]
+        )
 
 
 class _Layered(Library):
-    """The library here with the standard interfaces of another distribution.
+    """The local library with the standard interfaces of another distribution.
 
-    These count, or, unless `other_first`, only where there is none here. So a message that one
-    of the two lacks hides nothing of those that hold it.
+    With `other_first` they take precedence, otherwise they fill gaps. A message that one of the
+    two lacks therefore does not hide the messages that hold it.
     """
 
     def __init__(
         self,
-        given: Sequence[inputs.Inputs],
+        packages: Sequence[inputs.Inputs],
         scope: Scope,
         other: Distro,
         *,
         other_first: bool = False,
     ) -> None:
-        own = {one.package: one.folders for one in given}
+        own = {package.package: package.folders for package in packages}
         super().__init__(
             scope.include,
             scope.root,
@@ -84,24 +89,24 @@ class _Layered(Library):
         return others if others and self._other_first else super().source(name) or others
 
 
-def _models(given: Sequence[inputs.Inputs], library: Library, report: Report) -> list[Model]:
-    found = Report()
-    models = [model for _, model in Compiler(library).all(given, found)]
-    report.extend(one for one in found if one.severity is codes.ERROR)
+def _models(packages: Sequence[inputs.Inputs], library: Library, report: Report) -> list[Model]:
+    problems = Report()
+    models = [model for _, model in Compiler(library).all(packages, problems)]
+    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
     return models
 
 
 def _used(models: Iterable[Model]) -> set[ir.TypeName]:
-    """Return the standard messages in packages' fields, and in the fields of those."""
-    found: set[ir.TypeName] = set()
+    """Return the standard messages in packages' fields, nested ones included."""
+    used: set[ir.TypeName] = set()
     for model in models:
         waiting = list(model.own)
         while waiting:
             for target in _targets(waiting.pop()):
-                if target not in found and catalog.is_standard(target.package):
-                    found.add(target)
+                if target not in used and catalog.is_standard(target.package):
+                    used.add(target)
                     waiting.append(model.interfaces[target])
-    return found
+    return used
 
 
 def _targets(interface: ir.Interface) -> Iterator[ir.TypeName]:
@@ -112,27 +117,34 @@ def _targets(interface: ir.Interface) -> Iterator[ir.TypeName]:
                 yield element.target
 
 
-def _all(here: Library, other: Distro) -> set[ir.TypeName]:
-    """Return the standard interfaces that there are here, or in another distribution."""
-    names = {name for name in here.packages() if catalog.is_standard(name)}
-    return {*catalog.interfaces(other), *(one for name in names for one in here.interfaces(name))}
+def _all(library: Library, other: Distro) -> set[ir.TypeName]:
+    """Return the standard interfaces of the local library and another distribution."""
+    names = {name for name in library.packages() if catalog.is_standard(name)}
+    return {
+        *catalog.interfaces(other),
+        *(interface for name in names for interface in library.interfaces(name)),
+    }
 
 
 def _of_packages(
-    names: Iterable[ir.TypeName], here: Library, there: _Layered
+    names: Iterable[ir.TypeName], library: Library, other_library: _Layered
 ) -> Iterator[Comparison]:
-    """Yield what differs in standard interfaces, package by package."""
-    packages: dict[str, list[ir.TypeName]] = {}
+    """Yield the differences in standard interfaces, package by package."""
+    by_package: dict[str, list[ir.TypeName]] = {}
     for name in sorted(names):
-        packages.setdefault(name.package, []).append(name)
-    for package, mine in packages.items():
-        texts = ((name, catalog.source(name, there.other), here.source(name)) for name in mine)
+        by_package.setdefault(name.package, []).append(name)
+    for package, mine in by_package.items():
+        texts = (
+            (name, catalog.source(name, other_library.other), library.source(name)) for name in mine
+        )
         both = list(texts)
         old = [(name, source) for name, source, _ in both if source]
         new = [(name, source) for name, _, source in both if source]
-        found = compare(
-            compile_package(package, old, there, Report()).only(mine),
-            compile_package(package, new, here, Report()).only(mine),
+        comparison = compare(
+            compile_package(package, old, other_library, Report()).only(mine),
+            compile_package(package, new, library, Report()).only(mine),
         )
-        # what to do instead is nothing that users of ROS 2 can do
-        yield found._replace(changes=tuple(one._replace(hint=None) for one in found.changes))
+        # the hints are for authors of interfaces, not for users of ROS 2
+        yield comparison._replace(
+            changes=tuple(change._replace(hint=None) for change in comparison.changes)
+        )

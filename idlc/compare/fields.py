@@ -1,4 +1,4 @@
-"""What changed between the fields of two versions of one structure."""
+"""The changes between the fields and constants of two versions of one structure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from idlc.wire.compatible import reads_alike, type_reads_alike
 
 
 class Sides(NamedTuple):
-    """A structure in two versions, and all that each refers to."""
+    """A structure in two versions, each with the model of its types."""
 
     old: ir.Message
     new: ir.Message
@@ -34,7 +34,7 @@ class Sides(NamedTuple):
     after: Model
 
     def subject(self, name: str) -> str:
-        """Return how an element is called in allow-lists."""
+        """Return the name of an element in allow-lists."""
         return f"{self.new.name}.{name}"
 
     @property
@@ -44,23 +44,22 @@ class Sides(NamedTuple):
 
 
 def field_changes(sides: Sides) -> Iterator[Change]:
-    """Yield what changed between the fields, in the order of the new version.
+    """Yield the changes of the fields, in the order of the new version.
 
-    Whether bytes are still read right is decided for the structure as a whole: two changes can
-    make up for each other.
+    The level `wire` is decided for the structure as a whole: two changes can cancel each other.
     """
-    found = list(_changes(sides))
+    changes = list(_changes(sides))
     broken = not reads_alike(sides.old, sides.new, sides.before.messages, sides.after.messages)
     if not broken:
-        found = [change.without("wire") for change in found]
-    elif not any("wire" in change.levels for change in found):
-        found = [
+        changes = [change.without("wire") for change in changes]
+    elif not any("wire" in change.levels for change in changes):
+        changes = [
             change._replace(levels=change.levels | {"wire"}) if "hash" in change.levels else change
-            for change in found
+            for change in changes
         ]
-    if any("hash" in change.levels for change in found) and _same_hash(sides):
-        found = [change.without("hash") for change in found]
-    yield from (change for change in found if change.levels)
+    if any("hash" in change.levels for change in changes) and _same_hash(sides):
+        changes = [change.without("hash") for change in changes]
+    yield from (change for change in changes if change.levels)
 
 
 def _same_hash(sides: Sides) -> bool:
@@ -83,7 +82,7 @@ def _changes(sides: Sides) -> Iterator[Change]:
 
 
 def _optional(sides: Sides) -> Iterator[Change]:
-    """Yield the change that a structure has `@optional` now, for its first field that has it."""
+    """Yield the change if a structure has `@optional` now, at its first such field."""
     first = next((field for field in sides.new.fields if field.optional), None)
     if first is not None and not any(field.optional for field in sides.old.fields):
         yield Change(
@@ -140,7 +139,7 @@ def _removed(sides: Sides, field: ir.Field, beside: ir.Field | None, *, is_last:
 
 
 def _start_of(beside: ir.Field | None, sides: Sides) -> Span | None:
-    """Return a place in the new file for something that is no longer there."""
+    """Return a range in the new file for an element that was removed."""
     if beside is not None and beside.type_span is not None:
         return beside.type_span
     return Span(sides.new.source, 0, 0) if sides.new.source else None
@@ -169,7 +168,7 @@ def _added(sides: Sides, field: ir.Field, *, is_last: bool) -> Change:
     """Return the change; `is_last` is whether no field that stayed comes after it."""
     levels: set[Level] = {"wire", "hash"}
     if not is_last:
-        levels.add("source")  # positional arguments and patterns mean other fields now
+        levels.add("source")  # positional arguments and patterns refer to other fields now
     return Change(
         codes.FIELD_ADDED,
         sides.subject(field.name),
@@ -253,19 +252,19 @@ def _default(field: ir.Field) -> str | None:
 def _default_changed(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     levels: set[Level] = {"behaviour"}
     if old.default is None:
-        what = f"field `{new.name}` has a default value now"
+        message = f"field `{new.name}` has a default value now"
     elif new.default is None:
-        what = f"field `{new.name}` lost its default value, {spell_value(old.default.value)}"
+        message = f"field `{new.name}` lost its default value, {spell_value(old.default.value)}"
         levels.add("source")
     else:
-        what = (
+        message = (
             f"the default of `{new.name}` was {spell_value(old.default.value)} "
             f"and is {spell_value(new.default.value)} now"
         )
     return Change(
         codes.FIELD_DEFAULT_CHANGED,
         sides.subject(new.name),
-        what,
+        message,
         frozenset(levels),
         span=new.default_span or new.name_span,
         old=old.default_span,
@@ -287,7 +286,7 @@ def _unit(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
 
 
 def constant_changes(sides: Sides) -> Iterator[Change]:
-    """Yield what changed between the constants; their order says nothing."""
+    """Yield the changes of the constants; their order has no meaning."""
     pairing = pair(sides.old.constants, sides.new.constants, _content)
     for constant in pairing.removed:
         yield _gone(sides, constant)
@@ -301,7 +300,7 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
 
 
 def added(sides: Sides) -> Iterator[str]:
-    """Yield the constants that the new version has and the old one had not."""
+    """Yield the constants that only the new version has."""
     for constant in pair(sides.old.constants, sides.new.constants, _content).added:
         yield f"constant `{sides.subject(constant.name)}`"
 

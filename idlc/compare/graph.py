@@ -1,6 +1,6 @@
-"""Who sends and reads what in a running graph, and which versions of types that makes.
+"""The endpoints of a running graph, and the differing versions of their types.
 
-Everything here is what other programs announce, as values.
+All values come from the announcements of other programs.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from idlc.wire.compatible import reads_alike
 Entity: TypeAlias = Literal["topic", "service", "action"]
 Role: TypeAlias = Literal["publisher", "subscription", "server", "client"]
 
-#: What services and actions imply, at the end of a structure's name.
+#: The suffixes of structures that services and actions imply.
 _PART = re.compile(r"_((SendGoal|GetResult)_)?(Request|Response)$|_FeedbackMessage$")
-#: What every action uses, whatever its type.
+#: The package whose types every action uses.
 _SHARED = "action_msgs/"
-#: More nodes than these are named by the first one in a sentence.
+#: A sentence with more nodes than these names only the first.
 NAMED = 2
 
 
 class Endpoint(NamedTuple):
     """One end of a topic, service or action, and the structure that it sends or reads.
 
-    A service has two, of its request and of its response. `node` and `hash` are empty where they
-    are not known.
+    A service has two, of its request and of its response. `node` and `hash` are empty if they
+    are unknown.
     """
 
     node: str
@@ -45,13 +45,13 @@ class Endpoint(NamedTuple):
     hash: str = ""
 
     @property
-    def who(self) -> str:
+    def label(self) -> str:
         """The node, for a sentence."""
         return f"`{one_line(self.node)}`" if self.node else "a program without a node"
 
     @property
-    def deed(self) -> str:
-        """What it does where, in words."""
+    def activity(self) -> str:
+        """Its activity in words, such as "publishes on topic `/scan`"."""
         verb = {
             "publisher": "publishes on topic",
             "subscription": "subscribes to topic",
@@ -61,74 +61,74 @@ class Endpoint(NamedTuple):
         return f"{verb} `{one_line(self.name)}`"
 
 
-class Here(NamedTuple):
-    """A type as this machine has it: its hash, and whether it is in the files that were given."""
+class LocalType(NamedTuple):
+    """The local version of a type: its hash; `in_files` if it is in the user's files."""
 
     hash: str
-    is_given: bool
+    in_files: bool
 
     @property
-    def who(self) -> str:
-        """Where it is, for a sentence."""
-        return "your files" if self.is_given else "what is installed here"
+    def label(self) -> str:
+        """Its origin, for a sentence."""
+        return "your files" if self.in_files else "what is installed here"
 
 
 class Version(NamedTuple):
-    """One version of a type, who uses it, and whether it is that of this machine."""
+    """One version of a type with its users; `local` if this machine has the same version."""
 
     type: str
     hash: str
     endpoints: tuple[Endpoint, ...]
-    here: Here | None = None
+    local: LocalType | None = None
 
     @property
-    def who(self) -> str:
-        """Who has it, for a sentence."""
-        nodes = sorted({one.who for one in self.endpoints})
+    def label(self) -> str:
+        """Its users, for a sentence."""
+        nodes = sorted({endpoint.label for endpoint in self.endpoints})
         named = " and ".join(nodes) if len(nodes) <= NAMED else first_few(nodes, 1)
-        return named or (self.here.who if self.here else "nobody")
+        return named or (self.local.label if self.local else "nobody")
 
     @property
     def nodes(self) -> tuple[str, ...]:
         """The nodes that have it, sorted."""
-        return tuple(sorted({one.node for one in self.endpoints if one.node}))
+        return tuple(sorted({endpoint.node for endpoint in self.endpoints if endpoint.node}))
 
     @property
     def sends(self) -> bool:
-        """Whether somebody sends it; programs that are built here may."""
-        return not self.endpoints or any(one.sends for one in self.endpoints)
+        """True if somebody sends it; programs that are built here may."""
+        return not self.endpoints or any(endpoint.sends for endpoint in self.endpoints)
 
     @property
     def reads(self) -> bool:
-        """Whether somebody reads it; programs that are built here may."""
-        return not self.endpoints or not all(one.sends for one in self.endpoints)
+        """True if somebody reads it; programs that are built here may."""
+        return not self.endpoints or not all(endpoint.sends for endpoint in self.endpoints)
 
 
 def several_versions(
-    endpoints: Iterable[Endpoint], here: Mapping[str, Here]
+    endpoints: Iterable[Endpoint], local: Mapping[str, LocalType]
 ) -> Iterator[tuple[Version, ...]]:
     """Yield the versions of each type that has more than one.
 
-    That of this machine is the last one, otherwise that which most endpoints have.
+    The local version comes last, or else the version of the most endpoints.
     """
     types: dict[str, dict[str, list[Endpoint]]] = {}
-    for one in endpoints:
-        if one.hash:
-            types.setdefault(one.structure, {}).setdefault(one.hash, []).append(one)
+    for endpoint in endpoints:
+        if endpoint.hash:
+            types.setdefault(endpoint.structure, {}).setdefault(endpoint.hash, []).append(endpoint)
     for name, hashes in sorted(types.items()):
-        mine = here.get(name)
+        mine = local.get(name)
         if mine:
             hashes.setdefault(mine.hash, [])
         versions = [
-            Version(name, hash_, tuple(found), mine if mine and mine.hash == hash_ else None)
-            for hash_, found in hashes.items()
+            Version(name, hash_, tuple(users), mine if mine and mine.hash == hash_ else None)
+            for hash_, users in hashes.items()
         ]
         if len(versions) > 1:
             yield tuple(sorted(versions, key=_rank))
 
 
 def _rank(version: Version) -> tuple[bool, int, str]:
-    return version.here is not None, len(version.endpoints), version.hash
+    return version.local is not None, len(version.endpoints), version.hash
 
 
 def interface_of(name: str) -> str:
@@ -146,10 +146,10 @@ def event_of(name: str) -> str | None:
 def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
     """Yield a change for each topic, service and action whose ends differ in the type's name."""
     places: dict[tuple[Entity, str], dict[str, list[Endpoint]]] = {}
-    for one in endpoints:
-        if one.entity != "action" or not one.structure.startswith(_SHARED):
-            types = places.setdefault((one.entity, one.name), {})
-            types.setdefault(interface_of(one.structure), []).append(one)
+    for endpoint in endpoints:
+        if endpoint.entity != "action" or not endpoint.structure.startswith(_SHARED):
+            types = places.setdefault((endpoint.entity, endpoint.name), {})
+            types.setdefault(interface_of(endpoint.structure), []).append(endpoint)
     for (entity, name), types in sorted(places.items()):
         if len(types) > 1:
             shown = one_line(name)
@@ -165,44 +165,47 @@ def several_types(endpoints: Iterable[Endpoint]) -> Iterator[Change]:
 
 
 def _uses(types: Mapping[str, list[Endpoint]]) -> Iterator[str]:
-    for name, found in sorted(types.items()):
+    for name, endpoints in sorted(types.items()):
         yield f"{one_line(name)}:"
-        yield from deeds(found)
+        yield from activities(endpoints)
 
 
-def deeds(endpoints: Iterable[Endpoint]) -> Iterator[str]:
-    """Yield a line for each thing that endpoints do, with the nodes that do it."""
+def activities(endpoints: Iterable[Endpoint]) -> Iterator[str]:
+    """Yield a line for each activity of endpoints, with its nodes."""
     nodes: dict[str, list[str]] = {}
-    for one in endpoints:
-        nodes.setdefault(one.deed, []).append(one.who)
-    for deed, who in sorted(nodes.items()):
-        yield f"  {first_few(sorted(set(who)), 5)} {deed}"
+    for endpoint in endpoints:
+        nodes.setdefault(endpoint.activity, []).append(endpoint.label)
+    for activity, actors in sorted(nodes.items()):
+        yield f"  {first_few(sorted(set(actors)), 5)} {activity}"
 
 
 #: Models by a structure's full name and type hash.
-Known: TypeAlias = Mapping[tuple[str, str], Model]
+Models: TypeAlias = Mapping[tuple[str, str], Model]
 #: Structures of two versions, by name and both hashes.
-Seen: TypeAlias = set[tuple[str, str, str]]
+Reported: TypeAlias = set[tuple[str, str, str]]
 
 
 def version_changes(
-    versions: Sequence[Version], known: Known, problems: Mapping[tuple[str, str], str], seen: Seen
+    versions: Sequence[Version],
+    models: Models,
+    problems: Mapping[tuple[str, str], str],
+    seen: Reported,
 ) -> Iterator[Change]:
-    """Yield that there are several versions of a type, and what differs between them.
+    """Yield a change for a type with several versions, and the differences between them.
 
-    All are compared with the last one. `problems` says why a version is not among the `known`
-    ones. Of what several types hold, the differences are told once: `seen` grows.
+    All are compared with the last one. `problems` has the reason why a version has no model.
+    Differences of a structure that several types hold are reported once: `seen` grows.
     """
     *others, last = versions
-    sides = [found for one in others for found in _all_sides(one, last, known)]
-    structures = sorted({str(one.new.name) for one, *_ in sides})
+    sides = [difference for version in others for difference in _all_sides(version, last, models)]
+    structures = sorted({str(difference.new.name) for difference, *_ in sides})
     pairs = [(a, b) for a in versions for b in versions if a is not b and a.sends and b.reads]
-    lines = [line for version in versions for line in _version(version, known, problems)]
-    lines += _effects(pairs, known)
+    lines = [line for version in versions for line in _version(version, models, problems)]
+    lines += _effects(pairs, models)
     if structures and structures != [last.type]:
-        lines.append(f"what differs is in {', '.join(f'`{one}`' for one in structures)}")
-    misread = any(_misreads(a, b, known) for a, b in pairs)
-    whose = [one.who for one in versions]
+        lines.append(f"what differs is in {', '.join(f'`{name}`' for name in structures)}")
+    misread = any(_misreads(a, b, models) for a, b in pairs)
+    whose = [version.label for version in versions]
     levels: set[Level] = {"hash", "wire"} if misread else {"hash"}
     yield Change(
         codes.SEVERAL_VERSIONS,
@@ -213,102 +216,102 @@ def version_changes(
         hint="build everything that uses it from one version, and start it again",
         detail="\n".join(lines),
     )
-    for found in sides:
-        yield from _told_once(*found, known, seen)
+    for difference in sides:
+        yield from _reported_once(*difference, models, seen)
 
 
 def _version(
-    version: Version, known: Known, problems: Mapping[tuple[str, str], str]
+    version: Version, models: Models, problems: Mapping[tuple[str, str], str]
 ) -> Iterator[str]:
-    where = f", that of {version.here.who}" if version.here else ""
+    where = f", that of {version.local.label}" if version.local else ""
     yield f"{version.hash}{where}:"
-    yield from deeds(version.endpoints) if version.endpoints else ["  no node"]
+    yield from activities(version.endpoints) if version.endpoints else ["  no node"]
     key = (version.type, version.hash)
-    if key not in known:
+    if key not in models:
         yield f"  only its hash is known: {problems.get(key, 'nobody was asked')}"
 
 
-def _effects(pairs: Iterable[tuple[Version, Version]], known: Known) -> Iterator[str]:
-    """Yield what becomes of each version that is sent, at whoever has another one."""
+def _effects(pairs: Iterable[tuple[Version, Version]], models: Models) -> Iterator[str]:
+    """Yield the effect of each sent version on the readers of another one."""
     for sender, reader in pairs:
-        if any((one.type, one.hash) not in known for one in (sender, reader)):
+        if any((version.type, version.hash) not in models for version in (sender, reader)):
             effect = "may be misread, or not delivered"
-        elif _misreads(sender, reader, known):
+        elif _misreads(sender, reader, models):
             effect = "misread, or not delivered"
         else:
             effect = "read right, or not delivered"
-        yield f"{sender.who} → {reader.who}: {effect}"
+        yield f"{sender.label} → {reader.label}: {effect}"
 
 
-def _misreads(sender: Version, reader: Version, known: Known) -> bool:
-    """Return whether bytes are known to be read wrongly."""
-    keys = [(one.type, one.hash) for one in (sender, reader)]
-    if any(key not in known for key in keys):
+def _misreads(sender: Version, reader: Version, models: Models) -> bool:
+    """Return whether `reader` certainly misreads the bytes of `sender`."""
+    keys = [(version.type, version.hash) for version in (sender, reader)]
+    if any(key not in models for key in keys):
         return False
-    before, after = (known[key].messages for key in keys)
+    before, after = (models[key].messages for key in keys)
     name = ir.TypeName.parse(sender.type)
     return not reads_alike(before[name], after[name], before, after)
 
 
 def _all_sides(
-    one: Version, other: Version, known: Known
+    left: Version, right: Version, models: Models
 ) -> Iterator[tuple[Sides, Version, Version]]:
-    """Yield what differs between two versions of a type, itself and what it holds.
+    """Yield the structures that differ between two versions of a type, nested ones included.
 
-    From the one to the other, unless only the other is sent.
+    The change is from left to right, unless only the right version is sent.
     """
-    backwards = not (one.sends and other.reads) and other.sends and one.reads
-    old, new = (other, one) if backwards else (one, other)
+    backwards = not (left.sends and right.reads) and right.sends and left.reads
+    old, new = (right, left) if backwards else (left, right)
     keys = [(old.type, old.hash), (new.type, new.hash)]
-    if any(key not in known for key in keys):
+    if any(key not in models for key in keys):
         return
-    before, after = (known[key] for key in keys)
+    before, after = (models[key] for key in keys)
     name = ir.TypeName.parse(old.type)
-    for each in sorted(_held(name, before) & _held(name, after)):
-        if before.describer.hash(str(each)) != after.describer.hash(str(each)):
-            sides = Sides(before.messages[each], after.messages[each], before, after)
+    for shared in sorted(_held(name, before) & _held(name, after)):
+        if before.describer.hash(str(shared)) != after.describer.hash(str(shared)):
+            sides = Sides(before.messages[shared], after.messages[shared], before, after)
             if any(_changes(sides)):
                 yield sides, old, new
 
 
-def _told_once(
-    sides: Sides, old: Version, new: Version, known: Known, seen: Seen
+def _reported_once(
+    sides: Sides, old: Version, new: Version, models: Models, seen: Reported
 ) -> Iterator[Change]:
     name = str(sides.new.name)
     key = (name, sides.before.describer.hash(name), sides.after.describer.hash(name))
     if key not in seen:
         seen.add(key)
         met = [(a, b) for a, b in ((old, new), (new, old)) if a.sends and b.reads]
-        misread = any(_misreads(a, b, known) for a, b in met or [(old, new)])
+        misread = any(_misreads(a, b, models) for a, b in met or [(old, new)])
         for change in _with_wire(list(_changes(sides)), misread):
-            yield change._replace(message=f"{change.message} ({old.who} → {new.who})")
+            yield change._replace(message=f"{change.message} ({old.label} → {new.label})")
 
 
 def _changes(sides: Sides) -> Iterator[Change]:
-    """Yield what changed; not that a type changed which it holds, as that is told of that type."""
+    """Yield the changes of a structure, without those of nested types, which have their own."""
     for change in (*field_changes(sides), *constant_changes(sides)):
         if change.code is not codes.USED_TYPE_CHANGED:
             yield change
 
 
-def _with_wire(found: Sequence[Change], misread: bool) -> Iterator[Change]:
-    """Yield changes which say that bytes are misread if and only if somebody misreads them."""
-    said = any("wire" in change.levels for change in found)
-    for change in found:
+def _with_wire(changes: Sequence[Change], misread: bool) -> Iterator[Change]:
+    """Yield changes with the level `wire` if and only if somebody misreads the bytes."""
+    has_wire = any("wire" in change.levels for change in changes)
+    for change in changes:
         if not misread:
             yield change.without("wire")
-        elif not said and "hash" in change.levels:
+        elif not has_wire and "hash" in change.levels:
             yield change._replace(levels=change.levels | {"wire"})
         else:
             yield change
 
 
 def _held(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
-    found: set[ir.TypeName] = set()
+    held: set[ir.TypeName] = set()
     waiting = [name]
     while waiting:
-        one = waiting.pop()
-        if one not in found:
-            found.add(one)
-            waiting += model.messages[one].references
-    return found
+        target = waiting.pop()
+        if target not in held:
+            held.add(target)
+            waiting += model.messages[target].references
+    return held

@@ -1,4 +1,4 @@
-"""Two versions of a package → everything that changed between them."""
+"""Two versions of a package → all changes between them."""
 
 from __future__ import annotations
 
@@ -30,10 +30,9 @@ CANDIDATES = 50
 
 
 class Comparison(NamedTuple):
-    """What breaks something, and what was added and breaks nothing.
+    """The changes that break something, and the additions, which break nothing.
 
-    `differs` is whether anything at all is different, comments included, in what could be
-    compared; `left_out` could not be.
+    `differs`: anything at all is different, comments included. `left_out` could not be compared.
     """
 
     changes: tuple[Change, ...]
@@ -42,21 +41,21 @@ class Comparison(NamedTuple):
     left_out: tuple[str, ...] = ()
 
     def placed(self, prefix: str) -> Comparison:
-        """Return it with what was removed in the files whose names follow a prefix."""
+        """Return it with removed elements placed in the files whose names follow a prefix."""
         changes = (
-            one if one.span else one._replace(place=one.path.removeprefix(prefix))
-            for one in self.changes
+            change if change.span else change._replace(place=change.path.removeprefix(prefix))
+            for change in self.changes
         )
         return self._replace(changes=tuple(changes))
 
 
 def together(comparisons: Iterable[Comparison]) -> Comparison:
     """Return the comparisons of several packages as one."""
-    found = list(comparisons)
+    parts = list(comparisons)
     return Comparison(
-        tuple(change for one in found for change in one.changes),
-        tuple(name for one in found for name in one.additions),
-        any(one.differs for one in found),
+        tuple(change for comparison in parts for change in comparison.changes),
+        tuple(name for comparison in parts for name in comparison.additions),
+        any(comparison.differs for comparison in parts),
     )
 
 
@@ -64,14 +63,18 @@ def compare(before: Model, after: Model) -> Comparison:
     """Return what changed in a package's own interfaces; both models must be free of errors."""
     old = {interface.name: interface for interface in before.own}
     new = {interface.name: interface for interface in after.own}
-    gone = [interface for name, interface in old.items() if name not in new]
-    come = [interface for name, interface in new.items() if name not in old]
-    renamed = dict(_renamed(gone, come))
-    changes = [_removed(one) for one in gone if one.name not in renamed]
-    changes += [called(one, renamed[one.name]) for one in gone if one.name in renamed]
-    found = {new.name for new in renamed.values()}
-    additions = [_added(one) for one in come if one.name not in found]
-    differs = bool(gone or come)
+    removed = [interface for name, interface in old.items() if name not in new]
+    appeared = [interface for name, interface in new.items() if name not in old]
+    renamed = dict(_renamed(removed, appeared))
+    changes = [_removed(interface) for interface in removed if interface.name not in renamed]
+    changes += [
+        called(interface, renamed[interface.name])
+        for interface in removed
+        if interface.name in renamed
+    ]
+    renamed_to = {new.name for new in renamed.values()}
+    additions = [_added(interface) for interface in appeared if interface.name not in renamed_to]
+    differs = bool(removed or appeared)
     for name in sorted(old.keys() & new.keys()):
         differs = differs or _differ(old[name], new[name])
         for sides in _sides(old[name], new[name], before, after):
@@ -81,28 +84,30 @@ def compare(before: Model, after: Model) -> Comparison:
 
 
 def _sides(old: ir.Interface, new: ir.Interface, before: Model, after: Model) -> Iterator[Sides]:
-    for one, other in zip(derive.sections(old), derive.sections(new), strict=True):
-        yield Sides(one, other, before, after)
+    for section, counterpart in zip(derive.sections(old), derive.sections(new), strict=True):
+        yield Sides(section, counterpart, before, after)
 
 
 def removed_package(before: Model) -> Comparison:
-    """Return the changes when a package is no longer there."""
+    """Return the changes of a removed package."""
     return Comparison(tuple(map(_removed, before.own)), (), bool(before.own))
 
 
 def added_package(after: Model) -> Comparison:
-    """Return what a package adds that was not there before."""
+    """Return the additions of a new package."""
     return Comparison((), tuple(map(_added, after.own)), bool(after.own))
 
 
 def _differ(old: ir.Interface, new: ir.Interface) -> bool:
-    """Return whether two versions of an interface are not the same, line ends apart."""
-    texts = [one.source.text.splitlines() if one.source else None for one in (old, new)]
+    """Return whether two versions of an interface differ, ignoring line ends."""
+    texts = [
+        interface.source.text.splitlines() if interface.source else None for interface in (old, new)
+    ]
     return texts[0] != texts[1] or meaning(old) != meaning(new)
 
 
 def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
-    """Return what changed since type hashes were recorded; nothing else is known of before."""
+    """Return the changes since type hashes were recorded, the only facts of the old version."""
     changes = []
     sources = {str(own.name): own.source for own in after.own}
     for name in sorted(recorded):
@@ -130,7 +135,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
 
 
 def _shorter(name: str) -> Iterator[str]:
-    """Yield what stands before each underscore of a name."""
+    """Yield the part before each underscore of a name."""
     return (name[:at] for at, character in enumerate(name) if character == "_")
 
 
@@ -169,15 +174,15 @@ def called(old: ir.Interface, new: ir.Interface) -> Change:
 
 
 def _renamed(
-    gone: list[ir.Interface], come: list[ir.Interface]
+    removed: list[ir.Interface], appeared: list[ir.Interface]
 ) -> Iterator[tuple[ir.TypeName, ir.Interface]]:
-    """Yield each interface that disappeared with the one of the same content that appeared."""
+    """Yield each removed interface with a new one of the same content."""
     left: dict[Hashable, list[ir.Interface]] = {}
-    for new in come:
+    for new in appeared:
         left.setdefault(_shape(new), []).append(new)
-    for old in gone:
+    for old in removed:
         shape = _shape(old)
-        # of very many, the first ones are as good as any
+        # the first candidates are as good as any others
         alike = left.get(shape, [])[:CANDIDATES] if shape[1] else []
         if alike:
             best = min(alike, key=lambda new: edit_distance(old.name.name, new.name.name))
@@ -194,7 +199,7 @@ def _shape(interface: ir.Interface) -> tuple[ir.Kind, tuple[tuple[str, ir.FieldT
 
 
 def part_to_raise(comparison: Comparison) -> Literal["major", "minor", "patch"] | None:
-    """Return the part that semantic versioning asks to raise, `None` if nothing is different."""
+    """Return the part to raise by semantic versioning, `None` without a difference."""
     levels = {level for change in comparison.changes for level in change.levels}
     if levels & {"wire", "hash", "source"}:
         return "major"
@@ -208,10 +213,10 @@ def raised(version: str, part: Literal["major", "minor", "patch"]) -> str | None
 
     Before 1.0.0 there is no promise to keep, so a breaking change raises the minor part.
     """
-    found = re.fullmatch(r"(\d+)\.(\d+)\.(\d+)", version.strip())
-    if found is None:
+    match = re.fullmatch(r"(\d+)\.(\d+)\.(\d+)", version.strip())
+    if match is None:
         return None
-    major, minor, patch = map(int, found.groups())
+    major, minor, patch = map(int, match.groups())
     if part == "patch":
         return f"{major}.{minor}.{patch + 1}"
     if part == "minor" or not major:
@@ -233,7 +238,7 @@ class Allowance(NamedTuple):
     code: str | None = None
 
     def covers(self, change: Change) -> bool:
-        """Return whether a change, or the one that it follows from, is meant."""
+        """Return whether the entry allows a change, or the one that it follows from."""
         if self.code not in (None, change.code.id):
             return False
         names = [change.subject, change.subject.partition(".")[0], change.cause]
@@ -283,8 +288,8 @@ class BreakingSettings(msgspec.Struct, frozen=True):
     against: Text = ""
 
 
-def _words(what: str) -> Meta:
-    return Meta(pattern=r"\S", title="a string that is not blank", description=what)
+def _words(description: str) -> Meta:
+    return Meta(pattern=r"\S", title="a string that is not blank", description=description)
 
 
 class AllowSettings(msgspec.Struct, frozen=True):
@@ -300,7 +305,7 @@ class AllowSettings(msgspec.Struct, frozen=True):
 
 
 def against(config: Config, report: Report) -> str | None:
-    """Return what `idlc breaking` compares with unless told otherwise."""
+    """Return the setting `against`: the default of `idlc breaking --against`."""
     table, place = command_table(config, "breaking", BreakingSettings, report)
     if place is not None:
         place.no_url("against", table.against, report)
@@ -310,8 +315,8 @@ def against(config: Config, report: Report) -> str | None:
 def allowances(config: Config, report: Report) -> tuple[Allowance, ...]:
     """Return the entries of `[[tool.idlc.breaking.allow]]`."""
     entries = command_table(config, "breaking", BreakingSettings, report)[0].allow
-    found = [_allowance(config, at, entry, report) for at, entry in enumerate(entries)]
-    return tuple(entry for entry in found if entry is not None)
+    parsed = [_allowance(config, at, entry, report) for at, entry in enumerate(entries)]
+    return tuple(entry for entry in parsed if entry is not None)
 
 
 def _allowance(
@@ -323,11 +328,13 @@ def _allowance(
     name = "tool.idlc.breaking.allow"
     place = Place(config.source, name, f"{which} in [[{name}]]", number)
     day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
-    found = read_table({**entry, **day}, AllowSettings, place, report)
-    if found is None:
+    settings = read_table({**entry, **day}, AllowSettings, place, report)
+    if settings is None:
         return None
-    if found.code and not (found.code in CODES and found.code.startswith("IDL5")):
-        message = f"{place.shown} has `{found.code}`, which is no code of a breaking change"
+    if settings.code and not (settings.code in CODES and settings.code.startswith("IDL5")):
+        message = f"{place.shown} has `{settings.code}`, which is no code of a breaking change"
         place.wrong("code", message, report)
         return None
-    return Allowance(found.at, found.reason, found.until.isoformat(), found.code or None)
+    return Allowance(
+        settings.at, settings.reason, settings.until.isoformat(), settings.code or None
+    )

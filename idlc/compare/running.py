@@ -1,6 +1,6 @@
-"""The running ROS 2 graph, through rclpy: who sends and reads what, and how nodes describe types.
+"""The running ROS 2 graph, through rclpy: its endpoints, and the nodes' descriptions of types.
 
-Which graph it is, the user's environment says (ROS_DOMAIN_ID and the middleware's variables).
+The user's environment selects the graph (ROS_DOMAIN_ID and the middleware's variables).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from idlc.compare.changes import LEVELS, Change
 from idlc.compare.graph import (
     Endpoint,
     Entity,
-    Here,
+    LocalType,
     Role,
     Version,
     event_of,
@@ -35,7 +35,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.diagnostics.text import one_line
 from idlc.model import ir
-from idlc.model.from_description import NotBelievedError, reported_model
+from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import look, nothing_in
@@ -46,12 +46,12 @@ from idlc.wire.layout import oversized
 if TYPE_CHECKING:
     from idlc.model.describe import DescriptionDict, IndividualDict
 
-#: How much longer than without news a graph that never rests is watched.
+#: A graph that never comes to rest is watched for this many times the patience.
 RESTLESS = 10
 #: Nodes that are asked about one version.
 ASKED = 8
 _PAUSE = 0.1
-#: What DDS calls a request's or a reply's topic, and a structure.
+#: The names in DDS of a request's or a reply's topic, and of a structure.
 _SERVICE = re.compile(r"r([qr])(/.+)(?:Request|Reply)")
 _TYPE = re.compile(r"(\w+)::(\w+)::dds_::(\w+)_")
 _HASH = re.compile(r"RIHS01_[0-9a-f]{64}")
@@ -59,7 +59,7 @@ _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 
 
 class Question(NamedTuple):
-    """What a node is asked for: a type that it uses, by name and hash."""
+    """A request to a node to describe a type that it uses, by name and hash."""
 
     node: str
     type: str
@@ -67,7 +67,7 @@ class Question(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A node's description of a type, or why there is none; `sources` are .msg files by type."""
+    """A node's description of a type, or the problem with it; `sources` are .msg files by type."""
 
     description: DescriptionDict | None
     problem: str = ""
@@ -111,7 +111,7 @@ def joined(report: Report) -> Iterator[Graph | None]:
 
 
 class Graph:
-    """What a node can see of all others."""
+    """The running graph as one node sees it."""
 
     def __init__(self, rclpy: Any, node: Any, context: Any) -> None:
         self._rclpy = rclpy
@@ -119,15 +119,15 @@ class Graph:
         self._context = context
 
     def endpoints(self, patience: float) -> tuple[Endpoint, ...]:
-        """Return all ends of topics, services and actions, once nothing changed for a time."""
-        found = self._now()
+        """Return all ends of topics, services and actions, after `patience` without a change."""
+        endpoints = self._now()
         start = rest = time.monotonic()
         while (now := time.monotonic()) - rest < patience and now - start < RESTLESS * patience:
             time.sleep(min(_PAUSE, patience))
             latest = self._now()
-            if latest != found:
-                found, rest = latest, time.monotonic()
-        return found
+            if latest != endpoints:
+                endpoints, rest = latest, time.monotonic()
+        return endpoints
 
     def _now(self) -> tuple[Endpoint, ...]:
         return tuple(sorted({*self._topics(), *self._services()}))
@@ -146,41 +146,41 @@ class Graph:
     def _services(self) -> Iterator[Endpoint]:
         """Yield the ends of services, which rclpy shows as topics of DDS only."""
         for topic, _ in self._node.get_topic_names_and_types(no_demangle=True):
-            found = _SERVICE.fullmatch(topic)
-            if found is None:
+            match = _SERVICE.fullmatch(topic)
+            if match is None:
                 continue
-            owner, is_action, _ = found[2].partition("/_action/")
+            owner, is_action, _ = match[2].partition("/_action/")
             entity: Entity = "action" if is_action else "service"
             for sends in (True, False):
-                role: Role = "client" if sends == (found[1] == "q") else "server"
+                role: Role = "client" if sends == (match[1] == "q") else "server"
                 for node, type_, hash_ in self._ends(topic, sends, no_mangle=True):
                     yield Endpoint(node, entity, owner, role, sends, type_, hash_)
 
     def _ends(
         self, topic: str, sends: bool, *, no_mangle: bool = False
     ) -> Iterator[tuple[str, str, str]]:
-        """Yield node, type and hash of each end of a topic but for idlc's own."""
+        """Yield node, type and hash of each end of a topic, except idlc's own."""
         node = self._node
         look = node.get_publishers_info_by_topic if sends else node.get_subscriptions_info_by_topic
         own = f"{node.get_namespace().rstrip('/')}/{node.get_name()}"
         for info in look(topic, no_mangle=no_mangle):
-            who = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-            if who != own:
+            owner = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+            if owner != own:
                 mangled = _TYPE.fullmatch(info.topic_type)
                 type_ = "/".join(mangled.groups()) if mangled else info.topic_type
-                told = _HASH.fullmatch(str(getattr(info, "topic_type_hash", "")))
-                known = _UNKNOWN not in who
-                yield who if known else "", type_, told[0] if told else ""
+                type_hash = _HASH.fullmatch(str(getattr(info, "topic_type_hash", "")))
+                has_name = _UNKNOWN not in owner
+                yield owner if has_name else "", type_, type_hash[0] if type_hash else ""
 
     def ask(self, questions: Iterable[Question], patience: float) -> dict[Question, Answer]:
-        """Return what nodes answer within a time; each question has an answer."""
+        """Return the nodes' answers within `patience` seconds; each question has one."""
         questions = list(dict.fromkeys(questions))
         try:
             service = import_module("type_description_interfaces.srv").GetTypeDescription
         except ImportError:
             problem = "this ROS 2 has no type_description_interfaces"
             return dict.fromkeys(questions, Answer(None, problem))
-        nodes = dict.fromkeys(one.node for one in questions)
+        nodes = dict.fromkeys(question.node for question in questions)
         clients = {node: self._client(service, node) for node in nodes}
         try:
             futures = self._answers(service, clients, questions, patience)
@@ -189,8 +189,10 @@ class Graph:
                 self._node.destroy_client(client)
         offered = {name for name, _ in self._node.get_service_names_and_types()}
         return {
-            one: _answer(futures.get(one), f"{one.node}/get_type_description" in offered)
-            for one in questions
+            question: _answer(
+                futures.get(question), f"{question.node}/get_type_description" in offered
+            )
+            for question in questions
         }
 
     def _client(self, service: Any, node: str) -> Any:
@@ -205,25 +207,25 @@ class Graph:
         questions: Sequence[Question],
         patience: float,
     ) -> dict[Question, Any]:
-        """Return the results of the questions that could be asked, and were answered in time."""
+        """Return the results of the questions that were answered in time."""
         executor = self._rclpy.executors.SingleThreadedExecutor(context=self._context)
         executor.add_node(self._node)
         futures: dict[Question, Any] = {}
         end = time.monotonic() + patience
         while time.monotonic() < end:
-            for one in questions:
-                client = clients[one.node]
-                if one not in futures and client is not None and client.service_is_ready():
+            for question in questions:
+                client = clients[question.node]
+                if question not in futures and client is not None and client.service_is_ready():
                     request = service.Request(
-                        type_name=one.type, type_hash=one.hash, include_type_sources=True
+                        type_name=question.type, type_hash=question.hash, include_type_sources=True
                     )
-                    futures[one] = client.call_async(request)
-            if len(futures) == len(questions) and all(one.done() for one in futures.values()):
+                    futures[question] = client.call_async(request)
+            if len(futures) == len(questions) and all(future.done() for future in futures.values()):
                 break
             executor.spin_once(timeout_sec=_PAUSE)
         executor.remove_node(self._node)
         executor.shutdown()
-        return {one: future.result() for one, future in futures.items() if future.done()}
+        return {question: future.result() for question, future in futures.items() if future.done()}
 
 
 def _answer(result: Any, is_offered: bool) -> Answer:
@@ -233,25 +235,25 @@ def _answer(result: Any, is_offered: bool) -> Answer:
         return Answer(None, "does not answer")
     if not result.successful:
         return Answer(None, f"says: {one_line(result.failure_reason)}")
-    told = result.type_description
+    description = result.type_description
     return Answer(
         {
-            "type_description": _individual(told.type_description),
+            "type_description": _individual(description.type_description),
             "referenced_type_descriptions": [
-                _individual(one) for one in told.referenced_type_descriptions
+                _individual(referenced) for referenced in description.referenced_type_descriptions
             ],
         },
         sources={
-            one.type_name: one.raw_file_contents
-            for one in result.type_sources
-            if one.encoding == "msg"
+            source.type_name: source.raw_file_contents
+            for source in result.type_sources
+            if source.encoding == "msg"
         },
     )
 
 
-def _individual(told: Any) -> IndividualDict:
+def _individual(description: Any) -> IndividualDict:
     return {
-        "type_name": told.type_name,
+        "type_name": description.type_name,
         "fields": [
             {
                 "name": field.name,
@@ -263,7 +265,7 @@ def _individual(told: Any) -> IndividualDict:
                 },
                 "default_value": field.default_value,
             }
-            for field in told.fields
+            for field in description.fields
         ],
     }
 
@@ -278,10 +280,10 @@ _SERVICE_EVENTS = (
 
 
 class GraphVerdict(NamedTuple):
-    """What came out: how many findings break each level, and all that was looked at.
+    """The result: the number of findings by broken level, and of compared items by kind.
 
-    `seen` is how many nodes, topics, services and actions that is; `silent` how many endpoints
-    tell no type hash; `hidden` how many findings break other levels than those asked for.
+    `seen` counts nodes, topics, services and actions, `silent` endpoints without a type hash,
+    `hidden` findings that break only other levels than the selected ones.
     """
 
     levels: dict[str, int]
@@ -293,13 +295,13 @@ class GraphVerdict(NamedTuple):
 
 
 def compare_with_graph(
-    options: BreakingOptions, patience: float, report: Report, *, is_given: bool
+    options: BreakingOptions, patience: float, report: Report, *, has_paths: bool
 ) -> GraphVerdict | None:
-    """Report where endpoints, or the files here, differ in a type; `None` if nothing was seen.
+    """Report types in which endpoints, or local files, differ; `None` for an empty graph.
 
-    `patience` is how many seconds may pass without news; without files, what is installed counts.
+    `patience`: seconds without a change; without files, the installed types are compared.
     """
-    given = _given(options, report, is_given=is_given)
+    local_models = _local_models(options, report, has_paths=has_paths)
     if report.had_errors:
         return None
     with joined(report) as graph:
@@ -307,30 +309,32 @@ def compare_with_graph(
         if graph is None or not endpoints:
             report.extend([_empty(patience)] if graph else [])
             return None
-        known, here = _here(given, endpoints, options.scope)
-        found = list(several_versions(endpoints, here))
-        questions = dict(_questions(found, endpoints, known))
+        models, local = _local_versions(local_models, endpoints, options.scope)
+        versions = list(several_versions(endpoints, local))
+        questions = dict(_questions(versions, endpoints, models))
         answers = graph.ask(chain.from_iterable(questions.values()), patience)
     with stage("compare", "graph"):
-        problems = _learn(questions, answers, known)
-        changes = [*several_types(endpoints), *_changes(found, known, problems)]
+        problems = _add_described(questions, answers, models)
+        changes = [*several_types(endpoints), *_changes(versions, models, problems)]
     left = not_allowed(changes, options, report)
-    wanted = [change for change in left if change.levels & set(options.levels)]
-    report.extend(change.diagnostic for change in wanted)
+    selected = [change for change in left if change.levels & set(options.levels)]
+    report.extend(change.diagnostic for change in selected)
     return GraphVerdict(
-        {level: sum(level in change.levels for change in wanted) for level in LEVELS},
+        {level: sum(level in change.levels for change in selected) for level in LEVELS},
         len(changes) - len(left),
         _counts(endpoints),
-        sum(not one.hash for one in endpoints),
+        sum(not endpoint.hash for endpoint in endpoints),
         endpoints,
-        len(left) - len(wanted),
+        len(left) - len(selected),
     )
 
 
 def _counts(endpoints: Iterable[Endpoint]) -> dict[str, int]:
-    nodes = {one.node for one in endpoints if one.node}
-    entities = Counter(entity for entity, _ in {(one.entity, one.name) for one in endpoints})
-    return {"node": len(nodes)} | {one: entities[one] for one in get_args(Entity)}
+    nodes = {endpoint.node for endpoint in endpoints if endpoint.node}
+    entities = Counter(
+        entity for entity, _ in {(endpoint.entity, endpoint.name) for endpoint in endpoints}
+    )
+    return {"node": len(nodes)} | {entity: entities[entity] for entity in get_args(Entity)}
 
 
 def _empty(patience: float) -> Diagnostic:
@@ -342,46 +346,45 @@ def _empty(patience: float) -> Diagnostic:
     )
 
 
-def _given(options: BreakingOptions, report: Report, *, is_given: bool) -> list[Model]:
-    """Return the models of the files that were given, or that are found here."""
-    there = look(options.paths, options.scope.root, report, options.scope.exclude)
-    if is_given:
-        report.extend(
-            nothing_in(one, options.scope.root, options.scope.exclude) for one in there.empty
-        )
-    packages = inputs.packages(there.files, options.scope, report)
-    found = Report()
-    models = [model for _, model in models_of(packages, options.scope, found)]
-    if not found.had_errors:
-        found.extend(chain.from_iterable(map(oversized, models)))
-    report.extend(one for one in found if one.severity is codes.ERROR)
+def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
+    """Return the models of the user's files, or of the files in the working folder."""
+    root, exclude = options.scope.root, options.scope.exclude
+    listing = look(options.paths, root, report, exclude)
+    if has_paths:
+        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
+    packages = inputs.packages(listing.files, options.scope, report)
+    problems = Report()
+    models = [model for _, model in models_of(packages, options.scope, problems)]
+    if not problems.had_errors:
+        problems.extend(chain.from_iterable(map(oversized, models)))
+    report.extend(problem for problem in problems if problem.severity is codes.ERROR)
     return models
 
 
-def _here(
-    given: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope
-) -> tuple[dict[Key, Model], dict[str, Here]]:
-    """Return all versions that this machine has, and which one it uses of each type."""
-    known: dict[Key, Model] = {}
-    here: dict[str, Here] = {}
-    for model in given:
-        here |= {name: Here(hash_, True) for name, hash_ in _add(model, known)}
-    for model in _installed({one.structure for one in endpoints}, scope):
-        for name, hash_ in _add(model, known):
-            here.setdefault(name, Here(hash_, False))
-    return known, here
+def _local_versions(
+    local_models: Iterable[Model], endpoints: Iterable[Endpoint], scope: Scope
+) -> tuple[dict[Key, Model], dict[str, LocalType]]:
+    """Return all versions of types on this machine, and the one in use of each type."""
+    models: dict[Key, Model] = {}
+    local: dict[str, LocalType] = {}
+    for model in local_models:
+        local |= {name: LocalType(hash_, True) for name, hash_ in _add(model, models)}
+    for model in _installed({endpoint.structure for endpoint in endpoints}, scope):
+        for name, hash_ in _add(model, models):
+            local.setdefault(name, LocalType(hash_, False))
+    return models, local
 
 
-def _add(model: Model, known: dict[Key, Model]) -> Iterator[Key]:
-    """Add the structures of a model to what is known; yield their names and hashes."""
+def _add(model: Model, models: dict[Key, Model]) -> Iterator[Key]:
+    """Add the structures of a model to `models`; yield their names and hashes."""
     for name in map(str, model.messages):
         key = (name, model.describer.hash(name))
-        known.setdefault(key, model)
+        models.setdefault(key, model)
         yield key
 
 
 def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
-    """Yield the models of interfaces that are installed, or found along -I; broken ones are not."""
+    """Yield the models of interfaces that are installed, or found along -I, without broken ones."""
     dropped = Report()
     library = Library(scope.include, scope.root, dropped, distro=scope.distro)
     compiler = Compiler(library)
@@ -392,66 +395,77 @@ def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
             continue
         source = library.source(interface) if library.path(interface) else None
         if source is not None:
-            found = Report()
-            own = compiler.add([(interface, source)], found)
-            model = compiler.model(interface.package, own, found)
-            if not found.had_errors and not any(oversized(model)):
+            problems = Report()
+            own = compiler.add([(interface, source)], problems)
+            model = compiler.model(interface.package, own, problems)
+            if not problems.had_errors and not any(oversized(model)):
                 yield model
 
 
 def _questions(
-    found: Iterable[Sequence[Version]], endpoints: Iterable[Endpoint], known: Mapping[Key, Model]
+    versions: Iterable[Sequence[Version]],
+    endpoints: Iterable[Endpoint],
+    models: Mapping[Key, Model],
 ) -> Iterator[tuple[Key, list[Question]]]:
-    """Yield what to ask about each version that is not known.
+    """Yield the questions about each version without a model.
 
-    A node knows a service by the hash of the whole, which only service introspection tells: the
-    description of its events holds request and response.
+    A node knows a service by the hash of the whole, which only service introspection announces:
+    the description of its events holds request and response.
     """
-    events = [one for one in endpoints if one.structure.endswith("_Event") and one.hash]
-    for version in chain.from_iterable(found):
+    events = [
+        endpoint
+        for endpoint in endpoints
+        if endpoint.structure.endswith("_Event") and endpoint.hash
+    ]
+    for version in chain.from_iterable(versions):
         key = (version.type, version.hash)
-        if key not in known:
-            wanted = [Question(node, *key) for node in version.nodes[:ASKED]]
+        if key not in models:
+            questions = [Question(node, *key) for node in version.nodes[:ASKED]]
             if event := event_of(version.type):
                 mine = (
-                    one for one in events if one.structure == event and one.node in version.nodes
+                    event_end
+                    for event_end in events
+                    if event_end.structure == event and event_end.node in version.nodes
                 )
-                wanted = [Question(one.node, one.structure, one.hash) for one in mine]
-            yield key, wanted
+                questions = [
+                    Question(event_end.node, event_end.structure, event_end.hash)
+                    for event_end in mine
+                ]
+            yield key, questions
 
 
-def _learn(
+def _add_described(
     questions: Mapping[Key, Sequence[Question]],
     answers: Mapping[Question, Answer],
-    known: dict[Key, Model],
+    models: dict[Key, Model],
 ) -> dict[Key, str]:
-    """Add what nodes described to what is known; return why the others are not."""
+    """Add the described types to `models`; return the problems of the others."""
     problems: dict[Key, list[str]] = {}
-    for key, asked in questions.items():
-        for question in asked:
+    for key, sent in questions.items():
+        for question in sent:
             node, name, type_hash = question
             description, problem, sources = answers[question]
             if description is not None:
                 try:
                     model = reported_model(description, sources, name, type_hash, node)
                     if any(oversized(model)):
-                        raise NotBelievedError("it is larger than anybody can use")
-                except NotBelievedError as error:
+                        raise DescriptionError("it is larger than anybody can use")
+                except DescriptionError as error:
                     problem = f"is not believed: {error}"
                 else:
-                    list(_add(model, known))
+                    list(_add(model, models))
             if problem:
                 problems.setdefault(key, []).append(f"`{node}` {problem}")
     return {
         key: first_few(problems.get(key, [_SERVICE_EVENTS if event_of(key[0]) else _NO_NODE]), 3)
         for key in questions
-        if key not in known
+        if key not in models
     }
 
 
 def _changes(
-    found: Iterable[Sequence[Version]], known: Mapping[Key, Model], problems: Mapping[Key, str]
+    types: Iterable[Sequence[Version]], models: Mapping[Key, Model], problems: Mapping[Key, str]
 ) -> Iterator[Change]:
-    seen: graph.Seen = set()
-    for versions in found:
-        yield from graph.version_changes(versions, known, problems, seen)
+    seen: graph.Reported = set()
+    for versions in types:
+        yield from graph.version_changes(versions, models, problems, seen)

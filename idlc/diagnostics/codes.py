@@ -1,4 +1,4 @@
-"""Every code that idlc can report, with all its facts: stable, never renumbered, never reused.
+"""Every code that idlc can report, with its properties: stable, never renumbered, never reused.
 
 A code's constant is called like its slug, and `explain/<id>.md` is its page.
 """
@@ -17,16 +17,16 @@ CORRECTNESS = "correctness"
 PORTABILITY = "portability"
 STYLE = "style"
 PACKAGE = "package"
-#: By which users choose warnings.
+#: Users select warnings by these.
 CATEGORIES = (CORRECTNESS, PORTABILITY, STYLE, PACKAGE)
 
 
 class Code(msgspec.Struct, frozen=True):
-    """A kind of problem: its stable id, its short name, how bad it is and who asks for it.
+    """A kind of problem: its stable id, its short name, its severity and its category.
 
-    `default` is whether `idlc check` shows it unless told otherwise: off is what asks how much a
-    team writes and what it calls things, and what works as well as its alternative.
-    `usage` is whether it blames the call or its surroundings, not an interface: exit status 2.
+    `default`: `idlc check` reports it without being asked. Rules about names and the amount of
+    documentation are off, and rules against code that works as well as its alternative.
+    `usage`: a problem of the call or its environment, not of an interface; exit status 2.
     """
 
     id: str
@@ -38,7 +38,7 @@ class Code(msgspec.Struct, frozen=True):
 
     @property
     def kind(self) -> str:
-        """How bad it is and who asks for it, in words."""
+        """The severity and category, in words."""
         if self.severity is ERROR:
             return "error"
         return f"warning, {self.category}{'' if self.default else ', off by default'}"
@@ -46,7 +46,7 @@ class Code(msgspec.Struct, frozen=True):
     def at(
         self, span: Span, message: str, *, hint: str | None = None, labels: tuple[Label, ...] = ()
     ) -> Diagnostic:
-        """Return a problem of this kind at a place in a file."""
+        """Return a problem of this kind at a location in a file."""
         return Diagnostic(
             code=self.id,
             severity=self.severity,

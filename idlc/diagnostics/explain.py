@@ -17,16 +17,16 @@ SECTIONS = ("## Why", "## Bad", "## Good")
 
 def page(word: str) -> str | None:
     """Return the Markdown page of a code, given by id or name; `None` if there is none."""
-    known = find(word)
-    if known is None:
+    code = find(word)
+    if code is None:
         return None
-    path = files("idlc.diagnostics") / "explain" / f"{known.id}.md"
+    path = files("idlc.diagnostics") / "explain" / f"{code.id}.md"
     return path.read_text(encoding="utf-8") if path.is_file() else None
 
 
 def close_name(word: str) -> str | None:
     """Return the id or name of a code that is nearest to a word, `None` if none is near."""
-    return closest(word.upper(), CODES) or closest(word, (known.slug for known in CODES.values()))
+    return closest(word.upper(), CODES) or closest(word, (code.slug for code in CODES.values()))
 
 
 #: Headings of the list of codes, each from its number on.

@@ -19,9 +19,9 @@ from idlc.diagnostics.text import one_line
 
 
 class Run(NamedTuple):
-    """What a document tells besides problems: the command, idlc's version and the files read.
+    """The facts of a document besides problems: the command, idlc's version and the files read.
 
-    `strict` is whether warnings fail as errors do.
+    With `strict`, warnings fail as errors do.
     """
 
     command: str
@@ -35,15 +35,25 @@ def github(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     return "".join(map(_command, diagnostics))
 
 
-def _command(one: Diagnostic) -> str:
-    slug = CODES[one.code].slug if one.code in CODES else ""
-    facts = {"file": one.file, **_region(one), "title": f"{one.code} {slug}".strip()}
+def _command(diagnostic: Diagnostic) -> str:
+    slug = CODES[diagnostic.code].slug if diagnostic.code in CODES else ""
+    facts = {
+        "file": diagnostic.file,
+        **_region(diagnostic),
+        "title": f"{diagnostic.code} {slug}".strip(),
+    }
     listed = ",".join(
         f"{key}={_property(one_line(str(value)))}" for key, value in facts.items() if value
     )
-    parts = (one.message, one.breaks, one.holds_for, one.hint, one.within)
+    parts = (
+        diagnostic.message,
+        diagnostic.breaks,
+        diagnostic.holds_for,
+        diagnostic.hint,
+        diagnostic.within,
+    )
     text = "\n".join(one_line(part) for part in parts if part)
-    return f"::{one.severity.name.lower()} {listed}::{_escaped(text)}\n"
+    return f"::{diagnostic.severity.name.lower()} {listed}::{_escaped(text)}\n"
 
 
 def notice(title: str, text: str) -> str:
@@ -51,11 +61,11 @@ def notice(title: str, text: str) -> str:
     return f"::notice title={_property(one_line(title))}::{_escaped(one_line(text))}\n"
 
 
-def _region(one: Diagnostic) -> dict[str, int]:
-    if one.span is None or one.within:
+def _region(diagnostic: Diagnostic) -> dict[str, int]:
+    if diagnostic.span is None or diagnostic.within:
         return {}
-    line, column = one.span.source.position(one.span.start)
-    end_line, end_column = one.span.source.position(one.span.end)
+    line, column = diagnostic.span.source.position(diagnostic.span.start)
+    end_line, end_column = diagnostic.span.source.position(diagnostic.span.end)
     # GitHub shows columns only for places within one line
     if end_line != line:
         return {"line": line, "endLine": end_line}
@@ -73,29 +83,36 @@ def _property(text: str) -> str:
 def gitlab(diagnostics: Iterable[Diagnostic], _: Run) -> str:
     """Return the JSON document."""
     seen: dict[str, int] = {}
-    return json.dumps([_issue(one, seen) for one in diagnostics], indent=2) + "\n"
+    return json.dumps([_issue(diagnostic, seen) for diagnostic in diagnostics], indent=2) + "\n"
 
 
-def _issue(one: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
-    line = one.span.source.position(one.span.start)[0] if one.span and not one.within else 1
+def _issue(diagnostic: Diagnostic, seen: dict[str, int]) -> dict[str, object]:
+    line = (
+        diagnostic.span.source.position(diagnostic.span.start)[0]
+        if diagnostic.span and not diagnostic.within
+        else 1
+    )
     return {
         "type": "issue",
-        "check_name": one.code,
+        "check_name": diagnostic.code,
         "description": "; ".join(
-            filter(None, (one.message, one.breaks, one.holds_for, one.within))
+            filter(
+                None,
+                (diagnostic.message, diagnostic.breaks, diagnostic.holds_for, diagnostic.within),
+            )
         ),
-        "severity": "major" if one.severity is Severity.ERROR else "minor",
-        "fingerprint": fingerprint(one, seen),
-        "location": {"path": one.file or ".", "lines": {"begin": line}},
+        "severity": "major" if diagnostic.severity is Severity.ERROR else "minor",
+        "fingerprint": fingerprint(diagnostic, seen),
+        "location": {"path": diagnostic.file or ".", "lines": {"begin": line}},
     }
 
 
-def fingerprint(one: Diagnostic, seen: dict[str, int]) -> str:
-    """Return what tells a problem from all others, and stays when lines move.
+def fingerprint(diagnostic: Diagnostic, seen: dict[str, int]) -> str:
+    """Return a text that is unique to a problem, and stays when lines move.
 
-    `seen` counts those that are alike but for their place.
+    `seen` counts problems that differ in their location only.
     """
-    key = "\0".join((one.code, one.file, one.message))
+    key = "\0".join((diagnostic.code, diagnostic.file, diagnostic.message))
     number = seen[key] = seen.get(key, 0) + 1
     return hashlib.sha256(f"{key}\0{number}".encode("utf-8", "replace")).hexdigest()[:32]
 
@@ -106,36 +123,52 @@ _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 def junit(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     """Return the XML document: a test for each problem, and a passed one for each clean file.
 
-    A warning is a passed test with output, unless it fails the run as well: servers fail a build
-    for what the exit status does not.
+    A warning is a passed test with output, unless it fails the run as well: servers would fail a
+    build whose exit status is 0.
     """
-    found = list(diagnostics)
-    failed = sum(run.strict or one.severity is Severity.ERROR for one in found)
-    clean = [file for file in run.files if file not in {one.where[0] for one in found}]
+    reported = list(diagnostics)
+    failed = sum(run.strict or diagnostic.severity is Severity.ERROR for diagnostic in reported)
+    clean = [
+        file for file in run.files if file not in {diagnostic.where[0] for diagnostic in reported}
+    ]
     head = (
-        f'<testsuite name="idlc" tests="{len(found) + len(clean)}" '
+        f'<testsuite name="idlc" tests="{len(reported) + len(clean)}" '
         f'failures="{failed}" errors="0" skipped="0">'
     )
-    cases = [_case(one, failed=run.strict or one.severity is Severity.ERROR) for one in found]
+    cases = [
+        _case(diagnostic, failed=run.strict or diagnostic.severity is Severity.ERROR)
+        for diagnostic in reported
+    ]
     cases += [f'  <testcase classname="idlc" name={_quoted(file)}/>' for file in clean]
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', head, *cases, "</testsuite>", ""]
-    # whatever encoding it is written in, it is read alike
+    # ASCII reads the same in whichever encoding it is written
     return "\n".join(lines).encode("ascii", "xmlcharrefreplace").decode("ascii")
 
 
-def _case(one: Diagnostic, *, failed: bool) -> str:
-    path, line = one.where[0], ""
-    if one.span:
-        line = ":{}:{}".format(*one.span.source.position(one.span.start))
-    slug = CODES[one.code].slug if one.code in CODES else ""
+def _case(diagnostic: Diagnostic, *, failed: bool) -> str:
+    path, line = diagnostic.where[0], ""
+    if diagnostic.span:
+        line = ":{}:{}".format(*diagnostic.span.source.position(diagnostic.span.start))
+    slug = CODES[diagnostic.code].slug if diagnostic.code in CODES else ""
     lines = (
-        f"{path}{line}: {one.message}",
-        *filter(None, (one.breaks, one.holds_for, one.hint and f"hint: {one.hint}")),
+        f"{path}{line}: {diagnostic.message}",
+        *filter(
+            None,
+            (
+                diagnostic.breaks,
+                diagnostic.holds_for,
+                diagnostic.hint and f"hint: {diagnostic.hint}",
+            ),
+        ),
     )
     text = "\n".join(map(one_line, lines))
-    name = f"{one.code} {slug}{line}"
-    kind = one.severity.name.lower()
-    tag = f"failure type={_quoted(kind)} message={_quoted(one.message)}" if failed else "system-out"
+    name = f"{diagnostic.code} {slug}{line}"
+    kind = diagnostic.severity.name.lower()
+    tag = (
+        f"failure type={_quoted(kind)} message={_quoted(diagnostic.message)}"
+        if failed
+        else "system-out"
+    )
     text = text if failed else f"{kind}: {text}"
     return (
         f"  <testcase classname={_quoted(path or 'idlc')} name={_quoted(name)}>\n"
@@ -157,8 +190,8 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
     """Return the JSON document; services keep those of several commands apart."""
-    found = list(diagnostics)
-    codes = sorted({one.code for one in found})
+    reported = list(diagnostics)
+    codes = sorted({diagnostic.code for diagnostic in reported})
     seen: dict[str, int] = {}
     whole = {
         "tool": {
@@ -170,24 +203,26 @@ def sarif(diagnostics: Iterable[Diagnostic], run: Run) -> str:
         },
         "automationDetails": {"id": f"idlc/{run.command}/"},
         "columnKind": "unicodeCodePoints",
-        "results": [_result(one, codes.index(one.code), seen) for one in found],
+        "results": [
+            _result(diagnostic, codes.index(diagnostic.code), seen) for diagnostic in reported
+        ],
     }
     return json.dumps({"$schema": SCHEMA, "version": "2.1.0", "runs": [whole]}, indent=2) + "\n"
 
 
 def _rule(code: str) -> dict[str, object]:
-    known = CODES.get(code)
-    if known is None:
+    kind = CODES.get(code)
+    if kind is None:
         return {"id": code}
     text = page(code) or ""
-    first = text.split("\n\n")[1] if text.count("\n\n") else known.slug
+    first = text.split("\n\n")[1] if text.count("\n\n") else kind.slug
     plain = " ".join(first.replace("`", "").split())
     return {
         "id": code,
-        "name": "".join(word.capitalize() for word in re.split(r"\W", known.slug)),
+        "name": "".join(word.capitalize() for word in re.split(r"\W", kind.slug)),
         "shortDescription": {"text": plain},
         "help": {"text": plain, "markdown": text or plain},
-        "defaultConfiguration": {"level": _level(known.severity)},
+        "defaultConfiguration": {"level": _level(kind.severity)},
     }
 
 
@@ -195,24 +230,35 @@ def _level(severity: Severity) -> str:
     return "error" if severity is Severity.ERROR else "warning"
 
 
-def _result(one: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
-    text = "; ".join(filter(None, (one.message, one.breaks, one.holds_for, one.hint, one.within)))
+def _result(diagnostic: Diagnostic, rule: int, seen: dict[str, int]) -> dict[str, object]:
+    text = "; ".join(
+        filter(
+            None,
+            (
+                diagnostic.message,
+                diagnostic.breaks,
+                diagnostic.holds_for,
+                diagnostic.hint,
+                diagnostic.within,
+            ),
+        )
+    )
     result: dict[str, object] = {
-        "ruleId": one.code,
+        "ruleId": diagnostic.code,
         "ruleIndex": rule,
-        "level": _level(one.severity),
+        "level": _level(diagnostic.severity),
         "message": {"text": text},
-        "partialFingerprints": {"idlc/v1": fingerprint(one, seen)},
+        "partialFingerprints": {"idlc/v1": fingerprint(diagnostic, seen)},
     }
-    if one.file:
-        result["locations"] = [_location(one.span, one.file)]
-    if one.labels:
+    if diagnostic.file:
+        result["locations"] = [_location(diagnostic.span, diagnostic.file)]
+    if diagnostic.labels:
         result["relatedLocations"] = [
             {**_location(label.span, label.span.source.file), "message": {"text": label.text}}
-            for label in one.labels
+            for label in diagnostic.labels
         ]
-    if one.edits:
-        result["fixes"] = [{"artifactChanges": [_change(edit) for edit in one.edits]}]
+    if diagnostic.edits:
+        result["fixes"] = [{"artifactChanges": [_change(edit) for edit in diagnostic.edits]}]
     return result
 
 

@@ -1,4 +1,4 @@
-"""Source text and places in it.
+"""Source text and ranges in it.
 
 In: decoded text and the name a person knows it by. Out: spans that can be pointed at.
 Never reads a file and never changes the text: line ends, tabs and a byte order mark stay.
@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 
 class Source:
-    """One file's exact text. Compared by identity; `path` is what messages show.
+    """One file's exact text. Compared by identity; messages show `path`.
 
-    `file` is the file that the text is a part of, where that is not the file itself.
+    `file` is the file that contains the text, where `path` names only a part of it.
     """
 
     def __init__(self, path: str, text: str, file: str = "") -> None:
@@ -27,7 +27,7 @@ class Source:
 
     @property
     def is_idl(self) -> bool:
-        """Whether it is IDL, which ROS 2 makes of interface files, instead of one of them."""
+        """True for IDL, which ROS 2 makes from interface files, instead of an interface file."""
         return self.path.endswith(".idl")
 
     @cached_property

@@ -93,10 +93,10 @@ def _line(diagnostic: Diagnostic, paint: _Paint) -> str:
 
 
 def statistics(diagnostics: Iterable[Diagnostic]) -> Iterator[str]:
-    """Yield a line for each code that was found, the most frequent first."""
+    """Yield a line for each reported code, the most frequent first."""
     counts = Counter(diagnostic.code for diagnostic in diagnostics)
     width = max(map(len, map(str, counts.values())), default=0)
-    for code, number in sorted(counts.items(), key=lambda one: (-one[1], one[0])):
+    for code, number in sorted(counts.items(), key=lambda item: (-item[1], item[0])):
         yield f"{number:>{width}}  {code} {CODES[code].slug if code in CODES else ''}\n"
 
 
@@ -127,7 +127,7 @@ def _block(diagnostic: Diagnostic, paint: _Paint) -> Iterator[str]:
 
 
 def _shortened(text: str) -> str:
-    """Return a text without its middle if it is so long that nobody could read it."""
+    """Return a text without its middle if it is too long to read."""
     return text if len(text) <= TEXT_WIDTH else f"{text[: TEXT_WIDTH - 200]} … {text[-100:]}"
 
 
@@ -189,14 +189,14 @@ def _cut(line: str, start: int, end: int) -> tuple[str, int, int]:
 
 def summary(diagnostics: Iterable[Diagnostic]) -> str:
     """Return the closing line, such as `2 errors, 1 warning in 3 files`."""
-    found = list(diagnostics)
-    errors = sum(one.severity is Severity.ERROR for one in found)
+    reported = list(diagnostics)
+    errors = sum(diagnostic.severity is Severity.ERROR for diagnostic in reported)
     parts = [
         counted(number, noun)
-        for number, noun in ((errors, "error"), (len(found) - errors, "warning"))
+        for number, noun in ((errors, "error"), (len(reported) - errors, "warning"))
         if number
     ]
-    files = len({one.where[0] for one in found})
+    files = len({diagnostic.where[0] for diagnostic in reported})
     return f"{', '.join(parts)} in {counted(files, 'file')}" if parts else "no problems"
 
 

@@ -1,4 +1,4 @@
-"""Suggestions for misspelt names."""
+"""Text for terminals and messages: visible characters, widths, suggestions for misspelt names."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from contextvars import ContextVar
 TAB_STOP = 4
 #: Control, format, surrogate, private-use and unassigned characters, line and paragraph ends.
 _HIDDEN = frozenset(("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"))
-#: Control characters, those of the direction of writing included, other than tabs and line feeds.
+#: Control characters, including bidirectional ones, other than tabs and line feeds.
 _CONTROL = re.compile("[\\0-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u2028-\\u202e\\u2066-\\u2069]")
 
 
@@ -42,9 +42,9 @@ def one_line(text: str) -> str:
 def printable(text: str) -> str:
     """Return text of any number of lines with its control characters spelled out.
 
-    What writing needs stays, such as the joiners of scripts and emoji.
+    Characters that scripts and emoji need, such as joiners, stay.
     """
-    return _CONTROL.sub(lambda found: _spelled(found[0]), text)
+    return _CONTROL.sub(lambda match: _spelled(match[0]), text)
 
 
 def _spelled(character: str) -> str:
@@ -89,7 +89,7 @@ def edit_distance(left: str, right: str) -> int:
 _ENDS = ("_msgs", "_interfaces", "_srvs", "_actions")
 
 
-def closest(name: str, known: Iterable[str]) -> str | None:
+def closest(name: str, names: Iterable[str]) -> str | None:
     """Return the known name that is nearest, or `None` if none is near.
 
     A name of three letters may have one of them wrong, a long one three.
@@ -98,7 +98,7 @@ def closest(name: str, known: Iterable[str]) -> str | None:
         return None
     limit = min(max(1, len(name) // 3), 3)
     best: tuple[int, str] | None = None
-    for candidate in known:
+    for candidate in names:
         if abs(len(candidate) - len(name)) > limit:
             continue
         distance = edit_distance(name.lower(), candidate.lower())
@@ -107,9 +107,9 @@ def closest(name: str, known: Iterable[str]) -> str | None:
     return best[1] if best else None
 
 
-def package_hint(name: str, known: Iterable[str]) -> str:
+def package_hint(name: str, names: Iterable[str]) -> str:
     """Return the hint for a package that is nowhere to be found."""
-    near = closest_package(name, known)
+    near = closest_package(name, names)
     if near is not None:
         return f"did you mean `{near}`?"
     return (
@@ -123,7 +123,7 @@ _HAS_OPTIONS: ContextVar[bool] = ContextVar("has_options", default=True)
 
 @contextmanager
 def without_options() -> Iterator[None]:
-    """Let hints name settings, for users of a build or an editor, who type no options of idlc."""
+    """Let hints name settings instead of options, for users of a build or an editor."""
     before = _HAS_OPTIONS.set(False)
     try:
         yield
@@ -132,28 +132,28 @@ def without_options() -> Iterator[None]:
 
 
 def including(folder: str) -> str:
-    """Return the advice to look for packages in a folder, too."""
+    """Return the advice to look for packages in a folder as well."""
     if _HAS_OPTIONS.get():
         return f"add `-I {shlex.quote(folder)}`"
     return f"add `{folder}` to `include` in [tool.idlc] of pyproject.toml"
 
 
-def closest_package(name: str, known: Iterable[str]) -> str | None:
+def closest_package(name: str, names: Iterable[str]) -> str | None:
     """Return the package of the nearest name, or `None` if none is near.
 
     Digits are no slips of the pen: `nav2_msgs` is not `nav_msgs`.
     """
     end = next((end for end in _ENDS if name.endswith(end)), "")
     digits = "".join(filter(str.isdigit, name))
-    alike = [one for one in known if "".join(filter(str.isdigit, one)) == digits]
-    same_end = {one.removesuffix(end): one for one in alike if one.endswith(end)}
-    found = closest(name.removesuffix(end), same_end)
-    if found is not None:
-        return same_end[found]
-    return closest(name, (one for one in alike if not one.endswith(end)))
+    alike = [other for other in names if "".join(filter(str.isdigit, other)) == digits]
+    same_end = {other.removesuffix(end): other for other in alike if other.endswith(end)}
+    stem = closest(name.removesuffix(end), same_end)
+    if stem is not None:
+        return same_end[stem]
+    return closest(name, (other for other in alike if not other.endswith(end)))
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+def did_you_mean(name: str, names: Iterable[str]) -> str | None:
     """Return the hint that names the nearest known name, or `None`."""
-    found = closest(name, known)
-    return f"did you mean `{found}`?" if found else None
+    near = closest(name, names)
+    return f"did you mean `{near}`?" if near else None

@@ -28,7 +28,7 @@ LISTING = "idlc-docs.json"
 
 
 def write(out: str, files: Mapping[str, str], root: Root, report: Report) -> bool:
-    """Write files below `out`; report IDL612 to IDL614 and return `False` if that must not be."""
+    """Write files below `out`; report IDL612 to IDL614 and return `False` if that is refused."""
     folder = root.absolute(out)
     with alone(folder):
         return _write(folder, out, files, report)
@@ -43,7 +43,7 @@ def _write(folder: Path, out: str, files: Mapping[str, str], report: Report) -> 
     changes: list[Change] = []
     stale = {path for path, _ in mine} - pages.keys()
     renamed = tree.renamed(stale, pages)
-    mine |= {(renamed[path], one) for path, one in mine if path in renamed}
+    mine |= {(renamed[path], sha256) for path, sha256 in mine if path in renamed}
     for path in (*pages, *sorted(stale - renamed.keys())):
         old, new = tree.read(path), pages.get(path)
         foreign = isinstance(old, Obstacle) or (
@@ -65,46 +65,48 @@ def _write(folder: Path, out: str, files: Mapping[str, str], report: Report) -> 
     return apply_changes(Plan(folder, tuple(changes), {}), out, report, listing)
 
 
-def _in_the_way(shown: str, found: Obstacle | bytes | None) -> Diagnostic:
-    what = f"`{shown}` was not written by idlc, or edited since"
-    if isinstance(found, Obstacle):
-        what = f"cannot write `{shown}`: {found.what}"
-    return codes.FOREIGN_FILE.of(shown, what, hint="move it away, or choose another folder with -o")
+def _in_the_way(shown: str, current: Obstacle | bytes | None) -> Diagnostic:
+    message = f"`{shown}` was not written by idlc, or edited since"
+    if isinstance(current, Obstacle):
+        message = f"cannot write `{shown}`: {current.what}"
+    return codes.FOREIGN_FILE.of(
+        shown, message, hint="move it away, or choose another folder with -o"
+    )
 
 
 def _listed(folder: Path, tree: Tree) -> set[tuple[str, str]]:
-    """Return the pages that earlier runs wrote and what they wrote, as far as that may be."""
+    """Return the pages that earlier runs may have written, each with its SHA-256."""
     record = tree.read(LISTING)
-    found: set[tuple[str, str]] = set()
+    written: set[tuple[str, str]] = set()
     for data in (record if isinstance(record, bytes) else b"", *journals(folder)):
         try:
             listed = json.loads(data)
         except (ValueError, RecursionError):
             continue
         if isinstance(listed, dict):
-            found |= {
-                (path, one)
-                for path, one in listed.items()
-                if may_be_own(path) and isinstance(one, str)
+            written |= {
+                (path, sha256)
+                for path, sha256 in listed.items()
+                if may_be_own(path) and isinstance(sha256, str)
             }
-    return found
+    return written
 
 
 def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
-    """Write a site about the interfaces that paths and names mean; return how many pages it has.
+    """Write a site about the interfaces of paths and names; return its number of pages.
 
-    Interfaces with errors, and those that hold them, are left out.
+    Interfaces with errors, and interfaces that hold these, are left out.
     """
-    given = _given(paths, scope, report)
+    packages = _packages(paths, scope, report)
     if report.had_errors:
         return 0
-    models = [model for model, _ in sound_models(given, scope, report) if model.own]
+    models = [model for model, _ in sound_models(packages, scope, report) if model.own]
     if not models:
         return 0
     from idlc.documents.pages import site
     from idlc.project import templates
 
-    about = {one.package: _about(one, scope.root) for one in given}
+    about = {package.package: _about(package, scope.root) for package in packages}
     templates.keep()
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
@@ -114,26 +116,26 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     return sum(path.endswith(".html") for path in files) if done else 0
 
 
-def _given(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
+def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
     names = [word for word in words if is_name(word, scope.root)]
-    known = named_packages(names, scope, report, whole=False)
+    named = named_packages(names, scope, report, whole=False)
     paths = [word for word in words if not is_name(word, scope.root)]
     if not paths or report.had_errors:
-        return tuple(known)
+        return tuple(named)
     files = find(paths, scope.root, report, scope.exclude)
-    packages = (*inputs.packages(files, scope, report), *known)
+    packages = (*inputs.packages(files, scope, report), *named)
     return inputs.without_duplicates(packages, scope.root, report)
 
 
-def _about(given: inputs.Inputs, root: Root) -> About:
-    """Return what a package's package.xml says of it."""
+def _about(package: inputs.Inputs, root: Root) -> About:
+    """Return the facts about a package in its package.xml."""
     from idlc.documents.pages import About
 
-    path = root.manifest(given.folders[0]) if given.folders else None
-    found = read_statements(path, path.as_posix(), root, Report()) if path else ()
+    path = root.manifest(package.folders[0]) if package.folders else None
+    statements = read_statements(path, path.as_posix(), root, Report()) if path else ()
     texts: dict[str, list[str]] = {}
-    for one in found:
-        texts.setdefault(one.tag, []).append(" ".join(one.text.split()))
+    for statement in statements:
+        texts.setdefault(statement.tag, []).append(" ".join(statement.text.split()))
     return About(
         version=" ".join(texts.get("version", [])),
         description=" ".join(texts.get("description", [])),

@@ -16,7 +16,7 @@ from idlc.project.templates import RenderedFile, html, verbatim
 
 
 class About(NamedTuple):
-    """What a package's package.xml says of it."""
+    """The facts about a package in its package.xml."""
 
     version: str = ""
     description: str = ""
@@ -35,7 +35,7 @@ class Entry(NamedTuple):
 
 
 class PackagePage(NamedTuple):
-    """The page of a package; `described` is whether any interface says what it is for."""
+    """The page of a package; `described`: some interface has a description."""
 
     title: str
     root: str
@@ -46,7 +46,7 @@ class PackagePage(NamedTuple):
     entries: Sequence[Entry]
 
 
-class Row(NamedTuple):
+class PackageRow(NamedTuple):
     """A package in the list of packages."""
 
     page: str
@@ -60,11 +60,11 @@ class Front(NamedTuple):
 
     title: str
     root: str
-    rows: Sequence[Row]
+    rows: Sequence[PackageRow]
 
 
 def homes(names: Sequence[str]) -> dict[str, str]:
-    """Return the page of each package; that of a single one is the title page."""
+    """Return the page of each package; a single package has the title page."""
     return {name: f"{name}/index.html" if len(names) > 1 else "index.html" for name in names}
 
 
@@ -72,7 +72,7 @@ def package_page(
     name: str, home: str, about: About, interfaces: Sequence[ir.Interface], pages: Pages
 ) -> PackagePage:
     """Return the page of a package, which is `home`."""
-    entries = [_entry(one, pages) for one in interfaces]
+    entries = [_entry(interface, pages) for interface in interfaces]
     return PackagePage(
         title=name,
         root="../" * home.count("/"),
@@ -95,13 +95,13 @@ def front(
         own = about.get(name, About())
         version = [f"version {own.version}"] if own.version else []
         facts = " · ".join([*version, counted(interfaces)])
-        rows.append(Row(pages[name], words(name), facts, own.description))
+        rows.append(PackageRow(pages[name], words(name), facts, own.description))
     return Front("Interfaces", "", rows)
 
 
 def counted(interfaces: Sequence[ir.Interface]) -> str:
-    """Return how many interfaces of each kind there are, in words."""
-    kinds: Counter[str] = Counter(one.name.kind for one in interfaces)
+    """Return the number of interfaces of each kind, in words."""
+    kinds: Counter[str] = Counter(interface.name.kind for interface in interfaces)
     return ", ".join(
         f"{kinds[kind]} {word}{'s' * (kinds[kind] > 1)}"
         for kind, word in KINDS.items()
@@ -125,43 +125,48 @@ def _facts(about: About) -> list[str]:
 
 
 def first_line(interface: ir.Interface) -> str:
-    """Return the first line that says what an interface is for."""
+    """Return the first line of an interface's description."""
     lines = (line for part in derive.sections(interface) for line in part.comment)
     return next((line for line in lines if line.strip()), "")
 
 
-#: The interfaces of each package that is shown.
+#: The interfaces by package.
 Packages = Mapping[str, Sequence[ir.Interface]]
 
 
 def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedFile, ...]:
-    """Return the pages of all packages, and of what they use, with a search over all.
+    """Return the pages of all packages and of the interfaces that they use, with a search.
 
-    `about` tells of packages by name.
+    `about` has the facts about packages by name.
     """
-    known: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
+    sources: dict[ir.TypeName, tuple[ir.Interface, Model]] = {}
     for model in models:
         for name, interface in model.interfaces.items():
-            if interface.source is not None and (name not in known or interface in model.own):
-                known[name] = (interface, model)
+            if interface.source is not None and (name not in sources or interface in model.own):
+                sources[name] = (interface, model)
     own = {interface.name for model in models for interface in model.own}
-    pages = {name: _path(name) for name in sorted(known)}
-    users = _users(interface for interface, _ in known.values())
-    shown = [known[name][0] for name in sorted(own)]
-    packages = {name: tuple(found) for name, found in groupby(shown, lambda one: one.name.package)}
+    pages = {name: _path(name) for name in sorted(sources)}
+    users = _users(interface for interface, _ in sources.values())
+    shown = [sources[name][0] for name in sorted(own)]
+    packages = {
+        name: tuple(group)
+        for name, group in groupby(shown, lambda interface: interface.name.package)
+    }
     home = homes([*packages])
-    owners = {name: Home(there, about.get(name, About()).version) for name, there in home.items()}
-    template = html().get_template("site/interface.html.jinja")
+    owners = {
+        name: Home(address, about.get(name, About()).version) for name, address in home.items()
+    }
+    template = html().get_template("documents/interface.html.jinja")
     files = []
-    for name, (interface, model) in sorted(known.items()):
+    for name, (interface, model) in sorted(sources.items()):
         owner = owners.get(name.package, Home())
         shown_page = page(interface, model, users.get(name, set()), pages, owner)
         files.append(RenderedFile(pages[name], template.render(page=shown_page)))
     return (
         *_lists(packages, home, pages, about),
         RenderedFile("index.js", f"const INDEX = {_index(packages, home, pages, about)};\n"),
-        RenderedFile("search.js", verbatim("site/search.js")),
-        RenderedFile("style.css", verbatim("site/style.css")),
+        RenderedFile("search.js", verbatim("documents/search.js")),
+        RenderedFile("style.css", verbatim("documents/style.css")),
         *files,
     )
 
@@ -169,13 +174,13 @@ def site(models: Sequence[Model], about: Mapping[str, About]) -> tuple[RenderedF
 def _lists(
     packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
 ) -> Iterator[RenderedFile]:
-    """Yield the pages that list interfaces, and for several packages the one that lists those."""
-    template = html().get_template("site/package.html.jinja")
+    """Yield the page of each package, and for several packages the title page."""
+    template = html().get_template("documents/package.html.jinja")
     for name, interfaces in packages.items():
         text = package_page(name, home[name], about.get(name, About()), interfaces, pages)
         yield RenderedFile(home[name], template.render(page=text))
     if len(packages) > 1:
-        title = html().get_template("site/index.html.jinja")
+        title = html().get_template("documents/index.html.jinja")
         yield RenderedFile("index.html", title.render(page=front(packages, home, about)))
 
 
@@ -184,34 +189,39 @@ def _path(name: ir.TypeName) -> str:
 
 
 def _users(interfaces: Iterable[ir.Interface]) -> dict[ir.TypeName, set[ir.TypeName]]:
-    found: dict[ir.TypeName, set[ir.TypeName]] = {}
+    users: dict[ir.TypeName, set[ir.TypeName]] = {}
     for interface in interfaces:
         for target in derive.references(interface):
-            found.setdefault(target, set()).add(interface.name)
-    return found
+            users.setdefault(target, set()).add(interface.name)
+    return users
 
 
 def _index(
     packages: Packages, home: Mapping[str, str], pages: Pages, about: Mapping[str, About]
 ) -> str:
-    """Return what is searched: names, pages, lines about them, and the same of what is in them."""
+    """Return the search index: names, pages, descriptions and the items of each, as JSON."""
     entries: list[tuple[str, str, str, list[tuple[str, str]]]] = []
     for package, interfaces in packages.items():
         described = printable(about.get(package, About()).description)
         entries.append((package, home[package], described, []))
         entries += [
-            (str(one.name), pages[one.name], printable(first_line(one)), [*_items(one)])
-            for one in interfaces
+            (
+                str(interface.name),
+                pages[interface.name],
+                printable(first_line(interface)),
+                [*_items(interface)],
+            )
+            for interface in interfaces
         ]
     return json.dumps(entries, separators=(",", ":"))
 
 
 def _items(interface: ir.Interface) -> Iterator[tuple[str, str]]:
-    """Yield fields and constants, as they follow the interface's name, and a line about each."""
+    """Yield fields and constants, as suffixes of the interface's name, with a description."""
     for part in derive.sections(interface):
         before = prefix(interface, part)
         divider = "_" if before else "."
-        items = [(one.name, one.comment) for one in part.constants]
-        items += [(one.name, one.comment) for one in part.fields]
+        items = [(constant.name, constant.comment) for constant in part.constants]
+        items += [(field.name, field.comment) for field in part.fields]
         for name, comment in items:
             yield f"{divider}{before}{name}", printable(" ".join(comment[:1]))

@@ -1,4 +1,4 @@
-"""The pipelines of the commands that answer: hash and describe."""
+"""The pipelines of `idlc hash` and `idlc describe`."""
 
 from __future__ import annotations
 
@@ -24,39 +24,39 @@ if TYPE_CHECKING:
     from idlc.project.library import Library
 
 
-def hashes(wanted: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
-    """Return type hash and full name of what paths and type names mean, derived types included."""
-    found: list[tuple[str, str]] = []
+def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
+    """Return type hash and full name of each type in paths and names, derived types included."""
+    named_hashes: list[tuple[str, str]] = []
     scope = _with_hashes(scope)
     if not _has_hashes(scope.distro, report):
-        return found
-    for model, names in wanted_models(wanted, scope, report):
+        return named_hashes
+    for model, names in requested_models(targets, scope, report):
         with stage("describe", model.package):
-            found += [(model.describer.hash(name), name) for name in names]
-    return list(dict.fromkeys(found))
+            named_hashes += [(model.describer.hash(name), name) for name in names]
+    return list(dict.fromkeys(named_hashes))
 
 
-def describe(wanted: str, scope: Scope, report: Report) -> dict[str, object] | None:
+def describe(target: str, scope: Scope, report: Report) -> dict[str, object] | None:
     """Return the content of the JSON file that ROS 2 installs for one interface or derived type."""
     scope = _with_hashes(scope)
     if not _has_hashes(scope.distro, report):
         return None
-    found = list(wanted_models((wanted,), scope, report))
-    if report.had_errors or not found:
+    models = list(requested_models((target,), scope, report))
+    if report.had_errors or not models:
         return None
-    (model, names) = found[0]
+    (model, names) = models[0]
     tops = [str(own.name) for own in model.own if str(own.name) in names] or names
-    if len(found) > 1 or len(tops) > 1:
+    if len(models) > 1 or len(tops) > 1:
         hint = f"name one of them, such as `idlc describe {tops[0]}`"
-        message = f"`{wanted}` holds several interfaces"
-        report.add(codes.NO_SUCH_TYPE.of(wanted, message, hint=hint))
+        message = f"`{target}` holds several interfaces"
+        report.add(codes.NO_SUCH_TYPE.of(target, message, hint=hint))
         return None
     with stage("describe", tops[0]):
         return {**model.describer.installed(tops[0])}
 
 
 def _with_hashes(scope: Scope) -> Scope:
-    """Return a scope for the first of its distributions that has type hashes, if any has."""
+    """Return a scope for the first of its distributions with type hashes, if there is one."""
     able = tuple(distro for distro in scope.distros if distro.has_hashes)
     return msgspec.structs.replace(scope, distros=able or scope.distros)
 
@@ -64,44 +64,46 @@ def _with_hashes(scope: Scope) -> Scope:
 def _has_hashes(distro: Distro, report: Report) -> bool:
     """Return whether a distribution has type hashes and descriptions; report IDL624 otherwise."""
     if not distro.has_hashes:
-        first = next(one for one in later(distro) if one.has_hashes)
+        first = next(other for other in later(distro) if other.has_hashes)
         message = f"ROS 2 {distro.title} has no type hashes and no type descriptions"
         hint = f"they came with {first.title}; say for which distribution, as in `--distro jazzy`"
         report.add(codes.NO_TYPE_HASHES.of("", message, hint=hint))
     return distro.has_hashes
 
 
-def wanted_models(
-    wanted: Sequence[str], scope: Scope, report: Report
+def requested_models(
+    targets: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
-    """Yield, for paths and names, sound models and the names in them that are meant.
+    """Yield, for paths and names, models and the requested names in them.
 
-    What has errors is left out.
+    Interfaces with errors are left out.
     """
-    paths = [one for one in wanted if is_path(one, scope.root)]
-    for one in wanted:
-        if one not in paths:
-            found = Report()
-            yield from _named(one, scope, found)
-            report.extend(found)
+    paths = [target for target in targets if is_path(target, scope.root)]
+    for target in targets:
+        if target not in paths:
+            problems = Report()
+            yield from _named(target, scope, problems)
+            report.extend(problems)
     recordings, paths = divided(paths, scope.root)
     if recordings:
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(recordings, scope, report)
     if paths:
-        there = Report()
-        given = inputs.packages(find(paths, scope.root, there, scope.exclude), scope, there)
-        report.extend(there)
-        report.notes += there.notes
-        if not there.had_errors:
-            yield from sound_models(given, scope, report)
+        problems = Report()
+        packages = inputs.packages(
+            find(paths, scope.root, problems, scope.exclude), scope, problems
+        )
+        report.extend(problems)
+        report.notes += problems.notes
+        if not problems.had_errors:
+            yield from sound_models(packages, scope, report)
 
 
 def _named(text: str, scope: Scope, report: Report) -> Iterator[tuple[Model, list[str]]]:
-    """Yield the models that a type's or package's name means, and the names that are meant."""
-    library, meant = resolve(text, scope, report)
-    for name, interface in meant:
+    """Yield the models of a type's or package's name, and the requested names in them."""
+    library, matches = resolve(text, scope, report)
+    for name, interface in matches:
         model = _compiled(interface, library, report)
         if model is None:
             return
@@ -124,6 +126,6 @@ def _compiled(interface: ir.TypeName, library: Library, report: Report) -> Model
 
 
 def _no_such_part(text: str, interface: ir.TypeName, names: Sequence[str]) -> Diagnostic:
-    parts = (f"`{one.rpartition('/')[2]}`" for one in names if one != str(interface))
+    parts = (f"`{name.rpartition('/')[2]}`" for name in names if name != str(interface))
     hint = f"the parts of `{interface}` are {', '.join(parts)}"
     return codes.NO_SUCH_TYPE.of("", f"no such type: `{text}`", hint=hint)

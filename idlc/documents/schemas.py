@@ -12,12 +12,12 @@ from idlc.model.link import Model
 Json = dict[str, object]
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-#: What stands between messages in an MCAP schema of encoding `ros2msg`.
+#: The line between messages in an MCAP schema of encoding `ros2msg`.
 MCAP_LINE = "=" * 80
 
 
 def facts(interface: ir.Interface, model: Model) -> Json:
-    """Return everything that is known of an interface, and of the messages that it uses."""
+    """Return all facts about an interface and the messages that it uses."""
     used = [model.messages[name] for name in _used(derive.sections(interface), model)]
     return {
         "name": str(interface.name),
@@ -33,14 +33,14 @@ def _structure(message: ir.Message) -> Json:
         "comment": list(message.comment),
         "constants": [
             {
-                "name": one.name,
-                "type": spell(one.type),
-                "value": one.value,
-                "comment": list(one.comment),
+                "name": constant.name,
+                "type": spell(constant.type),
+                "value": constant.value,
+                "comment": list(constant.comment),
             }
-            for one in message.constants
+            for constant in message.constants
         ],
-        "fields": [_field(one) for one in message.fields],
+        "fields": [_field(field) for field in message.fields],
     }
 
 
@@ -69,7 +69,7 @@ def _used(parts: tuple[ir.Message, ...], model: Model) -> Iterator[ir.TypeName]:
 
 
 def json_schema(interface: ir.Interface, model: Model) -> Json:
-    """Return the JSON Schema of what `to_dict()` gives; a service's are those of its parts."""
+    """Return the JSON Schema of the result of `to_dict()`; a service has one for each part."""
     parts = derive.sections(interface)
     used = list(_used(parts, model))
     definitions = {str(name): _object(model.messages[name]) for name in used}
@@ -98,14 +98,14 @@ def _object(message: ir.Message) -> Json:
 
 
 def _property(field: ir.Field) -> Json:
-    found = _value(field.type)
+    schema = _value(field.type)
     if field.comment:
-        found["description"] = "\n".join(field.comment)
+        schema["description"] = "\n".join(field.comment)
     if field.unit:
-        found["x-unit"] = field.unit
+        schema["x-unit"] = field.unit
     if field.default is not None:
-        found["default"] = field.default.value
-    return found
+        schema["default"] = field.default.value
+    return schema
 
 
 def _value(type_: ir.FieldType) -> Json:
@@ -137,10 +137,10 @@ def _value(type_: ir.FieldType) -> Json:
 
 
 def mcap(interface: ir.Interface, model: Model) -> str:
-    """Return a message's MCAP schema of encoding `ros2msg`: its text and those that it uses."""
+    """Return a message's MCAP schema of encoding `ros2msg`: its text and nested messages' texts."""
     used = [model.interfaces[name] for name in _used(derive.sections(interface), model)]
-    heads = [f"{MCAP_LINE}\nMSG: {one.name.package}/{one.name.name}\n" for one in used]
-    texts = [_ended(file_text(one)) for one in (interface, *used)]
+    heads = [f"{MCAP_LINE}\nMSG: {message.name.package}/{message.name.name}\n" for message in used]
+    texts = [_ended(file_text(part)) for part in (interface, *used)]
     return "".join(head + text for head, text in zip(("", *heads), texts, strict=True))
 
 

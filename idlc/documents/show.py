@@ -1,4 +1,4 @@
-"""The pipeline of `idlc show`: find a type, compile it, say it in another way."""
+"""The pipeline of `idlc show`: find a type, compile it, print it in another format."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from idlc.check.compiler import stage
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
-from idlc.documents.query import wanted_models
+from idlc.documents.query import requested_models
 from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
 from idlc.model.ir import spell, spell_value
@@ -17,7 +17,7 @@ from idlc.project.settings import Scope
 
 INDENT = "    "
 GAP = 2
-#: A column for comments further to the right than this is worse than none.
+#: Comments are not aligned further to the right than this column.
 WIDEST = 60
 
 
@@ -37,8 +37,11 @@ def outline(interface: ir.Interface, model: Model) -> Iterator[str]:
 
 
 def _constants(message: ir.Message) -> Iterator[tuple[str, tuple[str, ...]]]:
-    for one in message.constants:
-        yield f"{spell(one.type)} {one.name}={spell_value(one.value)}", one.comment
+    for constant in message.constants:
+        yield (
+            f"{spell(constant.type)} {constant.name}={spell_value(constant.value)}",
+            constant.comment,
+        )
 
 
 def _fields(message: ir.Message, model: Model, depth: int) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -60,7 +63,7 @@ def _fields(message: ir.Message, model: Model, depth: int) -> Iterator[tuple[str
 
 
 def _commented(code: str, comment: tuple[str, ...], column: int) -> Iterator[str]:
-    """Yield a line of code with its comment after it, the rest of that below."""
+    """Yield a line of code with its comment after it, later comment lines below."""
     if not comment:
         yield code
         return
@@ -69,18 +72,18 @@ def _commented(code: str, comment: tuple[str, ...], column: int) -> Iterator[str
     yield from (f"{' ' * column}# {line}".rstrip() for line in rest)
 
 
-def show(wanted: str, style: str, scope: Scope, report: Report) -> list[str]:
-    """Return the interfaces that a type name or path means, each as text in a format."""
+def show(target: str, style: str, scope: Scope, report: Report) -> list[str]:
+    """Return the interfaces of a type name or path, each as text in a format."""
     texts = []
     wholes: list[ir.TypeName] = []
-    for model, names in list(wanted_models((wanted,), scope, report)):
+    for model, names in list(requested_models((target,), scope, report)):
         for own in model.own:
             wholes.append(own.name)
             if str(own.name) in names:
                 with stage("show", str(own.name)):
                     texts.append(shown(own, model, style))
     if not texts and not report.had_errors:
-        message = f"`{wanted}` is a part of a service or action"
+        message = f"`{target}` is a part of a service or action"
         hint = f"`idlc show {wholes[0]}` shows the whole" if wholes else None
         report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
     return texts

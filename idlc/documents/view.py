@@ -1,6 +1,6 @@
-"""What the pages' templates are given: texts and flags, in the order in which they are shown.
+"""The input of the pages' templates: texts and flags, in the order in which they are shown.
 
-Texts are as the user wrote them; the templates' environment escapes all that it places.
+Texts are as the user wrote them; the templates' environment escapes every text.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MOST = 14
 
 
 class Box(NamedTuple):
-    """An interface; `page` is where a click leads, empty for the page itself and what has none."""
+    """An interface; a click leads to `page`, empty for the page itself and without a page."""
 
     x: str
     y: str
@@ -36,7 +36,7 @@ class Box(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """A drawing; `lines` are curves as SVG describes them."""
+    """A drawing; `lines` are curves in SVG's syntax."""
 
     label: str
     width: str
@@ -80,7 +80,7 @@ def picture(
     middle = height / 2
     lines = [_line((users_.end, y), (own.start, middle)) for y, _ in _places(users_, height)]
     lines += [_line((own.end, middle), (used_.start, y)) for y, _ in _places(used_, height)]
-    others = {one: page for one, page in pages.items() if one != name}
+    others = {other: page for other, page in pages.items() if other != name}
     return Picture(
         f"what uses {name.name}, and what it uses",
         f"{(used_ if right else own).end + 1:.0f}",
@@ -115,11 +115,11 @@ def _places(column: _Column, height: float) -> Iterator[tuple[float, _Node]]:
         yield first + number * (_HEIGHT + _GAP), node
 
 
-def _line(here: tuple[float, float], there: tuple[float, float]) -> str:
-    middle = (here[0] + there[0]) / 2
+def _line(start: tuple[float, float], end: tuple[float, float]) -> str:
+    middle = (start[0] + end[0]) / 2
     return (
-        f"M{here[0]:.0f},{here[1]:.0f} C{middle:.0f},{here[1]:.0f} "
-        f"{middle:.0f},{there[1]:.0f} {there[0]:.0f},{there[1]:.0f}"
+        f"M{start[0]:.0f},{start[1]:.0f} C{middle:.0f},{start[1]:.0f} "
+        f"{middle:.0f},{end[1]:.0f} {end[0]:.0f},{end[1]:.0f}"
     )
 
 
@@ -145,12 +145,12 @@ _SECTIONS = {"srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedb
 #: The pages by interface; a link from one page to another goes up one folder.
 Pages = Mapping[ir.TypeName, str]
 
-#: Blanks that draw something: at the start of a line, or several that no punctuation explains.
+#: Whitespace of a drawing: at the start of a line, or repeated without punctuation before it.
 _DRAWING = re.compile(r"(?m)^[ \t]|[^\s.,;:!?]([ ]{2,}|\t)\S")
 
 
 class Block(NamedTuple):
-    """A paragraph, or something drawn, which `pre` shows as it stands."""
+    """A paragraph, or a drawing, which `pre` shows unchanged."""
 
     tag: str
     text: str
@@ -165,7 +165,7 @@ class Link(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A field or constant; its type is a link and what comes after it, or only the latter."""
+    """A field or constant; its type is a link and the text after it, or only a text."""
 
     anchor: str
     words: Sequence[str]
@@ -177,7 +177,7 @@ class Row(NamedTuple):
 
 
 class Table(NamedTuple):
-    """Rows, and which of the columns that may be empty are not; `units` is the heading of one."""
+    """Rows, and flags for the columns that have text; `units` is the heading of one."""
 
     rows: Sequence[Row]
     units: str
@@ -196,7 +196,7 @@ class Section(NamedTuple):
 
 
 class Home(NamedTuple):
-    """The page of a package and its version; empty what it has not."""
+    """The page of a package and its version; empty if there is none."""
 
     page: str = ""
     version: str = ""
@@ -245,19 +245,19 @@ def page(
 
 
 def words(name: str) -> list[str]:
-    """Return the pieces of a name between which it may break."""
+    """Return the pieces of a name between which a line may break."""
     return re.split(r"(?<=[_/.])|(?<=[a-z0-9])(?=[A-Z])", name)
 
 
 def prefix(interface: ir.Interface, part: ir.Message) -> str:
-    """Return what tells the anchors of a service's or action's parts from each other."""
+    """Return the prefix of a part's anchors, which differs for the parts of a service or action."""
     return part.name.name.removeprefix(interface.name.name).strip("_") + "." * (
         part.name != interface.name
     )
 
 
 def blocks(lines: Sequence[str]) -> list[Block]:
-    """Return comment lines: paragraphs, and what is indented or drawn as it stands."""
+    """Return comment lines as paragraphs, and as drawings where they are indented or aligned."""
     texts = re.split(r"\n\s*\n", "\n".join(lines).strip("\n"))
     return [Block(_tag(text), text) for text in texts if text.strip()]
 
@@ -273,17 +273,17 @@ def _link(target: ir.TypeName, text: str, pages: Pages) -> Link:
 def _section(title: str, message: ir.Message, before: str, pages: Pages) -> Section:
     constants = [
         Row(
-            before + one.name,
-            words(one.name),
+            before + constant.name,
+            words(constant.name),
             None,
-            [spell(one.type)],
+            [spell(constant.type)],
             "",
-            spell_value(one.value),
-            blocks(one.comment),
+            spell_value(constant.value),
+            blocks(constant.comment),
         )
-        for one in message.constants
+        for constant in message.constants
     ]
-    fields = [_field(one, message.name.package, before, pages) for one in message.fields]
+    fields = [_field(field, message.name.package, before, pages) for field in message.fields]
     empty = not (constants or fields)
     return Section(title, blocks(message.comment), _table(constants), _table(fields), empty)
 

@@ -95,7 +95,7 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
                 reach = model.reach(interface.name)
                 paths = {one.source.path for one in reach if one and one.source}
                 is_sound = model.is_sound(interface.name) and not paths & self._broken
-                return model.alone(interface) if is_sound else None
+                return model.restricted_to(interface) if is_sound else None
         return None
 
     def source(self, name: ir.TypeName) -> Source | None:
@@ -306,7 +306,7 @@ class Workspace:
 
     def _around(self, path: Path) -> Facts | None:
         given = self._packages[self._places[path][0]]
-        return next(iter(self._checkers.values())).around(given)
+        return next(iter(self._checkers.values())).package_facts(given)
 
     def earlier(self, against: str = "") -> Earlier:
         """Return what the packages are compared with: `against`, or what pyproject.toml says."""

@@ -1,4 +1,4 @@
-"""The pipeline of `idlc gen`: compile, render, compare with what is on disk, write."""
+"""The pipeline of `idlc gen`: compile, render, compare with the files on disk, write."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.generate.package import Generated, generated, planned, up_to_date, with_needs
-from idlc.generate.requested import borrowed, completed, targets, unread_idl, wanted
+from idlc.generate.requested import (
+    borrowed,
+    completed,
+    folder_targets,
+    requested_packages,
+    unread_idl,
+)
 from idlc.generate.target import Target
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
@@ -20,7 +26,7 @@ from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
-from idlc.project.library import resolve
+from idlc.project.library import Library, resolve
 from idlc.project.lock import load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
@@ -33,10 +39,10 @@ if TYPE_CHECKING:
 
 
 class GenOptions(NamedTuple):
-    """What `idlc gen` was asked to do: to write to `out`, into the prefix `ament`, or both.
+    """The arguments of `idlc gen`, which writes to `out`, into the prefix `ament`, or both.
 
-    `topics` are those of recordings whose types are wanted; none means all. `again` is the command
-    that writes what `check` compares, for hints.
+    Types of `topics` of recordings are written; none means all. `again` is the command for hints
+    that writes the files which `check` compares.
     """
 
     paths: tuple[str, ...]
@@ -50,51 +56,51 @@ class GenOptions(NamedTuple):
     again: str = "idlc gen"
 
 
-def with_settings(wanted: GenOptions, settings: Config) -> GenOptions:
-    """Return what was typed, with what pyproject.toml says where nothing was."""
-    return wanted._replace(
-        paths=wanted.paths or settings.paths,
-        out=wanted.out or ("" if wanted.ament else settings.out or ""),
-        vendor_deps=wanted.vendor_deps or settings.vendor_deps,
+def with_settings(options: GenOptions, settings: Config) -> GenOptions:
+    """Return options, with defaults from pyproject.toml."""
+    return options._replace(
+        paths=options.paths or settings.paths,
+        out=options.out or ("" if options.ament else settings.out or ""),
+        vendor_deps=options.vendor_deps or settings.vendor_deps,
     )
 
 
-def in_package(wanted: GenOptions) -> GenOptions:
-    """Return options with what the package around implies where nothing was said.
+def in_package(options: GenOptions) -> GenOptions:
+    """Return options with defaults from the package of the working folder.
 
     A package that setup.py builds is compiled into the folder from which setup.py installs it.
     """
-    if wanted.ament or (wanted.out and wanted.paths) or len(wanted.paths) > 1:
-        return wanted
-    root = wanted.scope.root
-    given = root.absolute(next(iter(wanted.paths), "."))
-    path = root.manifest(given)
-    if path is None or (wanted.paths and path.parent != given):
-        return wanted
+    if options.ament or (options.out and options.paths) or len(options.paths) > 1:
+        return options
+    root = options.scope.root
+    folder = root.absolute(next(iter(options.paths), "."))
+    path = root.manifest(folder)
+    if path is None or (options.paths and path.parent != folder):
+        return options
     name = declared_name(path, root, Report())
     if not name or not is_file(path.parent / "setup.py"):
-        return wanted
-    return wanted._replace(
-        paths=wanted.paths or (root.shown(path.parent),),
-        out=wanted.out or root.shown(home_of(path.parent, wanted.scope.package or name, root)),
+        return options
+    return options._replace(
+        paths=options.paths or (root.shown(path.parent),),
+        out=options.out or root.shown(home_of(path.parent, options.scope.package or name, root)),
     )
 
 
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
     runs = [options._replace(ament="")] if options.out else []
-    runs += [options] if options.ament else []  # OUT may give the package its name
+    runs += [options] if options.ament else []  # the package may be named by OUT
     done: list[Generated] = []
     for run in runs:
         if not report.had_errors:
-            root = options.scope.root.on_disk()  # a run sees what the one before it wrote
+            root = options.scope.root.on_disk()  # a run sees the output of the one before
             scope = msgspec.structs.replace(options.scope, root=root)
-            done += _written(run._replace(scope=scope), report)
+            done += _run_once(run._replace(scope=scope), report)
     report.notes[:] = dict.fromkeys(report.notes)
     return () if report.had_errors else tuple(done)
 
 
-def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
+def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     root = options.scope.root
     recordings, others = divided(options.paths, root)
     paths = [word for word in others if not is_name(word, root)]
@@ -110,52 +116,56 @@ def _written(options: GenOptions, report: Report) -> tuple[Generated, ...]:
         named += recorded
     if report.had_errors:
         return ()
-    given = wanted(paths, named, options.out, options.scope, report)
-    whole = {one.package for one in given if one.is_whole(root) or options.ament}.union(words)
-    _note_idl((one for one in given if one.package in whole), options.scope, report)
-    found = _targets(given, options, report) if given else ()
-    if not found:
+    packages = requested_packages(paths, named, options.out, options.scope, report)
+    whole = [
+        each for each in packages if each.is_whole(root) or options.ament or each.package in words
+    ]
+    _note_idl(whole, options.scope, report)
+    folders = _targets(packages, options, report) if packages else ()
+    if not folders:
         return ()
-    with found[0].alone(beside=options.vendor_deps or len(found) > 1):
-        done = _made(dict(zip(found, given, strict=True)), texts, options, report)
+    with folders[0].exclusive(beside=options.vendor_deps or len(folders) > 1):
+        done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
-            from idlc.generate.prefix import enter
+            from idlc.generate.prefix import write_setup_scripts
 
-            enter(found[0])
+            write_setup_scripts(folders[0])
         return done
 
 
-def _note_idl(given: Iterable[inputs.Inputs], scope: Scope, report: Report) -> None:
-    for one in given:
-        if names := unread_idl(one.folders, scope.exclude):
+def _note_idl(packages: Iterable[inputs.Inputs], scope: Scope, report: Report) -> None:
+    for package in packages:
+        if names := unread_idl(package.folders, scope.exclude):
             files = first_few((f"`{name}`" for name in names), 3)
             report.notes.append(
-                f"idlc does not compile .idl files, so `{one.package}` lacks what these define: "
-                f"{files}"
+                f"idlc does not compile .idl files, so `{package.package}` lacks what these "
+                f"define: {files}"
             )
 
 
 def _targets(
-    given: Sequence[inputs.Inputs], options: GenOptions, report: Report
+    packages: Sequence[inputs.Inputs], options: GenOptions, report: Report
 ) -> tuple[Target, ...]:
     """Return the folder that each package is written to."""
     if not options.ament:
-        return targets(given, options.out, options.scope.root, report, force=options.force)
+        return folder_targets(
+            packages, options.out, options.scope.root, report, force=options.force
+        )
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
     prefix = options.ament.rstrip("/") or "/"
     homes = (
-        (one.package, one.home if not one.borrowed else next(iter(one.folders), None))
-        for one in given
+        (each.package, next(iter(each.folders), None) if each.borrowed else each.home)
+        for each in packages
     )
-    distros = [one.name for one in options.scope.distros]
-    found = [
+    distros = [distro.name for distro in options.scope.distros]
+    overlays = [
         Overlay(
             prefix, name, home, options.scope.root, report, force=options.force, distros=distros
         )
         for name, home in homes
     ]
-    return tuple(found) if found[0].usable() else ()
+    return tuple(overlays) if overlays[0].usable() else ()
 
 
 def is_name(word: str, root: Root) -> bool:
@@ -167,62 +177,62 @@ def is_name(word: str, root: Root) -> bool:
 def named_packages(
     words: Sequence[str], scope: Scope, report: Report, *, whole: bool
 ) -> list[inputs.Inputs]:
-    """Return the packages that names mean, with those of their interfaces that are meant.
+    """Return the packages that names resolve to, with the interfaces that they resolve to.
 
-    They are `whole` in a prefix, where they hide those of the same name in others.
+    Packages are `whole` in a prefix, where they hide packages of the same name in others.
     """
     chosen: dict[str, set[ir.TypeName]] = {}
-    found = []
+    libraries: dict[str, Library] = {}
     for word in words:
-        library, meant = resolve(word, scope, report)
-        for one in meant:
-            package = one.interface.package
-            names = library.interfaces(package) if whole else (one.interface,)
+        library, definitions = resolve(word, scope, report)
+        for definition in definitions:
+            package = definition.interface.package
+            names = library.interfaces(package) if whole else (definition.interface,)
             chosen.setdefault(package, set()).update(names)
-        found += [(library, package) for package in {one.interface.package for one in meant}]
-    libraries = {package: library for library, package in found}
+        libraries[package] = library
     return [borrowed(types, libraries[package]) for package, types in sorted(chosen.items())]
 
 
-def _made(
-    wanted: Mapping[Target, inputs.Inputs],
+def _compile_and_write(
+    requested: Mapping[Target, inputs.Inputs],
     texts: Mapping[ir.TypeName, Source],
     options: GenOptions,
     report: Report,
 ) -> tuple[Generated, ...]:
-    library = library_for(tuple(wanted.values()), options.scope, report, texts)
-    if not (options.check or report.had_errors or _may_be_refused(wanted.values(), library.distro)):
+    library = library_for(tuple(requested.values()), options.scope, report, texts)
+    refusable = _may_be_refused(requested.values(), library.distro)
+    if not (options.check or report.had_errors or refusable):
         current = [
-            up_to_date(target, given.digests, library, options.vendor_deps)
-            for target, given in wanted.items()
+            up_to_date(target, package.digests, library, options.vendor_deps)
+            for target, package in requested.items()
         ]
         if all(current):
-            done = [one for each in current for one in each]
-            return with_needs(done, wanted, library.distro, report, options.again)
+            done = [package for packages in current for package in packages]
+            return with_needs(done, requested, library.distro, report, options.again)
     compiler = Compiler(library)
-    models = [model for _, model in compiler.all(wanted.values(), report)]
+    models = [model for _, model in compiler.all(requested.values(), report)]
     needed = {name for model in models for name in model.interfaces}
-    if not report.had_errors and (more := completed(wanted.values(), needed, library)):
-        return _made(dict(zip(wanted, more, strict=True)), texts, options, report)
+    if not report.had_errors and (more := completed(requested.values(), needed, library)):
+        return _compile_and_write(dict(zip(requested, more, strict=True)), texts, options, report)
     packages = []
     if not report.had_errors:
         packages = planned(
-            models, wanted, compiler, check=options.check, vendor_deps=options.vendor_deps
+            models, requested, compiler, check=options.check, vendor_deps=options.vendor_deps
         )
     if options.check:
-        for one in packages:
-            one.target.drift(one.plan, one.lock, options.again)
-    elif not all(one.target.apply(one.plan, one.lock) for one in packages):
+        for package in packages:
+            package.target.drift(package.plan, package.lock, options.again)
+    elif not all(package.target.apply(package.plan, package.lock) for package in packages):
         return ()
-    targets = wanted if packages else ()
+    targets = requested if packages else ()
     return with_needs(map(generated, packages), targets, library.distro, report, options.again)
 
 
-def _may_be_refused(given: Iterable[inputs.Inputs], distro: Distro) -> bool:
-    """Return whether files that one distribution accepted may be an error for this one."""
+def _may_be_refused(packages: Iterable[inputs.Inputs], distro: Distro) -> bool:
+    """Return whether files that another distribution accepts may have errors for this one."""
     if distro.reads_optional:
         return False
-    return any(OPTIONAL.encode() in file.data for one in given for file in one.files)
+    return any(OPTIONAL.encode() in file.data for package in packages for file in package.files)
 
 
 class Run(NamedTuple):
@@ -232,23 +242,23 @@ class Run(NamedTuple):
     options: GenOptions
 
     def lock(self, package: str) -> lock.Lock | None:
-        """Return what the last run recorded of a package; `None` if there was none."""
+        """Return the lock of a package from the last run; `None` if there was none."""
         out = self.folder / self.options.out
-        found = (load_lock(one, "", Report()) for one in (out / package, out))
-        return next((one for one in found if one and one.package == package), None)
+        locks = (load_lock(folder, "", Report()) for folder in (out / package, out))
+        return next((lock for lock in locks if lock and lock.package == package), None)
 
     def is_needed(self, package: str, inputs: Mapping[str, str], key: str) -> bool:
-        """Return whether a package was made of other texts than these, or by another idlc.
+        """Return whether a package was generated from other texts, or by another idlc.
 
         `inputs` are the digests of all files of the package, `key` is one that it must have.
         """
         lock = self.lock(package)
         if lock is None or lock.idlc != __version__ or key not in lock.inputs:
             return True
-        return any(inputs.get(name) != one for name, one in lock.inputs.items())
+        return any(inputs.get(name) != digest for name, digest in lock.inputs.items())
 
     def make(self, report: Report) -> tuple[Generated, ...]:
-        """Write, and return what was done; empty after an error. Raises OSError."""
+        """Write, and return the packages; empty after an error. Raises OSError."""
         root = Root.at(self.folder)
         paths = tuple(
             root.path(word) if is_recording(word, root) else word for word in self.options.paths
@@ -260,12 +270,12 @@ class Run(NamedTuple):
 def run_for(path: Path, package: str) -> Run | None:
     """Return the run that compiles a file of a package.
 
-    It is that of the nearest settings which say what is written where, or the one that made a
-    generated package in the source package, or beside its interfaces.
+    The nearest settings with paths and an output decide, or else the lock of a generated package
+    in the source package, or beside its interfaces.
     """
     for folder in path.parents:
-        if is_file(folder / settings.SETTINGS_FILE) and (found := _by_settings(folder, path)):
-            return found
+        if is_file(folder / settings.SETTINGS_FILE) and (run := _by_settings(folder, path)):
+            return run
     return _by_lock(path, package)
 
 
@@ -273,9 +283,9 @@ def _by_settings(folder: Path, path: Path) -> Run | None:
     report = Report()
     root = Root.at(folder)
     settings = load_settings(root, report)
-    wanted = with_settings(GenOptions((), scope(settings)), settings)
-    covered = any(path.is_relative_to(root.absolute(one)) for one in wanted.paths)
-    return Run(folder, wanted) if wanted.out and covered and not report.had_errors else None
+    options = with_settings(GenOptions((), scope(settings)), settings)
+    covered = any(path.is_relative_to(root.absolute(each)) for each in options.paths)
+    return Run(folder, options) if options.out and covered and not report.had_errors else None
 
 
 def _by_lock(path: Path, package: str) -> Run | None:
@@ -283,7 +293,7 @@ def _by_lock(path: Path, package: str) -> Run | None:
     for out in (home / package, home):
         lock = load_lock(out, "", Report())
         if lock is not None and lock.package == package:
-            found = scope(load_settings(Root.at(home), Report()), package)
+            settings = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), found, name, vendor_deps=lock.vendor_deps))
+            return Run(home, GenOptions((".",), settings, name, vendor_deps=lock.vendor_deps))
     return None

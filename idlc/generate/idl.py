@@ -10,14 +10,14 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import derive, ir
 from idlc.model.ir import spell
 
-#: What would end a text or begin a comment is written as an escape (language 1.5).
+#: Characters that would end a text or begin a comment are written as escapes (language 1.5).
 _SPECIAL = re.compile(r"[\x00-\x1f\x7f-\x9f\"'#\\]")
 #: In arrays escapes are interpreted once, and other characters break ROS 2's tools (language 4).
 _SPECIAL_IN_ARRAYS = re.compile(r"[^\x20-\x7e]|[\"'#\\]")
 
 
 def file_text(interface: ir.Interface) -> str:
-    """Return the text that defines an interface, as it was written if it was."""
+    """Return the text that defines an interface: its file's, or one generated from IDL."""
     source = interface.source
     if source is None:
         return ""
@@ -49,7 +49,7 @@ def _comment(lines: tuple[str, ...]) -> Iterator[str]:
 def _value(value: ir.Value) -> str:
     if not isinstance(value, tuple):
         return _scalar(value)
-    return f"[{', '.join(_element(one) for one in value)}]"
+    return f"[{', '.join(_element(element) for element in value)}]"
 
 
 def _element(value: ir.Scalar) -> str:
@@ -64,12 +64,12 @@ def _scalar(value: ir.Scalar) -> str:
     return f'"{_SPECIAL.sub(_escaped, value)}"' if isinstance(value, str) else repr(value)
 
 
-def _escaped(found: re.Match[str]) -> str:
-    return "\\" * 4 if found[0] == "\\" else _escaped_once(found)
+def _escaped(match: re.Match[str]) -> str:
+    return "\\" * 4 if match[0] == "\\" else _escaped_once(match)
 
 
-def _escaped_once(found: re.Match[str]) -> str:
-    code = ord(found[0])
+def _escaped_once(match: re.Match[str]) -> str:
+    code = ord(match[0])
     return f"\\x{code:02x}" if code < 0x100 else f"\\U{code:08x}"
 
 

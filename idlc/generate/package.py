@@ -1,4 +1,4 @@
-"""One package of `idlc gen`: rendered, compared with what is on disk, ready to be written."""
+"""One package of `idlc gen`: rendered, compared with the files on disk, ready to be written."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _key(name: ir.TypeName) -> str:
 
 
 def as_inputs(names: Iterable[ir.TypeName], library: Library) -> dict[str, str]:
-    """Return the digests of a library's interfaces as those of input files are recorded."""
+    """Return the digests of a library's interfaces, keyed like input files in a lock."""
     digests = dependencies(names, library)
     return {_key(name): digests[str(name)] for name in names}
 
@@ -51,9 +51,9 @@ def package_of(
     check: bool,
     vendored: Sequence[str] | None = None,
 ) -> Package | None:
-    """Return a sound model rendered and compared with what is on disk.
+    """Return a sound model rendered and compared with the files on disk.
 
-    `vendored` are the packages that are written because of it, where that was asked for.
+    `vendored` are the packages that are written because of it, with --vendor-deps.
     """
     from idlc.generate.python.render import render_package
     from idlc.project import templates
@@ -96,7 +96,7 @@ def package_of(
 def _with_surroundings(
     model: Model, modules: Mapping[str, str], target: Target
 ) -> dict[str, str | bytes]:
-    """Return the files to write: modules, and in a prefix all that ROS 2 looks for there."""
+    """Return the files to write: modules, and in a prefix the files that ROS 2 reads there."""
     if not target.modules:  # a package folder
         return {**modules}
     from idlc.generate.prefix import overlaid
@@ -105,10 +105,10 @@ def _with_surroundings(
 
 
 def _check_syntax(plan: Plan, target: Target) -> None:
-    """Fail on rendered code that Python cannot read, which would be idlc's own fault.
+    """Fail on rendered code that Python cannot parse, which would be a bug of idlc.
 
-    Only text from an interface file can have that effect, and text that could has a backslash in
-    front of it; modules without one are like those that the tests read.
+    Only text from an interface file can cause that, and such text is escaped by a backslash;
+    modules without one are like those that the tests parse.
     """
     for change in plan.changes:
         rendered = change.path.endswith(".py") and "/_idlc/" not in f"/{change.path}"
@@ -126,21 +126,22 @@ def _imports(model: Model) -> tuple[str, ...]:
 
 def planned(
     models: Sequence[Model],
-    wanted: Mapping[Target, inputs.Inputs],
+    requested: Mapping[Target, inputs.Inputs],
     compiler: Compiler,
     *,
     check: bool,
     vendor_deps: bool,
 ) -> list[Package]:
-    """Return sound models, and what they vendor, ready to be written; empty if any must not be."""
+    """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     vendor = _Vendor({model.package for model in models}, compiler, check=check)
-    found: list[Package | None] = []
-    for model, (target, given) in zip(models, wanted.items(), strict=True):
+    packages: list[Package | None] = []
+    for model, (target, package) in zip(models, requested.items(), strict=True):
         names = vendor.add(model, target) if vendor_deps else None
         library = compiler.library
-        found.append(package_of(model, target, given.digests, library, check=check, vendored=names))
-    found += [vendor.packages[name] for name in sorted(vendor.packages)]
-    return [] if None in found else [one for one in found if one]
+        digests = package.digests
+        packages.append(package_of(model, target, digests, library, check=check, vendored=names))
+    packages += [vendor.packages[name] for name in sorted(vendor.packages)]
+    return [] if None in packages else [package for package in packages if package]
 
 
 class _Vendor:
@@ -155,7 +156,7 @@ class _Vendor:
         self.packages: dict[str, Package | None] = {}
 
     def add(self, model: Model, target: Target) -> list[str]:
-        """Add what a model depends on, and return the names."""
+        """Add the packages that a model depends on, and return their names."""
         names: set[str] = set()
         waiting = _needed(model) - self._own
         while waiting:
@@ -171,7 +172,7 @@ class _Vendor:
         names = library.interfaces(package)
         sources = [(name, source) for name in names if (source := library.source(name))]
         whole = self._compiler.model(package, self._compiler.add(sources, report), report)
-        target.report.extend(one for one in report if one.severity is Severity.ERROR)
+        target.report.extend(each for each in report if each.severity is Severity.ERROR)
         self._needed[package] = _needed(whole)
         if not accept_name(package, "what is depended on", target.report) or report.had_errors:
             return None
@@ -186,10 +187,10 @@ def _needed(model: Model) -> set[str]:
 
 
 class Generated(NamedTuple):
-    """What a run of `idlc gen` did to one package.
+    """The outcome of `idlc gen` for one package.
 
-    `files` counts all that it consists of; `needs` are packages that it imports
-    and that are not here.
+    `files` is the number of all its files; `needs` are packages that it imports
+    and that are not installed.
     """
 
     package: str
@@ -201,31 +202,31 @@ class Generated(NamedTuple):
     needs: tuple[str, ...] = ()
 
 
-def generated(one: Package) -> Generated:
-    """Return what is done to a package that is ready to be written."""
-    removed = sum(change.new is None for change in one.plan.changes)
-    written = len(one.plan.changes) - removed
-    target = one.target
-    files = len(one.plan.outputs)
-    return Generated(target.package, target.name, len(one.lock.inputs), files, written, removed)
+def generated(package: Package) -> Generated:
+    """Return the outcome for a package that is ready to be written."""
+    removed = sum(change.new is None for change in package.plan.changes)
+    written = len(package.plan.changes) - removed
+    target = package.target
+    files = len(package.plan.outputs)
+    return Generated(target.package, target.name, len(package.lock.inputs), files, written, removed)
 
 
 def up_to_date(
     target: Target, digests: dict[str, str], library: Library, vendor_deps: bool
 ) -> tuple[Generated, ...]:
-    """Return what there is if a run would change nothing; empty otherwise."""
+    """Return the packages if a run would change nothing; empty otherwise."""
     if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
         return ()
-    found = [target]
+    folders = [target]
     for package in target.lock.vendored:
-        found.append(target.beside(package))
+        folders.append(target.beside(package))
         names = library.interfaces(package)
-        if not found[-1].unchanged(as_inputs(names, library), library):
+        if not folders[-1].unchanged(as_inputs(names, library), library):
             return ()
     return tuple(
-        Generated(one.package, one.name, len(one.lock.inputs), len(one.lock.outputs))
-        for one in found
-        if one.lock
+        Generated(folder.package, folder.name, len(folder.lock.inputs), len(folder.lock.outputs))
+        for folder in folders
+        if folder.lock
     )
 
 
@@ -234,7 +235,7 @@ def with_needs(
 ) -> tuple[Generated, ...]:
     """Report IDL617 for generated packages that need others that cannot be imported here.
 
-    Where they are not imported anyway, that is only noted in what is returned.
+    Where nodes do not run, these are only in `needs` of the result.
     """
     quiet: dict[str, tuple[str, ...]] = {}
     for target in targets:
@@ -253,4 +254,4 @@ def with_needs(
                 "which writes it next to this one",
             )
         )
-    return tuple(one._replace(needs=quiet.get(one.out, ())) for one in done)
+    return tuple(package._replace(needs=quiet.get(package.out, ())) for package in done)

@@ -1,4 +1,4 @@
-"""A prefix that ROS 2 and its tools look into, with several packages and files of others in it."""
+"""A prefix that ROS 2 and its tools read, with several packages and files of others in it."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 class Libraries(NamedTuple):
     """The libraries of a package by their paths in a prefix, such as `lib/libNAME.so`.
 
-    `missing` says why there are none although the package has interfaces. Such a package must not
-    be registered in the index of ROS 2: recorders stop at it. `build_tag` is what a wheel of the
-    package has in its name, so that wheels for different distributions have different names.
+    `missing` says why a package with interfaces has none. Such a package must not be registered in
+    the index of ROS 2: recorders stop at it. `build_tag` is part of the name of the package's
+    wheel, so that wheels for different distributions have different names.
     """
 
     files: Mapping[str, bytes]
@@ -41,22 +41,22 @@ class Libraries(NamedTuple):
     build_tag: str = ""
 
 
-def libraries_of(model: Model, found: Distribution | None = None) -> Libraries:
-    """Return the libraries of a model without errors, by default for what is installed here.
+def libraries_of(model: Model, distro: Distribution | None = None) -> Libraries:
+    """Return the libraries of a model without errors, by default for the installed distribution.
 
-    Who writes them moves them into place: programs may have the old ones open.
+    Write them elsewhere and move them into place: programs may have the old ones open.
     """
     from idlc.generate.native.library import libraries
 
-    found = found or distribution()
-    target = target_of(found)
+    distro = distro or distribution()
+    target = target_of(distro)
     if not model.own or isinstance(target, str):
         missing = target if model.own and isinstance(target, str) else ""
         return Libraries({}, missing, build_tag(model))
     with stage("libraries", model.package):
         files = libraries(model, *target)
     placed = {f"lib/{name}": content for name, content in files.items()}
-    return Libraries(placed, build_tag=build_tag(model, found.name))
+    return Libraries(placed, build_tag=build_tag(model, distro.name))
 
 
 def build_tag(model: Model, *libraries: str) -> str:
@@ -65,17 +65,17 @@ def build_tag(model: Model, *libraries: str) -> str:
     return "" if list(names) == [DEFAULT] else f"1{'_'.join(names)}"
 
 
-def target_of(found: Distribution) -> tuple[Machine, Layout] | str:
-    """Return for which processor and layout libraries are made here, or why none can be."""
+def target_of(distro: Distribution) -> tuple[Machine, Layout] | str:
+    """Return the processor and layout of libraries on this machine, or why there are none."""
     from idlc.generate.native.layouts import LAYOUTS
     from idlc.generate.native.library import MACHINES
 
     machine = MACHINES.get(prefixes.machine())
-    layout = LAYOUTS.get(found.name)
+    layout = LAYOUTS.get(distro.name)
     if machine is None:
         return f"idlc makes libraries for Linux on {' and '.join(MACHINES)}, and this is neither"
     if layout is None:
-        return f"idlc does not know this distribution of ROS 2 ({found.why})"
+        return f"idlc does not know this distribution of ROS 2 ({distro.why})"
     return machine, layout
 
 
@@ -88,48 +88,48 @@ def shared(
 ) -> dict[str, bytes]:
     """Return libraries, package.xml, interfaces and entries in the index, in the order to write.
 
-    What leads to others comes after these. Without libraries the package is registered neither as
-    a package nor as one with interfaces: recorders stop at the one, `ros2 interface list` at the
-    other alone.
+    Files come after those that they refer to. Without libraries the package is registered neither
+    as a package nor as one with interfaces: recorders stop at the first, `ros2 interface list` at
+    the second without the first.
     """
     name = model.package
-    found: dict[str, str | bytes] = {**libraries.files}
+    files: dict[str, str | bytes] = {**libraries.files}
     if manifest is not None:
-        found[f"share/{name}/package.xml"] = manifest
+        files[f"share/{name}/package.xml"] = manifest
     interfaces = {}
     for own in model.own:
         key = f"{own.name.kind}/{own.name.name}"
         interfaces[f"{key}.{own.name.kind}"] = file_text(own)
         interfaces[f"{key}.idl"] = idl(own)
         described = model.describer.installed(str(own.name))
-        found[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
-    found |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
-    found[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
+        files[f"share/{name}/{key}.json"] = json.dumps(described, indent=2)
+    files |= {f"share/{name}/{path}": text for path, text in interfaces.items()}
+    files[f"{INDEX}/package_run_dependencies/{name}"] = ";".join(dependencies(model))
     if libraries.missing:
         report.notes.append(
             f"`{name}` is not registered in the index of ROS 2, because recorders stop at packages "
             f"without a library: {libraries.missing}"
         )
     else:
-        found[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
-        found[f"{INDEX}/packages/{name}"] = ""
+        files[f"{INTERFACES}/{name}"] = "\n".join(sorted(interfaces))
+        files[f"{INDEX}/packages/{name}"] = ""
     return {
         path: content.encode() if isinstance(content, str) else content
-        for path, content in found.items()
+        for path, content in files.items()
     }
 
 
 def dependencies(model: Model) -> list[str]:
     """Return the packages whose interfaces a model has besides its own."""
-    return sorted({one.package for one in model.interfaces} - {model.package})
+    return sorted({name.package for name in model.interfaces} - {model.package})
 
 
-#: How the files begin by which shells learn of a prefix, and which all packages in it share.
+#: The first bytes of the setup files for shells, which all packages in a prefix share.
 MARK = b"# Written by idlc"
 
 
 class Overlay(Target):
-    """A package in a prefix. What idlc wrote of it is recorded in its share folder."""
+    """A package in a prefix. Its lock is in its share folder."""
 
     def __init__(
         self,
@@ -154,22 +154,22 @@ class Overlay(Target):
 
     @property
     def place(self) -> str:
-        """The prefix's path, which shells need where they do not know what they read."""
+        """The prefix's path, for shells that do not know the path of the file they source."""
         return self._path.as_posix()
 
     @property
     def distribution(self) -> Distribution:
-        """The distribution that libraries are for: the installed one, unless others are wanted."""
-        found = distribution((self._path, *prefixes.ament_prefixes()))
-        if not self._distros or found.name in self._distros:
-            return found
-        wanted = self._distros[0]
+        """The distribution that libraries are for: the installed one, unless others are chosen."""
+        installed = distribution((self._path, *prefixes.ament_prefixes()))
+        if not self._distros or installed.name in self._distros:
+            return installed
+        chosen = self._distros[0]
         self.report.notes.append(
-            f"`{self.name}` gets libraries for {wanted}, not for {found.name} ({found.why})"
+            f"`{self.name}` gets libraries for {chosen}, not for {installed.name} ({installed.why})"
         )
-        return Distribution(wanted, f"--distro {wanted}")
+        return Distribution(chosen, f"--distro {chosen}")
 
-    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
         del beside
         return alone(self._path)
@@ -190,9 +190,9 @@ class Overlay(Target):
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Return whether nothing is to be done: not to be told from interfaces alone.
+        """Return `False`: interfaces alone do not show whether a run would change nothing.
 
-        Libraries depend on what else is installed, too.
+        Libraries depend on the installed distribution, too.
         """
         del inputs, library, vendor_deps
         return False
@@ -200,12 +200,12 @@ class Overlay(Target):
     def cause(self, change: Change) -> str:
         """Say why a library differs, if another distribution is the reason."""
         old, new = (inspect(data or b"") for data in (change.old, change.new))
-        if old is None or new is None or old.told == new.told:
+        if old is None or new is None or old.stamp == new.stamp:
             return ""
         return "it is for another distribution of ROS 2"
 
     def share(self, files: Mapping[str, str]) -> bool:
-        """Write the files for shells, but not over those of others, which are noted."""
+        """Write the files for shells; foreign files stay, with a note."""
         tree, changes = Tree(self._path), []
         for path, text in files.items():
             old, new = tree.read(path), text.encode("utf-8")
@@ -225,7 +225,7 @@ _SHELLS = ("sh", "bash", "zsh")
 def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[str, str | bytes]:
     """Return the files of a package by their paths in the prefix.
 
-    They are in the order in which to write them: what leads to others comes after these.
+    They are in the order in which to write them: files come after those that they refer to.
     """
     assert isinstance(overlay, Overlay)
     manifest = overlay.manifest or _rendered(
@@ -236,8 +236,8 @@ def overlaid(model: Model, modules: Mapping[str, str], overlay: Target) -> dict[
     return {**placed, **shared(model, manifest, libraries, overlay.report)}
 
 
-def enter(overlay: Target) -> bool:
-    """Write the files by which a shell learns of the prefix; return whether that went well."""
+def write_setup_scripts(overlay: Target) -> bool:
+    """Write the setup files for shells; return whether that succeeded."""
     assert isinstance(overlay, Overlay)
     files = {
         f"{name}.{shell}": _rendered(f"overlay/setup.{shell}.jinja", prefix=quote(overlay.place))
@@ -247,7 +247,7 @@ def enter(overlay: Target) -> bool:
     return overlay.share(files)
 
 
-def _rendered(template: str, **given: object) -> str:
+def _rendered(template: str, **variables: object) -> str:
     from idlc.project.templates import environment
 
-    return environment().get_template(template).render(**given)
+    return environment().get_template(template).render(**variables)

@@ -1,4 +1,4 @@
-"""Which packages a run of `idlc gen` writes, and into which folders."""
+"""The packages that a run of `idlc gen` writes, and their folders."""
 
 from __future__ import annotations
 
@@ -24,31 +24,31 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 
-def wanted(
+def requested_packages(
     paths: Sequence[str],
     named: Sequence[inputs.Inputs],
     out: str,
     scope: Scope,
     report: Report,
 ) -> tuple[inputs.Inputs, ...]:
-    """Return the packages that paths mean, and those that were named; empty after a problem.
+    """Return the packages at paths, and the named ones; empty after a problem.
 
     Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
     """
     files = find(paths, scope.root, report, scope.exclude) if paths else ()
-    found = list(named)
-    for one in named:
-        accept_name(one.package, "the command line", report)
+    packages = list(named)
+    for package in named:
+        accept_name(package.package, "the command line", report)
     if files and not report.had_errors:
-        found += _from_files(files, "" if found else out, scope, report)
-    usage = [one for one in report if one.code in codes.USAGE]
-    return () if usage else inputs.without_duplicates(found, scope.root, report)
+        packages += _from_files(files, "" if packages else out, scope, report)
+    usage = [diagnostic for diagnostic in report if diagnostic.code in codes.USAGE]
+    return () if usage else inputs.without_duplicates(packages, scope.root, report)
 
 
 def _from_files(
     files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
-    """Return files by package: as one that is called like `out` if nothing says otherwise."""
+    """Return files by package: as one, by default with the name of the folder `out`."""
     root = scope.root
     homes = by_home(files, root)
     apart = [] if scope.package else several(homes, root)
@@ -56,8 +56,9 @@ def _from_files(
         return ()
     declared = next((path for home in homes if (path := root.manifest(home))), None)
     if apart or not out:
-        found = inputs.packages(files, scope, report)
-        origins = ["package.xml" if root.manifest(one.home) else "its folder" for one in found]
+        packages = inputs.packages(files, scope, report)
+        folders = (package.home for package in packages)
+        origins = ["package.xml" if root.manifest(folder) else "its folder" for folder in folders]
     else:
         name, origins = scope.package, ["--package"]
         if name is None and declared:
@@ -72,8 +73,8 @@ def _from_files(
                         hint=f"choose another folder; add `--package {name}` if they are its files",
                     )
                 )
-            _tell(name, min(homes), out, root, report)
-        found = (inputs.load(name, files, min(homes), root, report),)
+            _note_name(name, min(homes), out, root, report)
+        packages = (inputs.load(name, files, min(homes), root, report),)
     if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
@@ -82,12 +83,12 @@ def _from_files(
                 hint="choose another folder with -o",
             )
         )
-    for one, origin in zip(found, origins, strict=True):
-        accept_name(one.package, origin, report)
-    return found
+    for package, origin in zip(packages, origins, strict=True):
+        accept_name(package.package, origin, report)
+    return packages
 
 
-def _tell(name: str, home: Path, out: str, root: Root, report: Report) -> None:
+def _note_name(name: str, home: Path, out: str, root: Root, report: Report) -> None:
     """Note a name that other commands cannot know."""
     if name != home.name and root.absolute(out).parent not in places(home, root):
         report.notes.append(
@@ -97,7 +98,7 @@ def _tell(name: str, home: Path, out: str, root: Root, report: Report) -> None:
 
 
 def _mixed(homes: Sequence[Path], root: Root, report: Report) -> bool:
-    """Report folders of interfaces within each other that no package.xml tells apart."""
+    """Report nested folders of interfaces without a package.xml."""
     loose = [home for home in homes if not root.manifest(home)]
     if not any(set(home.parents) & set(homes) for home in loose):
         return False
@@ -125,24 +126,24 @@ def borrowed(types: Iterable[ir.TypeName], library: Library) -> inputs.Inputs:
 
 
 def completed(
-    given: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
+    packages: Collection[inputs.Inputs], needed: AbstractSet[ir.TypeName], library: Library
 ) -> list[inputs.Inputs]:
-    """Return packages with the interfaces that others need of those given in part; empty for none.
+    """Return packages with the needed interfaces that partial packages lack; empty for none.
 
-    What is written beside the others is what they import.
+    Packages import the ones that are written beside them.
     """
-    found = []
-    for one in given:
-        missing = {name for name in needed if name.package == one.package} - one.names
-        more = (_borrowed(name, str(name), library) for name in missing if one.borrowed)
-        files = sorted((*one.files, *more), key=lambda each: each.file.key)
-        found.append(msgspec.structs.replace(one, files=tuple(files)))
-    return [] if found == [*given] else found
+    extended = []
+    for package in packages:
+        missing = {name for name in needed if name.package == package.package} - package.names
+        more = (_borrowed(name, str(name), library) for name in missing if package.borrowed)
+        files = sorted((*package.files, *more), key=lambda each: each.file.key)
+        extended.append(msgspec.structs.replace(package, files=tuple(files)))
+    return [] if extended == [*packages] else extended
 
 
 def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
-    """Return the .idl files of a package that no .msg, .srv or .action file is beside, sorted."""
-    found = []
+    """Return the .idl files of a package without a .msg, .srv or .action file beside, sorted."""
+    unread = []
     for folder in folders:
         for kind in KINDS:
             inside = folder / kind[1:]
@@ -152,8 +153,9 @@ def unread_idl(folders: Iterable[Path], exclude: Exclusions) -> list[str]:
                 continue
             own = (name for name in names if name.endswith(".idl"))
             alone = (name for name in own if f"{name.removesuffix('.idl')}{kind}" not in names)
-            found += [f"{kind[1:]}/{name}" for name in alone if not exclude.has(str(inside / name))]
-    return sorted(found)
+            included = (name for name in alone if not exclude.has(str(inside / name)))
+            unread += [f"{kind[1:]}/{name}" for name in included]
+    return sorted(unread)
 
 
 def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
@@ -163,25 +165,26 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
     return inputs.Input(file, source.text.encode())
 
 
-def targets(
-    given: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
+def folder_targets(
+    packages: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
-    Reports IDL608 where a package of an earlier run is in the way, IDL612 for what is no folder.
+    Reports IDL608 where a package of an earlier run is in the way, IDL612 for other files.
     """
     top = root.absolute(out)
-    if len(given) == 1:
-        package = given[0].package
+    if len(packages) == 1:
+        package = packages[0].package
         beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
         folder = f"{out}/{package}" if beside_others else out
-        found = [Target(folder, package, root, report, force=force)]
+        targets = [Target(folder, package, root, report, force=force)]
     elif is_file(top / FILE):
-        message = f"`{out}` holds one package, and these are {len(given)}"
+        message = f"`{out}` holds one package, and these are {len(packages)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
         report.add(codes.SEVERAL_PACKAGES.of(out, message, hint=hint))
         return ()
     else:
         base = out.rstrip("/") or out
-        found = [Target(f"{base}/{g.package}", g.package, root, report, force=force) for g in given]
-    return tuple(found) if all(one.usable() for one in found) else ()
+        names = [each.package for each in packages]
+        targets = [Target(f"{base}/{name}", name, root, report, force=force) for name in names]
+    return tuple(targets) if all(target.usable() for target in targets) else ()

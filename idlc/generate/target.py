@@ -21,9 +21,10 @@ from idlc.project.write import Change, Plan, plan
 from idlc.version import __version__
 
 _PACKAGE = Path(__file__).parents[1]
-#: What makes the output, beside what is given: a change here counts although the version stays.
+#: The sources of idlc that affect the output: a change counts although the version stays.
+_ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
 _MAKERS = (
-    *(_PACKAGE / part for part in ("diagnostics", "syntax", "model", "checks", "emit", "runtime")),
+    *(_PACKAGE / room for room in _ROOMS),
     _PACKAGE / "templates",
     _PACKAGE.parent / "templates",
 )
@@ -41,7 +42,7 @@ def unchanged(
     *,
     vendor_deps: bool = False,
 ) -> bool:
-    """Return whether the package in `out` is what a run would write.
+    """Return whether a run would leave the package in `out` unchanged.
 
     `inputs` are the digests of the input files by name within the package.
     """
@@ -52,7 +53,7 @@ def unchanged(
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
         and not _idlc_is_newer(out / FILE)
-        and all(_dependency(name, library) == one for name, one in lock.dependencies.items())
+        and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
     )
 
 
@@ -101,7 +102,7 @@ def _newest_maker() -> int:
 
 
 def last_change(folders: Iterable[Path]) -> int:
-    """Return when a file in these folders, or in those in them, was changed last."""
+    """Return the time of the last change of a file in these folders or below."""
     return max(map(_newest, filter(is_folder, folders)))
 
 
@@ -116,11 +117,11 @@ def _newest(folder: str | Path) -> int:
 
 
 class Target:
-    """A package folder, existing or not; `name` is how messages call it."""
+    """A package folder, existing or not; `name` is its name in reports."""
 
-    #: Where the lock is, below the folder; empty, or with a slash at its end.
+    #: The folder of the lock, below the package folder; empty, or with a slash at its end.
     home = ""
-    #: Where the package's modules are, in the same words.
+    #: The folder of the package's modules, in the same form.
     modules = ""
 
     def __init__(
@@ -133,7 +134,7 @@ class Target:
         self.report = report
         self._force = force
 
-    def alone(self, *, beside: bool = False) -> AbstractContextManager[None]:
+    def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
         return alone(self._path.parent if beside else self._path)
 
@@ -144,7 +145,7 @@ class Target:
 
     @cached_property
     def lock(self) -> Lock | None:
-        """What the last run recorded here; reports IDL615 unless everything is to be replaced."""
+        """The lock of the last run; reports IDL615 unless everything is to be replaced."""
         report = Report() if self._force else self.report
         return load_lock(self._path / self.home, f"{self.name}/{self.home}".rstrip("/"), report)
 
@@ -162,13 +163,13 @@ class Target:
     def unchanged(
         self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
     ) -> bool:
-        """Return whether what is here is what compiling the inputs would write."""
-        found = unchanged(
+        """Return whether compiling the inputs would change nothing."""
+        is_unchanged = unchanged(
             self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
         )
-        if found:
+        if is_unchanged:
             write.sweep(self._path)
-        return found
+        return is_unchanged
 
     def missing(self) -> list[str]:
         """Return the packages that the generated code needs and this Python cannot import."""
@@ -194,7 +195,7 @@ class Target:
     def plan(self, files: Mapping[str, str | bytes], *, check: bool = False) -> Plan | None:
         """Return the changes that make the folder hold `files`; `None` if it must not.
 
-        With `check` the changes are only to be looked at, and edited files are among them.
+        With `check` the changes are only compared, and edited files are among them.
         """
         content = {
             path: text.encode("utf-8") if isinstance(text, str) else text
@@ -205,7 +206,7 @@ class Target:
         return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
 
     def apply(self, changes: Plan, record: Lock) -> bool:
-        """Make planned changes and write the lock; reports IDL612 and returns `False` else."""
+        """Make planned changes and write the lock; report IDL612 and return `False` otherwise."""
         self.lock = record
         return write.apply(changes, encode(record), self.name, self.report)
 
@@ -245,26 +246,26 @@ class Target:
         return codes.DRIFT.of(path, message, hint=hint)
 
     def cause(self, change: Change) -> str:
-        """Say why a file is out of date; empty where only the locks can tell."""
+        """Return why a file is out of date; empty where only locks show it."""
         del change
         return ""
 
 
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
-    """Say what differs between the last run and one now; empty if nothing does."""
+    """Return the differences between the last run and one now; empty without any."""
     pairs = [(old.inputs, new.inputs)]
     if dependencies:
         pairs.append((old.dependencies, new.dependencies))
-    found = []
+    reasons = []
     if old.idlc != new.idlc:
-        found.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
+        reasons.append(f"it was written by idlc {old.idlc}, this is {new.idlc}")
     if old.converts_values != new.converts_values:
-        found.append("it was written for another distribution of ROS 2")
+        reasons.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
-        found.append(f"the package was called `{old.package}`")
+        reasons.append(f"the package was called `{old.package}`")
     for before, after in pairs:
-        found += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
-        found += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
+        reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
+        reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]
         common = sorted(before.keys() & after.keys())
-        found += [f"`{name}` changed" for name in common if before[name] != after[name]]
-    return first_few(found, 3)
+        reasons += [f"`{name}` changed" for name in common if before[name] != after[name]]
+    return first_few(reasons, 3)

@@ -1,1 +1,1 @@
-"""The syntax of interface files, and of the IDL that ROS 2 makes of them."""
+"""The syntax of interface files, and of the IDL that ROS 2 makes from them."""

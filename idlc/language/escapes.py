@@ -1,9 +1,9 @@
-r"""What happens to text on its way through ROS 2's pipeline (language 1.5).
+r"""The changes that ROS 2's pipeline makes to text (language 1.5).
 
 rosidl writes each comment line, unit, string constant and string default into an .idl file and
 reads it back. On the way escapes are interpreted twice or three times, and some text breaks the
-build. `through_idl` does the same to text that idlc keeps, so that the verdict and the value
-are those of a robot on the other side.
+build. `through_idl` does the same to text that idlc keeps, so that idlc accepts the same text
+and arrives at the same value as rosidl.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SIMPLE = {"a": "\a", "b": "\b", "f": "\f", "n": "\n", "r": "\r", "t": "\t", "v"
 
 
 class EscapeError(ValueError):
-    """Text that breaks ROS 2's pipeline: why, and the guilty characters in the text."""
+    """Text that breaks ROS 2's pipeline: the reason, and the range of the characters at fault."""
 
     def __init__(self, message: str, start: int, end: int) -> None:
         super().__init__(message)
@@ -33,7 +33,7 @@ class EscapeError(ValueError):
 
 
 def through_idl(text: str) -> str:
-    """Return what rosidl's parser sees of `text` after rosidl's adapter wrote it.
+    """Return `text` as rosidl's parser reads it after rosidl's adapter wrote it.
 
     Raises EscapeError for text that the pipeline refuses. Source: language 1.5, steps B to F.
     """
@@ -45,9 +45,9 @@ def through_idl(text: str) -> str:
 
 
 def read_back(literal: str, text: str) -> str:
-    """Return what rosidl's parser makes of the inside of a string literal (steps D to F).
+    """Return the inside of a string literal as rosidl's parser reads it (steps D to F).
 
-    `text` is what the user wrote, for the error's place.
+    `text` is the user's own, for the location of an error.
     """
     if "\n" in literal or "\r" in literal:
         place = _place(text, r"\\[nr]|\\0?1[25]|\\x0[ad]")
@@ -66,7 +66,7 @@ def read_back(literal: str, text: str) -> str:
 
 
 def inside_literal(literal: str) -> str:
-    """Return what rosidl's parser makes of the inside of a literal in an .idl file (step F).
+    """Return the inside of a literal in an .idl file as rosidl's parser reads it (step F).
 
     Raises ValueError for an incomplete escape.
     """
@@ -74,7 +74,7 @@ def inside_literal(literal: str) -> str:
 
 
 def plain_meaning(text: str) -> str:
-    """Return what a reader would take `text` to mean: each escape interpreted once."""
+    """Return `text` as a reader would understand it: each escape interpreted once."""
     return re.sub(_READ, _reread, text)
 
 
@@ -104,7 +104,7 @@ def _named(match: re.Match[str], name: str) -> str:
 
 
 def _error(match: re.Match[str], message: str) -> EscapeError:
-    """Return an error at a match in UTF-8 bytes, its place counted in characters."""
+    """Return an error at a match in UTF-8 bytes, its location counted in characters."""
 
     def characters(byte_offset: int) -> int:
         return len(match.string[:byte_offset].encode("latin-1").decode("utf-8", "ignore"))
@@ -126,10 +126,10 @@ def _reread(match: re.Match[str]) -> str:
 
 
 def _end_of_literal(literal: str) -> int:
-    found = re.search(_CLOSING_QUOTE, literal + '"')
-    return found.end() - 1 if found else -1
+    quote = re.search(_CLOSING_QUOTE, literal + '"')
+    return quote.end() - 1 if quote else -1
 
 
 def _place(text: str, pattern: str) -> tuple[int, int]:
-    found = re.search(pattern, text)
-    return found.span() if found else (0, len(text))
+    match = re.search(pattern, text)
+    return match.span() if match else (0, len(text))

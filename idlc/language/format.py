@@ -1,6 +1,6 @@
 """Syntax tree → the same file in canonical layout.
 
-Changes blanks, line ends and nothing else: no word, value or comment is added, lost or moved to
+Changes whitespace and line ends only: no word, value or comment is added, lost or moved to
 another line, so the meaning stays. Formatting twice is formatting once.
 """
 
@@ -18,7 +18,7 @@ from idlc.language.parse import parse_definition
 
 #: A tab reaches to the next multiple of one of these, whichever makes more sense of a section.
 TAB_WIDTHS = (8, 4)
-#: Kinds of words in the order in which they stand, and the narrow gaps before them, usual first.
+#: Kinds of words in their order on a line, and the narrow gaps before them, usual first.
 NARROW = {
     "type": (" ", ""),
     "name": (" ",),
@@ -28,7 +28,7 @@ NARROW = {
     "comment": ("  ", " "),
 }
 
-#: What can be in one column with another word: where it starts, or where a number ends.
+#: An edge that words can share in a column: the start of a word, or the end of a number.
 _Edge: TypeAlias = tuple[str, int]
 
 
@@ -67,7 +67,7 @@ class _Row:
 
     @property
     def is_comment(self) -> bool:
-        """Whether it is a comment and nothing else."""
+        """True for a line that holds only a comment."""
         return len(self._words) == 1 and bool(self._words[0].gap)
 
     def find(self, kind: str) -> _Word | None:
@@ -76,7 +76,7 @@ class _Row:
 
     def change(self, word: _Word, gap: str) -> None:
         """Change the gap before a word; later words that keep their columns get new gaps too."""
-        columns = [one.start for one in self._words]
+        columns = [earlier.start for earlier in self._words]
         word.gap = gap
         self._measure()
         for later, column in zip(self._words, columns, strict=True):
@@ -98,11 +98,11 @@ _Column: TypeAlias = "list[tuple[_Row, _Word]]"
 
 
 def lay_out(lines: Sequence[tree.Line]) -> list[str]:
-    """Return the texts of a section's lines, without blanks at their ends."""
+    """Return the texts of a section's lines, without trailing whitespace."""
     old = [(line.code + line.comment).rstrip() for line in lines]
     tabs = TAB_WIDTHS if any("\t" in line.code for line in lines) else TAB_WIDTHS[:1]
-    found = [_laid_out(lines, old, tab) for tab in tabs]
-    return min(found, key=lambda new: sum(map(str.__ne__, old, new)))
+    layouts = [_laid_out(lines, old, tab) for tab in tabs]
+    return min(layouts, key=lambda new: sum(map(str.__ne__, old, new)))
 
 
 def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[str]:
@@ -114,15 +114,15 @@ def _laid_out(lines: Sequence[tree.Line], old: Sequence[str], tab: int) -> list[
         else:
             block += 1
     kinds = [[(row, word) for row in rows.values() if (word := row.find(kind))] for kind in NARROW]
-    for found in kinds:
-        columns = _columns(found)
-        for _, word in found:
+    for column in kinds:
+        columns = _columns(column)
+        for _, word in column:
             in_column = bool(word.gap) and not columns.isdisjoint(word.edges)
             word.keeps_column = word.is_wide or in_column
     for row in rows.values():
         _balance(row)
-    for found in kinds:
-        _place(found)
+    for column in kinds:
+        _place(column)
     return [rows[number].text if number in rows else text for number, text in enumerate(old)]
 
 
@@ -137,7 +137,7 @@ def _words(line: tree.Line) -> Iterator[_Word]:
     for kind, piece in _pieces(text) if text else ():
         if piece.text:
             start = before + piece.start
-            # what counts as a blank between words, such as a no-break space, becomes one
+            # other whitespace between words, such as a no-break space, becomes a space
             gap = re.sub(r"[^ \t]", " ", line.code[end:start])
             end = before + piece.end
             yield _Word(kind, gap, line.code[start:end])
@@ -160,7 +160,7 @@ def _pieces(text: str) -> Iterator[tuple[str, tree.Piece]]:
 
 
 def _balance(row: _Row) -> None:
-    """Give `=` a blank on either side if there is one on one side."""
+    """Put a space on both sides of `=` if there is one on either side."""
     sign, value = row.find("sign"), row.find("value")
     if sign is not None and value is not None and bool(sign.gap) != bool(value.gap):
         row.change(value if sign.gap else sign, " ")
@@ -197,14 +197,14 @@ def _in(columns: set[_Edge], word: _Word) -> bool:
 
 
 def _is_even(block: _Column) -> bool:
-    """Return whether the block's gaps are the same; a comment may stand where it likes if alone."""
+    """Return whether the block's gaps are the same; a single comment may be anywhere."""
     gaps = {word.gap for row, word in block if not row.is_comment}
     alone = len(block) == 1 and block[0][1].kind != "comment"
     return len(gaps) == 1 and "" not in gaps and not alone
 
 
 def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
-    """Return the column of the row nearest to one, the row above first; 0 if there is none."""
+    """Return the column of the nearest anchor, the one above first; 0 if there is none."""
     after = bisect(anchors, (at, 0))
     close = anchors[max(after - 1, 0) : after + 1]
     return min(close, key=lambda anchor: abs(anchor[0] - at), default=(0, 0))[1]
@@ -218,7 +218,7 @@ def _usual(words: _Column) -> str:
     return max(NARROW["comment"], key=lambda gap: counts[gap])
 
 
-#: Blanks at the end of a line.
+#: Trailing whitespace.
 _INVISIBLE = re.compile(r"[ \t]+$", re.MULTILINE)
 #: More blank lines than these in a row say nothing.
 BLANK_LINES = 2
@@ -227,7 +227,7 @@ BLANK_LINES = 2
 def format_file(file: tree.File) -> str:
     """Return the text of a file in canonical layout; lines that are no definitions stay.
 
-    A file that differs only in what nobody sees, at the ends of lines and of the file, is in order.
+    A file that differs only in trailing whitespace, of lines and of the file, is in order.
     """
     newline = _newline(file)
     out: list[str] = []
@@ -241,21 +241,21 @@ def format_file(file: tree.File) -> str:
     return file.source.text if _look_alike(text, file.source.text) else text
 
 
-def _look_alike(one: str, other: str) -> bool:
-    return _INVISIBLE.sub("", one).rstrip() == _INVISIBLE.sub("", other).rstrip()
+def _look_alike(left: str, right: str) -> bool:
+    return _INVISIBLE.sub("", left).rstrip() == _INVISIBLE.sub("", right).rstrip()
 
 
 def _newline(file: tree.File) -> str:
     """Return the file's first usual line end, which all lines get."""
     ends = (line.newline for section in file.sections for line in section.lines)
-    found = next((end for end in ends if end in ("\n", "\r\n")), "\n")
+    usual = next((end for end in ends if end in ("\n", "\r\n")), "\n")
     if file.separators and file.source.text.startswith("---\r\n", file.separators[0]):
         return "\r\n"
-    return found
+    return usual
 
 
 def _texts(section: tree.Section) -> list[str]:
-    # ROS 2 keeps blanks at the ends of the comment lines that head a section
+    # ROS 2 keeps trailing whitespace of the comment lines that head a section
     head = [line.comment for line in takewhile(_is_comment_line, section.lines)]
     return [*head, *lay_out(section.lines[len(head) :])]
 
@@ -265,7 +265,7 @@ def _is_comment_line(line: tree.Line) -> bool:
 
 
 def _trimmed(texts: Iterable[str], *, first: bool) -> Iterator[str]:
-    """Yield lines without needless blank ones; those that divide comments stay."""
+    """Yield lines without needless blank ones; blank lines between comments stay."""
     blanks = 0
     begun = False
     for text in texts:

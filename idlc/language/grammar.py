@@ -19,5 +19,7 @@ def grammar() -> str:
 @lru_cache(maxsize=1)
 def terminals() -> dict[str, str]:
     """Return the regular expressions of the grammar's terminals by their names."""
-    found = re.findall(r"(?m)^(\w+)(?:\.\d+)?: /(.*)/([a-z]*)$", grammar())
-    return {name: f"(?{flags}:{pattern})" if flags else pattern for name, pattern, flags in found}
+    definitions = re.findall(r"(?m)^(\w+)(?:\.\d+)?: /(.*)/([a-z]*)$", grammar())
+    return {
+        name: f"(?{flags}:{pattern})" if flags else pattern for name, pattern, flags in definitions
+    }

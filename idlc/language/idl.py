@@ -1,4 +1,4 @@
-"""IDL text → its syntax. Never raises: what ROS 2 would not write is the `broken` place."""
+"""IDL text → its syntax. Never raises: `broken` is the first place that ROS 2 would not write."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Value(msgspec.Struct, frozen=True):
 
     @property
     def is_text(self) -> bool:
-        """Whether it is in quotes."""
+        """True for texts in quotes."""
         return self.pieces[0].text.startswith('"')
 
     @property
@@ -67,7 +67,7 @@ class Annotation(msgspec.Struct, frozen=True):
     parameters: Mapping[str, Value]
 
 
-class Constant(msgspec.Struct, frozen=True):
+class IdlConstant(msgspec.Struct, frozen=True):
     """`const TYPE NAME = VALUE;`."""
 
     annotations: tuple[Annotation, ...]
@@ -80,7 +80,7 @@ class Constants(msgspec.Struct, frozen=True):
     """The module of a structure's constants."""
 
     name: Piece
-    constants: tuple[Constant, ...]
+    constants: tuple[IdlConstant, ...]
 
 
 class Member(msgspec.Struct, frozen=True):
@@ -99,8 +99,8 @@ class Structure(msgspec.Struct, frozen=True):
     members: tuple[Member, ...]
 
 
-class File(msgspec.Struct, frozen=True):
-    """A file, or with `broken` the place from which on it is none that ROS 2 makes."""
+class IdlFile(msgspec.Struct, frozen=True):
+    """A file; `broken` is the first word that ROS 2 would not write, where there is one."""
 
     source: Source
     package: Piece = Piece("", 0)
@@ -121,7 +121,7 @@ def _optional(token: Token | None) -> Piece | None:
 
 
 @v_args(inline=True)
-class _Builder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x only
+class _IdlBuilder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x only
     """Builds the syntax while lark reduces; the method names are the grammar's rules."""
 
     def file(self, *parts: Any) -> tuple[Any, ...]:
@@ -134,12 +134,12 @@ class _Builder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x on
     def typedef(self, type_: Any, name: Token, size: Token | None = None) -> Typedef:
         return Typedef(type_, piece(name), _optional(size))
 
-    def constants(self, name: Token, *constants: Constant) -> Constants:
+    def constants(self, name: Token, *constants: IdlConstant) -> Constants:
         return Constants(piece(name), constants)
 
-    def constant(self, *parts: Any) -> Constant:
+    def constant(self, *parts: Any) -> IdlConstant:
         *annotations, type_, name, value = parts
-        return Constant(tuple(annotations), type_, piece(name), value)
+        return IdlConstant(tuple(annotations), type_, piece(name), value)
 
     def struct(self, *parts: Any) -> Structure:
         at = next(i for i, part in enumerate(parts) if isinstance(part, Token))
@@ -158,7 +158,7 @@ class _Builder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x on
     def element(self, *tokens: Token) -> Element:
         bound = piece(tokens[-1]) if tokens[-1].type == "SIZE" else None
         names = [piece(token) for token in tokens if token.type == "NAME"]
-        parts = tuple(one.text for one in names)
+        parts = tuple(name.text for name in names)
         return Element(Piece("::".join(parts), names[0].start), parts, bound)
 
     def annotation(self, name: Token, *parameters: tuple[str, Any]) -> Annotation:
@@ -175,23 +175,23 @@ class _Builder(Transformer):  # type: ignore[type-arg]  # generic in lark 1.x on
 def _lark() -> Lark:
     grammar = Path(__file__).with_name("idl.lark").read_text(encoding="utf-8")
     return Lark(
-        grammar, parser="lalr", start="file", transformer=_Builder(), maybe_placeholders=False
+        grammar, parser="lalr", start="file", transformer=_IdlBuilder(), maybe_placeholders=False
     )
 
 
-def parse_idl(source: Source) -> File:
+def parse_idl(source: Source) -> IdlFile:
     """Return the syntax of an .idl file; always succeeds."""
     try:
         package, kind, parts = cast("Any", _lark().parse(source.text))
     except UnexpectedInput as error:
-        return File(source, broken=_place(source.text, error))
-    return File(source, package, kind, parts)
+        return IdlFile(source, broken=_place(source.text, error))
+    return IdlFile(source, package, kind, parts)
 
 
 def _place(text: str, error: UnexpectedInput) -> Piece:
-    """Return the first word that cannot stand where it stands; empty at the end of the text."""
+    """Return the first word that the grammar does not allow; empty at the end of the text."""
     token = getattr(error, "token", None)
     at_end = token is not None and token.type == "$END"
     start = len(text) if at_end else getattr(error, "pos_in_stream", None) or 0
-    found = _WORD.search(text, start)
-    return Piece(found[0], found.start()) if found else Piece("", len(text))
+    word = _WORD.search(text, start)
+    return Piece(word[0], word.start()) if word else Piece("", len(text))

@@ -1,4 +1,7 @@
-"""The grammar as lark runs it: any text, and what is wrong with a line that is no definition."""
+"""The parser that lark makes of the grammar, for the few lines that `parse` cannot read quickly.
+
+Loading lark takes longer than most commands need, so `parse` imports this where it needs it.
+"""
 
 from __future__ import annotations
 
@@ -84,7 +87,7 @@ def lines(text: str) -> tuple[Any, ...]:
 
 
 def definition(text: str) -> tree.Body:
-    """Return what the code of one line is; `text` is a `Line.definition` and not empty."""
+    """Return the definition on one line; `text` is a `Line.definition` and not empty."""
     if text[0].isspace():
         return _broken_indent(text)
     try:
@@ -123,7 +126,7 @@ def _broken_indent(text: str) -> tree.Broken:
 
 
 def _broken(text: str, error: UnexpectedInput) -> tree.Broken:
-    """Say in our own words why `text` is no definition."""
+    """Return the problem of a `text` that is no definition, without lark's words for it."""
     type_, space, _ = text.partition(" ")
     whole = tree.Piece(type_, 0)
     if set(type_) == {"-"} and not space:

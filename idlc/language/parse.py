@@ -1,10 +1,9 @@
-"""Source → syntax tree. Never raises on a user's text: what is no definition becomes `Broken`."""
+"""Source → syntax tree. Never raises on a user's text: a line without meaning becomes `Broken`."""
 
 from __future__ import annotations
 
 import re
 from functools import lru_cache
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, cast
 
 from idlc.diagnostics.source import Source
@@ -20,18 +19,18 @@ _SEPARATOR = "---"
 
 @lru_cache(maxsize=1)
 def _definition() -> re.Pattern[str]:
-    known = terminals()
-    size = known["SIZE"]
+    patterns = terminals()
+    size = patterns["SIZE"]
     return re.compile(
-        rf"(?P<type>(?P<base>{known['TYPE_NAME']})(?:<=(?P<bound>{size}))?"
+        rf"(?P<type>(?P<base>{patterns['TYPE_NAME']})(?:<=(?P<bound>{size}))?"
         rf"(?P<array>\[(?:(?P<most><=)?(?P<size>{size}))?\])?) \s*"
-        rf"(?:(?P<field>{known['NAME']})(?: \s*(?P<default>{known['DEFAULT']}))?"
-        rf"|(?P<constant>{known['CONSTANT_NAME']})?(?P<sign>=)(?P<value>{known['VALUE']})?)"
+        rf"(?:(?P<field>{patterns['NAME']})(?: \s*(?P<default>{patterns['DEFAULT']}))?"
+        rf"|(?P<constant>{patterns['CONSTANT_NAME']})?(?P<sign>=)(?P<value>{patterns['VALUE']})?)"
     )
 
 
 def quick_lines(text: str) -> tuple[object, ...] | None:
-    """Return what `lalr.lines` returns, or `None` for a text with unusual line ends."""
+    """Return the same as `lalr.lines`, or `None` for a text with unusual line ends."""
     if not _UNUSUAL_ENDS.isdisjoint(text):
         return None
     parts: list[object] = []
@@ -49,40 +48,40 @@ def quick_lines(text: str) -> tuple[object, ...] | None:
 
 
 def quick_definition(text: str) -> tree.Body | None:
-    """Return what `lalr.definition` returns, or `None` for code that is not an ordinary line."""
-    found = _definition().fullmatch(text) if text.isprintable() else None
-    if found is None:
+    """Return the same as `lalr.definition`, or `None` for code that is not an ordinary line."""
+    match = _definition().fullmatch(text) if text.isprintable() else None
+    if match is None:
         return None
     type_ = tree.Type(
-        _piece(found, "type"),
-        _piece(found, "base"),
-        _optional(found, "bound"),
-        _optional(found, "array"),
-        bool(found["most"]),
-        _optional(found, "size"),
+        _piece(match, "type"),
+        _piece(match, "base"),
+        _optional(match, "bound"),
+        _optional(match, "array"),
+        bool(match["most"]),
+        _optional(match, "size"),
     )
-    if found["field"] is not None:
-        return tree.Field(type_, _piece(found, "field"), _optional(found, "default"))
-    name, value = _optional(found, "constant"), _optional(found, "value")
-    return tree.constant(type_, name, found.start("sign"), value, len(text))
+    if match["field"] is not None:
+        return tree.Field(type_, _piece(match, "field"), _optional(match, "default"))
+    name, value = _optional(match, "constant"), _optional(match, "value")
+    return tree.constant(type_, name, match.start("sign"), value, len(text))
 
 
-def _piece(found: re.Match[str], group: str) -> tree.Piece:
-    return tree.Piece(found[group], found.start(group))
+def _piece(match: re.Match[str], group: str) -> tree.Piece:
+    return tree.Piece(match[group], match.start(group))
 
 
-def _optional(found: re.Match[str], group: str) -> tree.Piece | None:
-    return None if found[group] is None else _piece(found, group)
+def _optional(match: re.Match[str], group: str) -> tree.Piece | None:
+    return None if match[group] is None else _piece(match, group)
 
 
 #: Longer lines are parsed again rather than remembered.
 SHARED_LENGTH = 1000
 
 
-def _lalr() -> ModuleType:
-    from idlc.language import lalr
+def _lines(text: str) -> tuple[Any, ...]:
+    from idlc.language import lalr  # lark is slow to load, and few files need it
 
-    return lalr
+    return lalr.lines(text)
 
 
 def parse(source: Source) -> tree.File:
@@ -90,7 +89,7 @@ def parse(source: Source) -> tree.File:
     text = source.text
     if not text or text[-1] not in LINE_ENDS:
         text += "\n"
-    parts = cast("Any", quick_lines(text) or _lalr().lines(text))
+    parts = cast("Any", quick_lines(text) or _lines(text))
     sections = parts[::2]
     separators = parts[1::2]
     starts = (0, *(source.line_starts_after(offset) for offset in separators))
@@ -101,7 +100,7 @@ def parse(source: Source) -> tree.File:
     )
 
 
-def parse_any(source: Source) -> tree.File | idl.File:
+def parse_any(source: Source) -> tree.File | idl.IdlFile:
     """Return the syntax of a file of either language; always succeeds."""
     if not source.is_idl:
         return parse(source)
@@ -111,12 +110,17 @@ def parse_any(source: Source) -> tree.File | idl.File:
 
 
 def parse_definition(text: str) -> tree.Body:
-    """Return what the code of one line is; `text` is a `Line.definition` and not empty."""
-    return _shared(text) if len(text) < SHARED_LENGTH else _parse_definition_at(text)
+    """Return the definition on one line; `text` is a `Line.definition` and not empty."""
+    return _shared(text) if len(text) < SHARED_LENGTH else _parse_code(text)
 
 
-def _parse_definition_at(text: str) -> tree.Body:
-    return quick_definition(text) or cast("tree.Body", _lalr().definition(text))
+def _parse_code(text: str) -> tree.Body:
+    body = quick_definition(text)
+    if body is not None:
+        return body
+    from idlc.language import lalr  # lark is slow to load, and few files need it
+
+    return lalr.definition(text)
 
 
-_shared = lru_cache(maxsize=4096)(_parse_definition_at)
+_shared = lru_cache(maxsize=4096)(_parse_code)

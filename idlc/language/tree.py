@@ -13,14 +13,14 @@ import msgspec
 from idlc.diagnostics.codes import Code
 from idlc.diagnostics.source import Source, Span
 
-#: An ordinary character for ROS 2, and therefore wrong wherever it stands (language 1.1).
+#: An ordinary character for ROS 2, and therefore wrong anywhere in a file (language 1.1).
 BYTE_ORDER_MARK = "\ufeff"
-#: What may begin a line before its definition, in distributions that read it (language 10).
+#: The annotation before a definition, in distributions that read it (language 10).
 OPTIONAL = "@optional"
 
 
 class Piece(msgspec.Struct, frozen=True):
-    """Some text and where it stands in its line; TABs are spaces here."""
+    """Some text and its offset in its line; TABs are spaces here."""
 
     text: str
     start: int
@@ -63,7 +63,7 @@ def constant(
 ) -> Constant:
     """Return a constant without the spaces around its parts, of which one may be missing.
 
-    `equals` is where its `=` stands, `end` where its line ends.
+    `equals` is the offset of its `=`, `end` the offset of the line's end.
     """
     name = name or Piece("", equals)
     value = value or Piece("", end)
@@ -76,7 +76,7 @@ def constant(
 
 
 class Broken(msgspec.Struct, frozen=True):
-    """Code that is no definition: the guilty piece, and what to say about it."""
+    """Code that is no definition: the piece at fault, and the problem to report."""
 
     code: Code
     piece: Piece
@@ -88,7 +88,7 @@ Body: TypeAlias = Field | Constant | Broken
 
 
 class Line(msgspec.Struct, frozen=True):
-    """One line. `code` is what stands before the comment, `comment` starts with its `#`."""
+    """One line. `code` is the text before the comment, `comment` starts with its `#`."""
 
     start: int
     code: str = ""
@@ -97,7 +97,7 @@ class Line(msgspec.Struct, frozen=True):
 
     @property
     def is_indented_comment(self) -> bool:
-        """Whether the line is a comment with white space before it."""
+        """True for a comment with whitespace before it."""
         return bool(self.comment) and bool(self.code) and not self.code.strip()
 
     @property
@@ -107,7 +107,7 @@ class Line(msgspec.Struct, frozen=True):
 
     @property
     def after_optional(self) -> Line | None:
-        """What follows `@optional` in a line that begins with it; no blank need, nor anything."""
+        """The rest of a line that begins with `@optional`; it may be empty or follow at once."""
         if not self.code.startswith(OPTIONAL):
             return None
         code = self.code[len(OPTIONAL) :].lstrip()

@@ -1,1 +1,1 @@
-"""What interface files mean: immutable values, linked by name, with hashes and the catalogue."""
+"""The meaning of interface files: immutable values, linked by name, hashes and the catalogue."""

@@ -1,7 +1,7 @@
 """ROS 2's standard interfaces, built in, so that a machine without ROS compiles them too.
 
-`catalog.json` holds those that are alike in all distributions, `catalog_differences.json` the
-others; `catalog.md` says where they come from. They are names, types, defaults and constants, no
+`catalog.json` holds the interfaces that are equal in all distributions, `catalog_differences.json`
+the others; `catalog.md` documents their origin. They are names, types, defaults and constants, no
 comments, and are turned into interface text, so that there is one way from text to meaning.
 """
 
@@ -19,7 +19,7 @@ from idlc.diagnostics.source import Source
 from idlc.model import ir
 from idlc.model.distros import DEFAULT, DISTROS, NEWEST, Distro, later
 
-#: The distribution that is meant where a function is not told.
+#: The distribution of functions that get none as an argument.
 distro = DEFAULT
 
 _HERE = Path(__file__)
@@ -51,13 +51,13 @@ def _entries(of: Distro) -> dict[str, msgspec.Raw]:
 
 @lru_cache
 def _messages(of: Distro) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
+    by_package: dict[str, list[str]] = {}
     for key in _entries(of):
         name = ir.TypeName.parse(key)
-        messages = found.setdefault(name.package, [])
+        messages = by_package.setdefault(name.package, [])
         if name.kind == "msg":
             messages.append(name.name)
-    return found
+    return by_package
 
 
 def interfaces(of: Distro = DEFAULT) -> tuple[ir.TypeName, ...]:
@@ -85,7 +85,7 @@ def packages(of: Distro = DEFAULT) -> Iterable[str]:
 
 
 def nearby(_: str) -> str | None:
-    """Return `None`: what is not built in is not near either."""
+    """Return `None`: the catalogue has no folders to suggest."""
     return None
 
 
@@ -101,7 +101,7 @@ def _packages_of_any() -> frozenset[str]:
 
 def holding(name: ir.TypeName) -> tuple[Distro, ...]:
     """Return the distributions that have an interface."""
-    return tuple(one for one in DISTROS if str(name) in _entries(one))
+    return tuple(other for other in DISTROS if str(name) in _entries(other))
 
 
 def removed(name: ir.TypeName, of: Distro) -> Distro | None:
@@ -113,10 +113,10 @@ def removed(name: ir.TypeName, of: Distro) -> Distro | None:
 
 
 def changed(name: ir.TypeName, of: Distro) -> Distro | None:
-    """Return the first distribution after one in which a message has other bytes."""
-    here = _layout(str(name), of)
-    others = ((one, _layout(str(name), one)) for one in later(of))
-    return next((one for one, layout in others if here and layout and layout != here), None)
+    """Return the first later distribution in which a message has another layout in bytes."""
+    own = _layout(str(name), of)
+    layouts = ((other, _layout(str(name), other)) for other in later(of))
+    return next((other for other, layout in layouts if own and layout and layout != own), None)
 
 
 def _sections(key: str, of: Distro) -> list[dict[str, list[list[Any]]]] | None:
@@ -128,7 +128,7 @@ def _sections(key: str, of: Distro) -> list[dict[str, list[list[Any]]]] | None:
 
 @lru_cache(maxsize=1024)
 def _layout(key: str, of: Distro) -> tuple[Hashable, ...]:
-    """Return the fields of a message, with those of the messages in it; empty if not there."""
+    """Return the fields of a message, nested ones included; empty if there is no such message."""
     return tuple(
         (type_, name, _layout(_target(type_), of) if "/" in type_ else ())
         for section in _sections(key, of) or ()
@@ -152,6 +152,6 @@ def _section(section: dict[str, list[list[Any]]]) -> str:
 
 def _literal(value: Any) -> str:
     if isinstance(value, list):
-        texts = (f'"{one}"' if isinstance(one, str) else str(one) for one in value)
+        texts = (f'"{item}"' if isinstance(item, str) else str(item) for item in value)
         return f"[{', '.join(texts)}]"
     return str(value)

@@ -17,7 +17,7 @@ _UNIT_END = re.compile(r"[,\]]")
 
 
 class Comment(msgspec.Struct, frozen=True):
-    """A condensed comment: its lines, and the unit that stood in brackets, if one did."""
+    """A condensed comment: its lines, and the unit from its brackets, if there is one."""
 
     lines: tuple[str, ...] = ()
     unit: str | None = None
@@ -29,11 +29,11 @@ def condense(lines: Sequence[str]) -> Comment:
         return Comment()
     unit: str | None = None
     kept = list(lines)
-    found = (
+    units = (
         list(islice(brackets("\n".join(lines)), 2)) if any("[" in line for line in lines) else []
     )
-    if len(found) == 1:
-        whole, unit = found[0]
+    if len(units) == 1:
+        whole, unit = units[0]
         kept = [line.replace(whole, "") for line in kept]
     filled = [at for at, line in enumerate(kept) if line]
     kept = kept[filled[0] : filled[-1] + 1] if filled else []
@@ -44,9 +44,9 @@ def condense(lines: Sequence[str]) -> Comment:
 
 
 def brackets(text: str) -> Iterator[tuple[str, str]]:
-    r"""Yield what `(\s*\[([^,\]]+)\])` finds in `text`, looking at each character once.
+    r"""Yield the matches of `(\s*\[([^,\]]+)\])` in `text`, looking at each character once.
 
-    These may be units: the whole with the blanks before it, and what stands between the brackets.
+    These may be units: the whole with the whitespace before it, and the text between the brackets.
     """
     start = 0
     at = text.find("[")
@@ -59,7 +59,7 @@ def brackets(text: str) -> Iterator[tuple[str, str]]:
 
 
 class Problem(msgspec.Struct, frozen=True):
-    """A comment that breaks ROS 2's pipeline; `text` is the guilty piece of it."""
+    """A comment that breaks ROS 2's pipeline; `text` is the piece at fault."""
 
     code: codes.Code
     text: str
@@ -68,7 +68,7 @@ class Problem(msgspec.Struct, frozen=True):
 
 
 def problem(comment: Comment) -> Problem | None:
-    """Return what is wrong with a comment or its unit (language 1.4, 1.5), or `None`."""
+    """Return the problem of a comment or its unit (language 1.4, 1.5), or `None`."""
     if comment.unit is not None and "\n" in comment.unit:
         return Problem(
             codes.UNIT_ACROSS_LINES,

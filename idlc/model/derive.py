@@ -8,7 +8,7 @@ SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
 TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
 
-#: What each kind of file needs beside the types that it names.
+#: Packages that each kind of file needs beside the types that it names.
 IMPLICIT_PACKAGES: dict[ir.Kind, tuple[str, ...]] = {
     "msg": (),
     "srv": ("service_msgs",),
@@ -125,7 +125,7 @@ def references(interface: ir.Interface) -> set[ir.TypeName]:
 
 def pseudo_structures(interface: ir.Interface) -> tuple[ir.Message, ...]:
     """Return the structures that exist only in type descriptions: services and actions as such."""
-    found = [
+    structures = [
         ir.Message(
             name=service.name,
             fields=(
@@ -137,8 +137,8 @@ def pseudo_structures(interface: ir.Interface) -> tuple[ir.Message, ...]:
         for service in services(interface)
     ]
     if isinstance(interface, ir.Action):
-        found.append(_action_structure(interface))
-    return tuple(found)
+        structures.append(_action_structure(interface))
+    return tuple(structures)
 
 
 def _action_structure(action: ir.Action) -> ir.Message:

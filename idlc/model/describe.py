@@ -117,7 +117,7 @@ class Describer:
     """
 
     def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
-        self._known: set[ir.TypeName] = set()
+        self._described: set[ir.TypeName] = set()
         self._individuals: dict[str, IndividualDict] = {}
         self._direct: dict[str, frozenset[str]] = {}
         self._closures: dict[str, list[str]] = {}
@@ -127,8 +127,8 @@ class Describer:
 
     def add(self, interfaces: Mapping[ir.TypeName, ir.Interface]) -> None:
         """Describe more interfaces; together they must be a closed set again."""
-        new = interfaces.keys() - self._known
-        self._known |= new
+        new = interfaces.keys() - self._described
+        self._described |= new
         for name in new:
             interface = interfaces[name]
             for message in (*derive.messages(interface), *derive.pseudo_structures(interface)):
@@ -139,16 +139,16 @@ class Describer:
 
     def _closure(self, name: str) -> list[str]:
         """Return all names that `name` refers to, itself excluded, in code-point order."""
-        known = self._closures.get(name)
-        if known is None:
+        closure = self._closures.get(name)
+        if closure is None:
             reached: set[str] = set()
             queue = [name]
             while queue:
-                found = self._direct[queue.pop()] - reached
-                reached |= found
-                queue.extend(found)
-            known = self._closures[name] = sorted(reached)
-        return known
+                fresh = self._direct[queue.pop()] - reached
+                reached |= fresh
+                queue.extend(fresh)
+            closure = self._closures[name] = sorted(reached)
+        return closure
 
     def description(self, name: str) -> DescriptionDict:
         """Return the full description of a structure, service or action by its full name."""
@@ -161,26 +161,26 @@ class Describer:
 
     def hash(self, name: str) -> str:
         """Return RIHS01_ and 64 hexadecimal digits for a full name."""
-        known = self._hashes.get(name)
-        if known is None:
+        digest = self._hashes.get(name)
+        if digest is None:
             references = ", ".join(self._hashed_text(n) for n in self._closure(name))
             text = (
                 f'{{"type_description": {self._hashed_text(name)}, '
                 f'"referenced_type_descriptions": [{references}]}}'
             )
-            known = "RIHS01_" + hashlib.sha256(text.encode("ascii")).hexdigest()
-            self._hashes[name] = known
-        return known
+            digest = "RIHS01_" + hashlib.sha256(text.encode("ascii")).hexdigest()
+            self._hashes[name] = digest
+        return digest
 
     def _hashed_text(self, name: str) -> str:
         """Return the JSON of an individual description without default values."""
-        known = self._texts.get(name)
-        if known is None:
+        text = self._texts.get(name)
+        if text is None:
             own = self._individuals[name]
             fields = [{"name": field["name"], "type": field["type"]} for field in own["fields"]]
-            known = json.dumps({"type_name": own["type_name"], "fields": fields})
-            self._texts[name] = known
-        return known
+            text = json.dumps({"type_name": own["type_name"], "fields": fields})
+            self._texts[name] = text
+        return text
 
     def installed(self, name: str) -> InstalledDict:
         """Return the content of the Name.json file for a full name."""

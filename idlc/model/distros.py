@@ -1,4 +1,4 @@
-"""The distributions of ROS 2, and how what they make of interface files differs."""
+"""The distributions of ROS 2, and their differences in handling interface files."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from idlc.diagnostics.text import did_you_mean
 class Distro(msgspec.Struct, frozen=True):
     """A distribution, by the name that ROS 2 has for it in paths.
 
-    `has_hashes` is whether it has type hashes and descriptions, `reads_optional` whether
-    `@optional` is no error, `has_wheels` whether pip can install its packages. `converts_values` is
-    whether its message classes take `None` for the default of any field, and any iterable for a
-    list.
+    `has_hashes`: it has type hashes and descriptions. `reads_optional`: `@optional` is no error.
+    `has_wheels`: pip can install its packages. `converts_values`: its message classes accept
+    `None` for the default of any field, and any iterable for a list.
     """
 
     name: str
@@ -30,7 +29,7 @@ class Distro(msgspec.Struct, frozen=True):
         return self.name.capitalize()
 
     def installing(self, packages: Iterable[str]) -> str:
-        """Return how to install packages, as it is said in a hint."""
+        """Return the advice to install packages, for a hint."""
         wheels = " ".join(f"ros-{self.name}-{name.replace('_', '-')}" for name in packages)
         return "install it with ROS 2" + (f" or `pip install {wheels}`" if self.has_wheels else "")
 
@@ -45,7 +44,7 @@ DISTROS = (
     Distro("rolling", reads_optional=True, converts_values=True),
 )
 BY_NAME = {distro.name: distro for distro in DISTROS}
-#: What is meant where nothing says otherwise.
+#: The distribution of a run without `--distro` or a setting.
 DEFAULT = BY_NAME["jazzy"]
 #: The one that accepts whatever another accepts.
 NEWEST = DISTROS[-1]
@@ -57,7 +56,7 @@ def listed(text: str) -> list[str]:
 
 
 def later(distro: Distro) -> tuple[Distro, ...]:
-    """Return the distributions after one."""
+    """Return the distributions after another."""
     return DISTROS[DISTROS.index(distro) + 1 :]
 
 

@@ -1,7 +1,7 @@
-"""Type descriptions → messages: `describe` the other way round, for what running programs tell.
+"""Type descriptions → messages: the inverse of `describe`, for descriptions from running programs.
 
-A description comes from another program. It is believed only if it is complete and has the type
-hash that the program announces; its names become text in what idlc shows, and nothing else.
+A description comes from another program. It is accepted only if it is complete and has the type
+hash that the program announces; idlc prints its names, and uses them for nothing else.
 """
 
 from __future__ import annotations
@@ -39,60 +39,60 @@ _DUMMY: FieldDict = {
 }
 
 
-class NotBelievedError(ValueError):
-    """A description is not what it should be; the text says why."""
+class DescriptionError(ValueError):
+    """A description is incomplete or contradicts its hash; the text gives the reason."""
 
 
 def model_of_description(
-    description: DescriptionDict, name: str, type_hash: str, who: str
+    description: DescriptionDict, name: str, type_hash: str, program: str
 ) -> Model:
-    """Return what a type of this name and hash is, as `who` describes it.
+    """Return the model of a type of this name and hash, as `program` describes it.
 
-    Raises NotBelievedError. Each message has a source of its own, for places in it.
+    Raises DescriptionError. Each message has a source of its own, for locations in it.
     """
     parts = (description["type_description"], *description["referenced_type_descriptions"])
-    messages = dict(_messages(parts, who))
+    messages = dict(_messages(parts, program))
     top = next(iter(messages))
     if str(top) != name:
-        raise NotBelievedError(f"it describes `{one_line(str(top))}` instead")
+        raise DescriptionError(f"it describes `{one_line(str(top))}` instead")
     model = Model(top.package, (messages[top],), messages)
     if model.describer.hash(name) != type_hash:
-        raise NotBelievedError("its description has another type hash")
+        raise DescriptionError("its description has another type hash")
     return model
 
 
 def _messages(
-    parts: Iterable[IndividualDict], who: str
+    parts: Iterable[IndividualDict], program: str
 ) -> Iterator[tuple[ir.TypeName, ir.Message]]:
-    """Yield the messages of a description by name, after all of them were looked at."""
+    """Yield the messages of a description by name, after all of them were checked."""
     messages: dict[ir.TypeName, ir.Message] = {}
     for part in parts:
-        message = _message(part, who)
+        message = _message(part, program)
         if message.name in messages:
-            raise NotBelievedError(f"it describes `{message.name}` twice")
+            raise DescriptionError(f"it describes `{message.name}` twice")
         messages[message.name] = message
     for message in messages.values():
         for target in message.references:
             if target not in messages:
-                raise NotBelievedError(f"it does not describe `{target}`")
+                raise DescriptionError(f"it does not describe `{target}`")
     if next(circles(messages, lambda name: messages[name].holders, set()), None):
-        raise NotBelievedError("it describes a message that contains itself")
+        raise DescriptionError("it describes a message that contains itself")
     yield from messages.items()
 
 
-def _message(part: IndividualDict, who: str) -> ir.Message:
+def _message(part: IndividualDict, program: str) -> ir.Message:
     name = _type_name(part["type_name"])
     fields = part["fields"] if [*map(_bare, part["fields"])] != [_DUMMY] else []
     names = [field["name"] for field in fields]
     seen: set[str] = set()
-    for one in names:
-        if not _NAME.fullmatch(one) or one in seen:
-            raise NotBelievedError(f"`{one_line(one)}` is not the name of one field")
-        seen.add(one)
+    for field_name in names:
+        if not _NAME.fullmatch(field_name) or field_name in seen:
+            raise DescriptionError(f"`{one_line(field_name)}` is not the name of one field")
+        seen.add(field_name)
     types = [_type(field["type"]) for field in fields]
     lines = [f"{spell(type_, name.package)} " for type_ in types]
-    text = "".join(f"{line}{one}\n" for line, one in zip(lines, names, strict=True))
-    source = Source(f"{name} ({who})", text)
+    text = "".join(f"{line}{field_name}\n" for line, field_name in zip(lines, names, strict=True))
+    source = Source(f"{name} ({program})", text)
     return ir.Message(name=name, source=source, fields=tuple(_fields(source, names, types, lines)))
 
 
@@ -122,7 +122,7 @@ def _type_name(text: str) -> ir.TypeName:
     except ValueError:
         name = ir.TypeName("", "msg", "")
     if not (_NAME.fullmatch(name.package) and _NAME.fullmatch(name.name)):
-        raise NotBelievedError(f"`{one_line(text)}` is not the name of a type")
+        raise DescriptionError(f"`{one_line(text)}` is not the name of a type")
     return name
 
 
@@ -138,7 +138,7 @@ def _type(type_: TypeDict) -> ir.FieldType:
             return ir.Sequence(element, type_["capacity"])
         case 3:
             return ir.Sequence(element)
-    raise NotBelievedError(f"it uses the unknown type {type_['type_id']}")
+    raise DescriptionError(f"it uses the unknown type {type_['type_id']}")
 
 
 def _element(type_id: int, type_: TypeDict) -> ir.Element:
@@ -149,7 +149,7 @@ def _element(type_id: int, type_: TypeDict) -> ir.Element:
         return ir.String(wide, type_["string_capacity"] if bounded else None)
     if type_id in _PRIMITIVES:
         return _PRIMITIVES[type_id]
-    raise NotBelievedError(f"it uses type {type_id}, which .msg files do not have")
+    raise DescriptionError(f"it uses type {type_id}, which .msg files do not have")
 
 
 #: Characters of all sources together; more are left alone.
@@ -157,22 +157,26 @@ MAX_TEXT = 1 << 20
 
 
 def reported_model(
-    description: DescriptionDict, sources: Mapping[str, str], name: str, type_hash: str, who: str
+    description: DescriptionDict,
+    sources: Mapping[str, str],
+    name: str,
+    type_hash: str,
+    program: str,
 ) -> Model:
-    """Return what a type of this name and hash is; raises NotBelievedError.
+    """Return the model of a type of this name and hash; raises DescriptionError.
 
-    The sources have constants, units and comments, so they count if they have that hash. A
-    program need not tell them, and tells none of what services and actions imply.
+    The sources have constants, units and comments, so they are preferred if they have that hash. A
+    program may leave them out, and has none for the types that services and actions imply.
     """
-    compiled = _compiled(sources, name, who)
+    compiled = _compiled(sources, name, program)
     if compiled is not None and compiled.describer.hash(name) == type_hash:
         return compiled
-    return model_of_description(description, name, type_hash, who)
+    return model_of_description(description, name, type_hash, program)
 
 
-def _compiled(sources: Mapping[str, str], name: str, who: str) -> Model | None:
-    """Return the model of a message and of all that it holds, if the sources have it."""
-    library = _Library(sources, who)
+def _compiled(sources: Mapping[str, str], name: str, program: str) -> Model | None:
+    """Return the model of a message, nested messages included, if the sources have it."""
+    library = _ProgramSources(sources, program)
     report = Report()
     try:
         top = ir.TypeName.parse(name)
@@ -188,22 +192,22 @@ def _compiled(sources: Mapping[str, str], name: str, who: str) -> Model | None:
     return None if report.had_errors else model.only({top})
 
 
-class _Library:
-    """The sources of one program, as `link.Library`; its own ROS 2 has accepted them."""
+class _ProgramSources:
+    """The sources of one program, as `link.Library`; ROS 2 has accepted them there."""
 
     distro = NEWEST
 
-    def __init__(self, sources: Mapping[str, str], who: str) -> None:
+    def __init__(self, sources: Mapping[str, str], program: str) -> None:
         self._sources = sources
-        self._who = who
+        self._program = program
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if there is none of that name."""
         text = self._sources.get(str(name))
-        return Source(f"{name} ({self._who})", text) if text is not None else None
+        return Source(f"{name} ({self._program})", text) if text is not None else None
 
     def names(self, _package: str) -> Iterable[str]:
-        """Return nothing: hints at other names are for people who write files."""
+        """Return nothing: nobody could follow a hint at another name."""
         return ()
 
     def packages(self) -> Iterable[str]:

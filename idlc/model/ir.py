@@ -59,7 +59,7 @@ class PrimitiveInfo(NamedTuple):
 
     @property
     def dtype(self) -> str:
-        """How numpy calls it."""
+        """Numpy's name of it."""
         return {"float": "float32", "double": "float64"}.get(self.idl, self.idl)
 
 
@@ -131,8 +131,8 @@ FieldType: TypeAlias = Element | Array | Sequence
 class Default(msgspec.Struct, frozen=True):
     """A declared default.
 
-    `value` is what Python sees (a tuple for arrays); `text` is the annotation's `str()` as it
-    stands in type descriptions (language 6).
+    `value` is the value in Python (a tuple for arrays); `text` is the annotation's `str()` as
+    type descriptions have it (language 6).
     """
 
     value: Value
@@ -142,7 +142,7 @@ class Default(msgspec.Struct, frozen=True):
 class Field(msgspec.Struct, frozen=True, kw_only=True):
     """A field. `comment` is condensed (language 1.4) but not yet escaped; `unit` likewise.
 
-    `optional` is whether it has `@optional`, which has no effect (language 10).
+    `optional`: it is marked `@optional`, which has no effect (language 10).
     """
 
     name: str
@@ -190,7 +190,9 @@ class Message(msgspec.Struct, frozen=True, kw_only=True):
     def holders(self) -> tuple[tuple[Field, TypeName], ...]:
         """The fields whose types name structures, each with that structure, in order."""
         elements = ((field, element_of(field.type)) for field in self.fields)
-        return tuple((field, one.target) for field, one in elements if isinstance(one, Ref))
+        return tuple(
+            (field, element.target) for field, element in elements if isinstance(element, Ref)
+        )
 
     @property
     def references(self) -> tuple[TypeName, ...]:
@@ -221,7 +223,7 @@ Interface: TypeAlias = Message | Service | Action
 
 
 def element_of(type_: FieldType) -> Element:
-    """Return what an array or sequence holds, or the type itself."""
+    """Return the element of an array or sequence, or the type itself."""
     return type_.element if isinstance(type_, (Array, Sequence)) else type_
 
 
@@ -280,7 +282,7 @@ def meaning(interface: Interface) -> Hashable:
 def content(interface: Interface) -> Hashable:
     """Return a value that is equal for two interfaces if they differ in comments only.
 
-    What IDL does not tell counts as little: units besides those of fields, and `char`.
+    Facts that IDL does not have are ignored, too: units, except of fields, and `char`.
     """
     return _plain(interface, bare=True)
 
@@ -295,6 +297,6 @@ def _plain(value: object, *, bare: bool = False) -> Hashable:
         inside = ((name, _plain(getattr(value, name), bare=bare)) for name in fields)
         return type(value).__name__, *inside
     if isinstance(value, tuple):
-        return tuple(_plain(one, bare=bare) for one in value)
+        return tuple(_plain(item, bare=bare) for item in value)
     # NaN is not equal to itself, 1 is to 1.0 and True
     return type(value).__name__, repr(value)

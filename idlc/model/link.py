@@ -42,33 +42,33 @@ def circles(
     edges: Callable[[Node], Iterable[tuple[Edge, Node]]],
     done: set[Node],
 ) -> Iterator[tuple[list[Node], Edge]]:
-    """Yield each circle as the nodes on it, with the edge that leads from the last to the first.
+    """Yield each circle as its nodes, with the edge from the last back to the first.
 
-    Nodes in `done` are left out; every node that is reached becomes one of them.
+    Nodes in `done` are skipped; every node that is reached is added to them.
     """
     for root in roots:
         path: list[Node] = []
         rest: list[Iterator[tuple[Edge, Node]]] = []
         places: dict[Node, int] = {}
-        enter: Node | None = None if root in done else root
-        while enter is not None or path:
-            if enter is not None:
-                places[enter] = len(path)
-                path.append(enter)
-                rest.append(iter(edges(enter)))
+        entered: Node | None = None if root in done else root
+        while entered is not None or path:
+            if entered is not None:
+                places[entered] = len(path)
+                path.append(entered)
+                rest.append(iter(edges(entered)))
             edge, target = next(rest[-1], (None, None))
-            enter = None
+            entered = None
             if target is None or edge is None:
                 done.add(path[-1])
                 del rest[-1], places[path.pop()]
             elif target in places:
                 yield path[places[target] :], edge
             elif target not in done:
-                enter = target
+                entered = target
 
 
 def check_recursion(interfaces: Iterable[ir.TypeName], pool: Pool) -> None:
-    """Note each field that closes a circle."""
+    """Add an error for each field that closes a circle."""
     for path, field in circles(interfaces, pool.references, pool.searched):
         if field.type_span is not None:
             pool[path[-1]].errors.append(_circle(path, field.type_span))
@@ -88,9 +88,9 @@ def _circle(path: list[ir.TypeName], span: Span) -> Diagnostic:
 
 
 class Entry(msgspec.Struct):
-    """An interface, the fields of it that hold messages of other files, and its errors.
+    """An interface, its fields that hold messages of other files, and its errors.
 
-    `linked` is whether its references were looked up.
+    `linked`: its references were looked up.
     """
 
     interface: ir.Interface
@@ -100,21 +100,21 @@ class Entry(msgspec.Struct):
 
 
 class Lowered(msgspec.Struct, frozen=True):
-    """What a text means, what is wrong in it, and the fields that hold messages of other files."""
+    """The interface of a text, its problems, and its fields that hold messages of other files."""
 
     interface: ir.Interface
     problems: Report
     references: tuple[tuple[ir.Field, ir.TypeName], ...]
 
 
-#: Interfaces with what they refer to; `None` for what there is not.
+#: Interfaces with the names that they refer to; `None` for a name without an interface.
 Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
-#: What was lowered before, by name; it holds for the same `Source` and distribution.
+#: Lowered interfaces by name, valid for the same `Source` and distribution.
 Memory: TypeAlias = dict[ir.TypeName, Lowered]
 
 
 class Pool:
-    """Interfaces by name: those that were added, and those that a library has.
+    """Interfaces by name, added ones and ones from a library.
 
     Pools of one library may share a `memory`, so that only texts that changed are lowered again.
     """
@@ -127,32 +127,36 @@ class Pool:
         self.searched: set[ir.TypeName] = set()
 
     def add(self, interface: ir.Interface, problems: Iterable[Diagnostic] = ()) -> Entry:
-        """Add an interface with what is wrong in its file, unless it is there already."""
-        known = self._entries.get(interface.name)
-        if known is None or known.interface is not interface:
-            errors = [one for one in problems if one.severity is Severity.ERROR]
-            known = Entry(interface, tuple(_references(interface)), errors)
-            self._entries[interface.name] = known
-        return known
+        """Add an interface with the problems of its file, unless it was added before."""
+        entry = self._entries.get(interface.name)
+        if entry is None or entry.interface is not interface:
+            errors = [
+                diagnostic for diagnostic in problems if diagnostic.severity is Severity.ERROR
+            ]
+            entry = Entry(interface, tuple(_references(interface)), errors)
+            self._entries[interface.name] = entry
+        return entry
 
     def remembered(self, name: ir.TypeName, source: Source) -> Lowered | None:
-        """Return what a text was lowered to before, after adding it; `None` if it is new."""
-        known = self._memory.get(name)
-        if known is None or known.interface.source is not source:
+        """Add and return the remembered interface of a text; `None` if the text is new."""
+        lowered = self._memory.get(name)
+        if lowered is None or lowered.interface.source is not source:
             return None
-        self._add(known)
-        return known
+        self._add(lowered)
+        return lowered
 
-    def learn(self, interface: ir.Interface, problems: Report) -> Lowered:
-        """Add and remember what a text was lowered to."""
-        known = Lowered(interface, problems, tuple(_references(interface)))
-        self._memory[interface.name] = known
-        self._add(known)
-        return known
+    def remember(self, interface: ir.Interface, problems: Report) -> Lowered:
+        """Add and remember the interface of a text."""
+        lowered = Lowered(interface, problems, tuple(_references(interface)))
+        self._memory[interface.name] = lowered
+        self._add(lowered)
+        return lowered
 
-    def _add(self, one: Lowered) -> None:
-        errors = [found for found in one.problems if found.severity is Severity.ERROR]
-        self._entries[one.interface.name] = Entry(one.interface, one.references, errors)
+    def _add(self, lowered: Lowered) -> None:
+        errors = [
+            diagnostic for diagnostic in lowered.problems if diagnostic.severity is Severity.ERROR
+        ]
+        self._entries[lowered.interface.name] = Entry(lowered.interface, lowered.references, errors)
 
     def get(self, name: ir.TypeName) -> Entry | None:
         """Return an interface by name; `None` if there is none."""
@@ -160,49 +164,54 @@ class Pool:
             source = self.library.source(name)
             self._entries[name] = None
             if source is not None and not self.remembered(name, source):
-                found = Report()
-                self.learn(lower(parse_any(source), name, found, self.library.distro), found)
+                problems = Report()
+                self.remember(
+                    lower(parse_any(source), name, problems, self.library.distro), problems
+                )
         return self._entries[name]
 
     def __getitem__(self, name: ir.TypeName) -> Entry:
-        """Return an interface that was found before."""
+        """Return an interface that `add` or `get` has seen before."""
         entry = self._entries[name]
         if entry is None:
             raise KeyError(name)
         return entry
 
     def references(self, name: ir.TypeName) -> Iterator[tuple[ir.Field, ir.TypeName]]:
-        """Yield the references of an interface to others that were found."""
+        """Yield the references of an interface to others that exist."""
         entry = self._entries.get(name)
         for field, target in entry.references if entry else ():
             if self._entries.get(target):
                 yield field, target
 
     def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
-        """Return an interface with all that it refers to, `None` for what there is not."""
-        return tuple(one for one, _ in self.graph((name,)).values())
+        """Return an interface with all that it refers to, `None` for a missing one."""
+        return tuple(interface for interface, _ in self.graph((name,)).values())
 
     def graph(self, names: Iterable[ir.TypeName]) -> Graph:
-        """Return interfaces and all that they refer to, `None` for what there is not."""
-        found: Graph = {}
+        """Return interfaces and all that they refer to, `None` for missing ones."""
+        graph: Graph = {}
         waiting = list(names)
         while waiting:
             name = waiting.pop()
-            if name in found:
+            if name in graph:
                 continue
             entry = self._entries.get(name)
             targets = tuple(target for _, target in entry.references) if entry else ()
-            found[name] = (entry.interface if entry else None, targets)
+            graph[name] = (entry.interface if entry else None, targets)
             waiting += targets
-        return found
+        return graph
 
     def is_sound(self, name: ir.TypeName) -> bool:
         """Return whether an interface and all that it refers to exist and have no errors."""
-        entries = [self._entries.get(one.name) if one else None for one in self.reach(name)]
+        entries = [
+            self._entries.get(interface.name) if interface else None
+            for interface in self.reach(name)
+        ]
         return all(entry is not None and not entry.errors for entry in entries)
 
     def crossings(self) -> Iterator[tuple[str, str, Span]]:
-        """Yield which package refers to which other, and where; not what ROS 2 adds by itself."""
+        """Yield each reference of a package to another, except those that ROS 2 adds by itself."""
         for entry in filter(None, self._entries.values()):
             own = entry.interface.name.package
             for field, target in entry.references:
@@ -218,9 +227,9 @@ class Pool:
 
 
 def _references(interface: ir.Interface) -> Iterator[tuple[ir.Field, ir.TypeName]]:
-    """Yield the fields that hold messages of other files, derived structures' included."""
+    """Yield the fields that hold messages of other files, including derived structures'."""
     for message in derive.messages(interface):
-        yield from (one for one in message.holders if one[1].kind == "msg")
+        yield from (holder for holder in message.holders if holder[1].kind == "msg")
 
 
 def check_packages(pool: Pool, report: Report) -> None:
@@ -228,10 +237,12 @@ def check_packages(pool: Pool, report: Report) -> None:
     edges: dict[str, dict[str, Span]] = {}
     for package, target, span in pool.crossings():
         edges.setdefault(package, {}).setdefault(target, span)
-    found = circles(
-        sorted(edges), lambda one: ((at, to) for to, at in edges.get(one, {}).items()), set()
+    package_circles = circles(
+        sorted(edges),
+        lambda package: ((at, to) for to, at in edges.get(package, {}).items()),
+        set(),
     )
-    for packages, span in found:
+    for packages, span in package_circles:
         names = " → ".join((*packages, packages[0]))
         report.add(
             codes.PACKAGE_CIRCLE.at(
@@ -242,13 +253,13 @@ def check_packages(pool: Pool, report: Report) -> None:
         )
 
 
-#: Problems after which nearest names are no longer looked for; people see fewer than these.
+#: Problems after which idlc no longer looks for the nearest names; people see fewer than these.
 SUGGESTIONS = 200
 _PRIMITIVES = (*ir.PRIMITIVES, *STRINGS)
 
 
 class Library(Protocol):
-    """Where other packages' interfaces come from, in order of precedence."""
+    """The sources of other packages' interfaces, in order of precedence."""
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface, or `None` if there is none of that name."""
@@ -260,7 +271,7 @@ class Library(Protocol):
         """Return the names of all packages, for suggestions."""
 
     def nearby(self, package: str) -> str | None:
-        """Return how to have a package looked for where it lies, if that is near."""
+        """Return the advice that makes idlc find a package, if its folder is near."""
 
     @property
     def distro(self) -> Distro:
@@ -310,28 +321,28 @@ class Model:
         return self._pool.library.distro if self._pool else DEFAULT
 
     def only(self, names: Container[ir.TypeName]) -> Model:
-        """Return the model with those of its own interfaces that have one of these names."""
+        """Return the model with its own interfaces limited to these names."""
         own = tuple(interface for interface in self.own if interface.name in names)
         return Model(self.package, own, self.interfaces, self._pool)
 
-    def each(self) -> Iterator[Model]:
+    def per_interface(self) -> Iterator[Model]:
         """Yield the model with each of its own interfaces alone."""
-        for one in self.own:
-            yield Model(self.package, (one,), self.interfaces, self._pool)
+        for interface in self.own:
+            yield Model(self.package, (interface,), self.interfaces, self._pool)
 
     def graph(self) -> Graph:
-        """Return the own interfaces and all that they refer to, `None` for what there is not."""
+        """Return the own interfaces and all that they refer to, `None` for missing ones."""
         if self._pool is None:
-            return {one.name: (one, ()) for one in self.own}
-        return self._pool.graph(one.name for one in self.own)
+            return {interface.name: (interface, ()) for interface in self.own}
+        return self._pool.graph(interface.name for interface in self.own)
 
-    def alone(self, interface: ir.Interface) -> Model:
+    def restricted_to(self, interface: ir.Interface) -> Model:
         """Return the model of one interface and all that it refers to."""
-        needed = {one.name: one for one in self.reach(interface.name) if one}
+        needed = {reached.name: reached for reached in self.reach(interface.name) if reached}
         return Model(self.package, (interface,), needed, self._pool)
 
     def reach(self, name: ir.TypeName) -> tuple[ir.Interface | None, ...]:
-        """Return an interface with all that it refers to, `None` for what there is not."""
+        """Return an interface with all that it refers to, `None` for a missing one."""
         return self._pool.reach(name) if self._pool else (self.interfaces.get(name),)
 
     def is_sound(self, name: ir.TypeName) -> bool:
@@ -339,20 +350,24 @@ class Model:
         return self._pool is None or self._pool.is_sound(name)
 
     def sound(self, broken: Container[str]) -> Model:
-        """Return the model without the interfaces in `broken` files, and those that hold them."""
+        """Return the model without the interfaces in `broken` files and their users."""
         users: dict[ir.TypeName, list[ir.TypeName]] = {}
         for name in self.interfaces:
             for _, target in self._pool.references(name) if self._pool else ():
                 users.setdefault(target, []).append(name)
         bad: set[ir.TypeName] = set()
-        known = self.interfaces.values()
-        waiting = [one.name for one in known if one.source and one.source.path in broken]
+        interfaces = self.interfaces.values()
+        waiting = [
+            interface.name
+            for interface in interfaces
+            if interface.source and interface.source.path in broken
+        ]
         while waiting:
             name = waiting.pop()
             if name not in bad:
                 bad.add(name)
                 waiting += users.get(name, ())
-        sound = {name: one for name, one in self.interfaces.items() if name not in bad}
+        sound = {name: interface for name, interface in self.interfaces.items() if name not in bad}
         return Model(self.package, self.only(sound).own, sound, self._pool)
 
 
@@ -384,8 +399,8 @@ def link(
 
 
 def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool: Pool) -> None:
-    """Add every interface that is reached and not there yet; note those that do not exist."""
-    unknown = _Unknown(interfaces, pool.library)
+    """Add every interface that is referred to; add an error for each that does not exist."""
+    unknown = _UnknownTypes(interfaces, pool.library)
     queue = list(interfaces)
     while queue:
         entry = pool[queue.pop()]
@@ -395,8 +410,8 @@ def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool
                     entry.errors.append(unknown.problem(target, field.type_span))
             elif target in interfaces:
                 continue
-            elif found := pool.get(target):
-                interfaces[target] = found.interface
+            elif target_entry := pool.get(target):
+                interfaces[target] = target_entry.interface
                 queue.append(target)
             elif field.type_span is not None and not entry.linked:
                 entry.errors.append(unknown.problem(target, field.type_span))
@@ -404,14 +419,14 @@ def _load_references(interfaces: MutableMapping[ir.TypeName, ir.Interface], pool
 
 
 def _is_implied_only(target: ir.TypeName, library: Library) -> bool:
-    """Return whether a message is there for events alone, which Humble does not have."""
+    """Return whether a message exists only for service events, which Humble does not have."""
     return target == derive.SERVICE_EVENT_INFO and target.name not in library.names(target.package)
 
 
-class _Unknown:
-    """Says what is wrong with references to what does not exist.
+class _UnknownTypes:
+    """Makes the problems of references to types that do not exist.
 
-    The nearest name is looked for among all that there are, so only for the first problems.
+    A search for the nearest name goes through all packages, so only the first problems get one.
     """
 
     def __init__(self, interfaces: Mapping[ir.TypeName, ir.Interface], library: Library) -> None:
@@ -427,9 +442,9 @@ class _Unknown:
         """Return the problem with a reference to `target`."""
         self._hints -= 1
         written = span.text
-        known = self._messages.get(target.package)
+        siblings = self._messages.get(target.package)
         packages = self._library.packages() if self._hints >= 0 else ()
-        is_known = known is not None or target.package in packages
+        is_known = siblings is not None or target.package in packages
         if "/" in written and not is_known and not self._library.names(target.package):
             return codes.UNKNOWN_PACKAGE.at(
                 span.at(0, len(target.package)),
@@ -444,10 +459,10 @@ class _Unknown:
 
     def _hint(self, target: ir.TypeName, *, qualified: bool) -> str:
         others: dict[ir.Kind, str] = {"srv": "a service", "action": "an action"}
-        for kind, what in others.items():
+        for kind, noun in others.items():
             other = target._replace(kind=kind)
             if other in self._interfaces or (self._hints >= 0 and self._library.source(other)):
-                return f"`{target.name}` is {what}; only messages can be the type of a field"
+                return f"`{target.name}` is {noun}; only messages can be the type of a field"
         return (
             (None if qualified else self._elsewhere(target.name))
             or self._misnamed(target)
@@ -457,7 +472,7 @@ class _Unknown:
         )
 
     def _misnamed(self, target: ir.TypeName) -> str | None:
-        """Return a hint at a file whose name is this one but for its capitals."""
+        """Return a hint at a file whose name differs only in its capitals."""
         for name in sorted(self._messages.get(target.package, ())):
             if name.lower() == target.name.lower() and not names.is_message_name(name):
                 return f"rename `{name}.msg` to `{target.name}.msg`"
@@ -467,27 +482,29 @@ class _Unknown:
         if self._hints < 0:
             return None
         own = filter(names.is_message_name, self._messages.get(target.package, ()))
-        known = {*own, *self._library.names(target.package), *_PRIMITIVES}
-        return did_you_mean(target.name, known)
+        candidates = {*own, *self._library.names(target.package), *_PRIMITIVES}
+        return did_you_mean(target.name, candidates)
 
     def _elsewhere(self, name: str) -> str | None:
         """Return a hint at a basic type, or at a package that has a message of just this name."""
         if self._hints < 0:
             return None
         library = self._library
-        packages = sorted(library.packages(), key=lambda one: (one != "std_msgs", one))
-        found = next((one for one in packages if name in library.names(one)), None)
+        packages = sorted(library.packages(), key=lambda package: (package != "std_msgs", package))
+        package = next(
+            (candidate for candidate in packages if name in library.names(candidate)), None
+        )
         if name.lower() in _PRIMITIVES and name.lower() != name:
-            other = f", or the message `{found}/{name}`" if found else ""
+            other = f", or the message `{package}/{name}`" if package else ""
             return f"did you mean `{name.lower()}`{other}?"
-        return f"did you mean `{found}/{name}`?" if found else lower_types.type_hint(name)
+        return f"did you mean `{package}/{name}`?" if package else lower_types.type_hint(name)
 
 
 def _missing(target: ir.TypeName, library: Library) -> str:
     """Return the hint for a name that is like none of its package."""
     package, name = target.package, target.name
-    known, distro = set(library.names(package)), library.distro
-    if known and known == set(catalog.names(package, distro)):
+    messages, distro = set(library.names(package)), library.distro
+    if messages and messages == set(catalog.names(package, distro)):
         return (
             f"the built-in `{package}` is that of ROS 2 {distro.title}, which has no `{name}`; "
             f"if yours does, {including('DIR')} with its sources, or source your ROS 2"

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 def after_optional(
     line: tree.Line, source: Source, distro: Distro, report: Report, *, is_second: bool
 ) -> tree.Line:
-    """Return what follows `@optional` in a line that begins with it; report what is wrong with it.
+    """Return the rest of a line that begins with `@optional`; report problems with it.
 
-    `is_second` is whether the definition to come has one already. Nothing follows another one.
+    `is_second`: the definition has another one before. After a second one the rest is empty.
     """
     rest = line.after_optional or line
     report.add(_problem(_span(line, source), distro, is_second=is_second))
@@ -45,12 +45,12 @@ def _span(line: tree.Line, source: Source) -> Span:
 
 def _problem(span: Span, distro: Distro, *, is_second: bool) -> Diagnostic:
     if not distro.reads_optional:
-        found = codes.OPTIONAL_NEEDS_LYRICAL.at(
+        diagnostic = codes.OPTIONAL_NEEDS_LYRICAL.at(
             span,
             f"ROS 2 {distro.title} does not know `@optional`, which came with Lyrical",
             hint="leave it out; where it is known (`--distro lyrical`), it has no effect",
         )
-        return msgspec.structs.replace(found, edits=(_removal(span),))
+        return msgspec.structs.replace(diagnostic, edits=(_removal(span),))
     if is_second:
         message = "a definition can have `@optional` only once"
         return codes.REPEATED_OPTIONAL.at(span, message, hint="leave it out here")
@@ -62,7 +62,7 @@ def _problem(span: Span, distro: Distro, *, is_second: bool) -> Diagnostic:
 
 
 def _removal(span: Span) -> Edit:
-    """Return the edit that leaves it out, with the blanks after it."""
+    """Return the edit that removes it, with the whitespace after it."""
     rest = span.source.text[span.end :]
     blanks = len(rest) - len(rest.lstrip(" \t"))
     return Edit(Span(span.source, span.start, span.end + blanks), "")
@@ -74,7 +74,7 @@ Lines: TypeAlias = tuple[tree.Line, ...]
 def lower_section(
     file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
 ) -> ir.Message:
-    """Return the message that a section's lines define; reports what is wrong in them."""
+    """Return the message that a section's lines define; reports their problems."""
     return _Section(file, lines, name, report, distro).lower()
 
 
@@ -88,7 +88,7 @@ class _Element(msgspec.Struct, frozen=True):
 
 
 class _Section:
-    """Lowers one section; holds what its steps share."""
+    """Lowers one section; holds the state that its steps share."""
 
     def __init__(
         self, file: tree.File, lines: Lines, name: ir.TypeName, report: Report, distro: Distro
@@ -164,16 +164,16 @@ class _Section:
         return after_optional(line, self.file.source, self.distro, self.report, is_second=is_second)
 
     def _condense(self, texts: list[str], lines: list[tree.Line], *, has_unit: bool) -> Comment:
-        """Return an element's comment; `has_unit` is whether rosidl writes its unit anywhere."""
+        """Return an element's comment; `has_unit`: rosidl writes its unit somewhere."""
         comment = condense(texts)
-        found = problem(comment if has_unit else msgspec.structs.replace(comment, unit=None))
-        if found is not None:
-            span = self._find(found.text, lines)
-            self.report.add(found.code.at(span, found.message, hint=found.hint))
+        defect = problem(comment if has_unit else msgspec.structs.replace(comment, unit=None))
+        if defect is not None:
+            span = self._find(defect.text, lines)
+            self.report.add(defect.code.at(span, defect.message, hint=defect.hint))
         return comment
 
     def _find(self, text: str, lines: list[tree.Line]) -> Span:
-        """Return where `text` stands in the comments of these lines, or the first of them."""
+        """Return the range of `text` in the comments of these lines, or the first comment."""
         line, at = next(
             ((line, at) for line in lines if (at := line.comment.find(text)) >= 0), (lines[0], 0)
         )
@@ -182,23 +182,23 @@ class _Section:
 
     def _broken(self, line: tree.Line, body: tree.Broken) -> None:
         span = self.file.span(line, body.piece)
-        found = body.code.at(span, body.message, hint=body.hint)
-        self.report.add(msgspec.structs.replace(found, edits=self._edits(line, body, span)))
+        diagnostic = body.code.at(span, body.message, hint=body.hint)
+        self.report.add(msgspec.structs.replace(diagnostic, edits=self._edits(line, body, span)))
 
     def _edits(self, line: tree.Line, body: tree.Broken, span: Span) -> tuple[Edit, ...]:
-        """Return the edit that makes a broken line what it was meant to be, if that is sure."""
+        """Return the edit that repairs a broken line, if its intention is sure."""
         if body.code is codes.INDENTED_DEFINITION:
             return (Edit(span, ""),)
         if not _is_dashes(line) or line.comment:
             return ()
-        lines = [one for section in self.file.sections for one in section.lines]
+        lines = [other for section in self.file.sections for other in section.lines]
         count = len(self.file.separators) + sum(map(_is_dashes, lines))
         if count != ir.KINDS.index(self.name.kind):
             return ()
         return (Edit(Span(span.source, line.start, line.start + len(line.code)), "---"),)
 
     def _warn_hash(self, line: tree.Line, text: str) -> None:
-        """Warn when a comment begins between quotes that the writer saw as a pair."""
+        """Warn when a comment begins between two quotes."""
         opened = [quote for quote in "\"'" if text.count(quote) % 2 and quote in line.comment]
         if opened:
             at = line.start + len(line.code)
@@ -265,11 +265,11 @@ class _Section:
                 )
             )
             return None
-        found = default(type_, piece.text)
-        if isinstance(found, Fault):
-            self._add_value(line, piece, found)
+        lowered = default(type_, piece.text)
+        if isinstance(lowered, Fault):
+            self._add_value(line, piece, lowered)
             return None
-        return found
+        return lowered
 
     def _constant(self, line: tree.Line, body: tree.Constant, about: Comment) -> ir.Constant | None:
         wrong = lower_types.constant_name(body.name.text, self.file.span(line, body.name))
@@ -316,7 +316,7 @@ def _head_text(line: tree.Line) -> str:
 
 
 def _comment_text(line: tree.Line) -> str:
-    # only the comments at the head of a section keep the blanks at their ends
+    # only the comments at the head of a section keep their trailing whitespace
     return line.comment.replace("\t", " ").rstrip().lstrip("#")
 
 
@@ -331,7 +331,7 @@ _NUMBERS = ("no", "one", "two")
 
 
 def lower(
-    file: tree.File | idl.File, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
+    file: tree.File | idl.IdlFile, name: ir.TypeName, report: Report, distro: Distro = DEFAULT
 ) -> ir.Interface:
     """Return the interface that a file defines for a distribution; missing sections are empty.
 
@@ -341,8 +341,8 @@ def lower(
     if not isinstance(file, tree.File):
         from idlc.model.lower_idl import lower_idl  # only recordings hold IDL
 
-        wanted = [name._replace(name=name.name + suffix) for suffix in suffixes]
-        return _assembled(name, lower_idl(file, wanted, report), file.source, report)
+        structures = [name._replace(name=name.name + suffix) for suffix in suffixes]
+        return _assembled(name, lower_idl(file, structures, report), file.source, report)
     _check_reading(file, report)
     _check_separators(file, name.kind, len(suffixes), report)
     empty = tree.Section(len(file.source.text), ())
@@ -357,7 +357,7 @@ def lower(
 def _assembled(
     name: ir.TypeName, parts: list[ir.Message], source: Source, report: Report
 ) -> ir.Interface:
-    """Return the interface that sections are."""
+    """Return the interface that consists of these sections."""
     parts = _without_moved_constants(parts, report)
     if name.kind == "msg":
         return parts[0]
@@ -370,12 +370,12 @@ def _assembled(
 def _check_reading(file: tree.File, report: Report) -> None:
     source = file.source
     if source.text.startswith(tree.BYTE_ORDER_MARK):
-        found = codes.BYTE_ORDER_MARK.at(
+        diagnostic = codes.BYTE_ORDER_MARK.at(
             Span(source, 0, 1),
             "the file begins with a byte order mark",
             hint="save it as UTF-8 without a byte order mark",
         )
-        report.add(msgspec.structs.replace(found, edits=(Edit(Span(source, 0, 1), ""),)))
+        report.add(msgspec.structs.replace(diagnostic, edits=(Edit(Span(source, 0, 1), ""),)))
     for section in file.sections:
         for line in section.lines:
             if line.newline and line.newline not in ("\n", "\r\n", "\r"):
@@ -413,9 +413,9 @@ def _check_separators(file: tree.File, kind: ir.Kind, expected: int, report: Rep
 
 
 def _has_near_separator(file: tree.File, expected: int) -> bool:
-    """Return whether some line was meant as a separator and is reported as such.
+    """Return whether some line resembles a separator and is reported as such.
 
-    What comes after the `expected` sections is not looked at any more.
+    Lines after the `expected` sections are ignored.
     """
     if file.source.text.startswith(tree.BYTE_ORDER_MARK + "-"):
         return True

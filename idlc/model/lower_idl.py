@@ -1,7 +1,7 @@
-"""IDL's syntax → IR: the same meaning as that of the interface file that the .idl was made of.
+"""IDL's syntax → IR: the same meaning as the interface file from which the .idl was made.
 
-What the adapter loses on the way stays lost: whether a number was a `char`, the units of
-constants, and how a text was written.
+Some facts are lost in the adapter: whether a number was a `char`, the units of constants, and the
+spelling of a text.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from idlc.model import ir, lower_types, lower_values, names
 from idlc.model.lower_types import STRINGS, Fault, as_parsed, positive
 from idlc.model.lower_values import MAX_ELEMENTS
 
-#: What ROS 2's adapter annotates with.
+#: The annotations that ROS 2's adapter writes.
 ANNOTATIONS = frozenset({"verbatim", "default", "unit", "optional"})
-#: What the adapter writes between the lines of a comment.
+#: The literal that the adapter writes between the lines of a comment.
 _LINE_END = '"\\n"'
 
 
 def parameter(annotations: Iterable[idl.Annotation], name: str, key: str) -> idl.Value | None:
     """Return a parameter of the first annotation of a name, or `None`."""
-    found = (one.parameters for one in annotations if one.name.text == name)
-    return next(found, {}).get(key)
+    matches = (annotation.parameters for annotation in annotations if annotation.name.text == name)
+    return next(matches, {}).get(key)
 
 
 def comment(annotations: Iterable[idl.Annotation]) -> tuple[str, ...]:
@@ -46,13 +46,13 @@ def comment(annotations: Iterable[idl.Annotation]) -> tuple[str, ...]:
 
 
 def unit(annotations: Iterable[idl.Annotation]) -> str | None:
-    """Return the unit that `@unit` says."""
+    """Return the unit in `@unit`."""
     value = parameter(annotations, "unit", "value")
     return None if value is None else text(value)
 
 
 def text(value: idl.Value) -> str:
-    """Return the texts of a value as one; a number's as it stands."""
+    """Return the texts of a value as one; a number as written."""
     return "".join(map(_inside, value.pieces)) if value.is_text else value.pieces[0].text
 
 
@@ -64,16 +64,16 @@ def _inside(piece: Piece) -> str:
 
 
 def scalar(type_: ir.Primitive | ir.String, value: idl.Value) -> ir.Scalar | Fault:
-    """Return the value of a constant, or what is wrong with it."""
-    found = default(type_, value)
-    if isinstance(found, Fault):
-        return found
-    assert not isinstance(found.value, tuple)
-    return found.value
+    """Return the value of a constant, or its fault."""
+    lowered = default(type_, value)
+    if isinstance(lowered, Fault):
+        return lowered
+    assert not isinstance(lowered.value, tuple)
+    return lowered.value
 
 
 def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
-    """Return the value of `@default`, or what is wrong with it."""
+    """Return the value of `@default`, or its fault."""
     if isinstance(type_, (ir.Array, ir.Sequence)):
         return _elements(type_, value)
     if isinstance(type_, ir.String):
@@ -83,8 +83,8 @@ def default(type_: ir.FieldType, value: idl.Value) -> ir.Default | Fault:
         return ir.Default(words, words)
     if value.is_text:
         return _wrong(value, type_)
-    found = lower_values.default(type_, value.pieces[0].text)
-    return found.moved(value.whole.start) if isinstance(found, Fault) else found
+    lowered = lower_values.default(type_, value.pieces[0].text)
+    return lowered.moved(value.whole.start) if isinstance(lowered, Fault) else lowered
 
 
 def _elements(type_: ir.Array | ir.Sequence, value: idl.Value) -> ir.Default | Fault:
@@ -95,13 +95,13 @@ def _elements(type_: ir.Array | ir.Sequence, value: idl.Value) -> ir.Default | F
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # unknown escapes
-            found = ast.literal_eval(words)
+            values = ast.literal_eval(words)
     except (ValueError, SyntaxError, MemoryError, RecursionError):
         return _wrong(value, type_)
-    if not isinstance(found, tuple) or not all(_fits(type_.element, one) for one in found):
+    if not isinstance(values, tuple) or not all(_fits(type_.element, item) for item in values):
         return _wrong(value, type_)
-    wrong = lower_values.wrong_length(type_, len(found), value.whole.text)
-    return wrong.moved(value.whole.start) if wrong else ir.Default(found, words)
+    wrong = lower_values.wrong_length(type_, len(values), value.whole.text)
+    return wrong.moved(value.whole.start) if wrong else ir.Default(values, words)
 
 
 def _fits(type_: ir.Element, value: object) -> bool:
@@ -127,65 +127,65 @@ def _wrong(value: idl.Value, type_: ir.FieldType) -> Fault:
     return Fault(codes.BAD_VALUE, message, value.whole.start, value.whole.end)
 
 
-#: What IDL calls primitives; of two that it calls alike, the one that says what it is.
+#: Primitives by their name in IDL; the later of two with one name, which is the plainer one.
 _PRIMITIVES = {info.idl: ir.Primitive(name) for name, info in ir.PRIMITIVES.items()}
 _CONSTANTS = "_Constants"
 
 
-def lower_idl(file: idl.File, wanted: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
-    """Return the wanted structures of a file, which must hold these and no others."""
-    return _Lowering(file, report).structures(wanted)
+def lower_idl(file: idl.IdlFile, names: Sequence[ir.TypeName], report: Report) -> list[ir.Message]:
+    """Return the structures of these names from a file, which must hold no others."""
+    return _Lowering(file, report).structures(names)
 
 
 class _Type(NamedTuple):
-    """A type and what names it, for problems with it."""
+    """A type and its name in the text, for problems with it."""
 
     type: ir.FieldType
     piece: Piece
 
 
 class _Lowering:
-    """Lowers one file; holds what its steps share."""
+    """Lowers one file; holds the state that its steps share."""
 
-    def __init__(self, file: idl.File, report: Report) -> None:
+    def __init__(self, file: idl.IdlFile, report: Report) -> None:
         self.file = file
         self.report = report
         self.typedefs: dict[str, _Type] = {}
         self.strange = False
 
-    def structures(self, wanted: Sequence[ir.TypeName]) -> list[ir.Message]:
+    def structures(self, names: Sequence[ir.TypeName]) -> list[ir.Message]:
         if self.file.broken is not None:
-            what = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
-            self._foreign(self.file.broken, what)
-            return [ir.Message(name=name, source=self.file.source) for name in wanted]
-        self._check_modules(wanted[0])
+            word = f"`{self.file.broken.text}`" if self.file.broken.text else "this end of the text"
+            self._foreign(self.file.broken, word)
+            return [ir.Message(name=name, source=self.file.source) for name in names]
+        self._check_modules(names[0])
         constants: dict[str, list[ir.Constant]] = {}
-        found: dict[str, idl.Structure] = {}
-        known = {name.name for name in wanted}
+        structures: dict[str, idl.Structure] = {}
+        expected = {name.name for name in names}
         for part in self.file.parts:
             name = part.name.text.removesuffix(_CONSTANTS)
             if isinstance(part, idl.Typedef):
                 self._typedef(part)
-            elif name not in known:
-                self._foreign(part.name, f"`{part.name.text}` among the parts of `{wanted[0]}`")
+            elif name not in expected:
+                self._foreign(part.name, f"`{part.name.text}` among the parts of `{names[0]}`")
             elif isinstance(part, idl.Constants):
                 lowered = map(self._constant, part.constants)
-                constants.setdefault(name, []).extend(one for one in lowered if one)
-            elif found.setdefault(name, part) is not part:
+                constants.setdefault(name, []).extend(constant for constant in lowered if constant)
+            elif structures.setdefault(name, part) is not part:
                 self._foreign(part.name, f"a second `{name}`")
         if not self.strange:
-            for name in known - found.keys():
+            for name in expected - structures.keys():
                 self._foreign(self.file.kind, f"a module without `{name}`")
-        return [self._structure(name, found.get(name.name), constants) for name in wanted]
+        return [self._structure(name, structures.get(name.name), constants) for name in names]
 
     def _check_modules(self, name: ir.TypeName) -> None:
         for piece, expected in ((self.file.package, name.package), (self.file.kind, name.kind)):
             if piece.text != expected:
                 self._foreign(piece, f"module `{piece.text}` for `{name}`")
 
-    def _foreign(self, piece: Piece, what: str) -> None:
+    def _foreign(self, piece: Piece, subject: str) -> None:
         self.strange = True
-        message = f"{what} is nothing that ROS 2 writes when it makes IDL of a .msg file"
+        message = f"{subject} is nothing that ROS 2 writes when it makes IDL of a .msg file"
         hint = f"idlc reads no other IDL; {including('DIR')} with the package's .msg files"
         self.report.add(codes.FOREIGN_IDL.at(self.file.span(piece), message, hint=hint))
 
@@ -196,10 +196,10 @@ class _Lowering:
     def _structure(
         self,
         name: ir.TypeName,
-        found: idl.Structure | None,
+        structure: idl.Structure | None,
         constants: dict[str, list[ir.Constant]],
     ) -> ir.Message:
-        fields = [self._field(member) for member in found.members] if found else []
+        fields = [self._field(member) for member in structure.members] if structure else []
         if [(field.name, field.type) for field in fields] == [
             (ir.DUMMY_FIELD, ir.Primitive("uint8"))
         ]:
@@ -208,7 +208,7 @@ class _Lowering:
             name=name,
             fields=tuple(fields),
             constants=tuple(constants.get(name.name, ())),
-            comment=comment(found.annotations) if found else (),
+            comment=comment(structure.annotations) if structure else (),
             source=self.file.source,
         )
 
@@ -272,15 +272,17 @@ class _Lowering:
             default=self._default(type_, member.annotations),
             comment=comment(member.annotations),
             unit=unit(member.annotations),
-            optional=any(f"@{one.name.text}" == OPTIONAL for one in member.annotations),
+            optional=any(
+                f"@{annotation.name.text}" == OPTIONAL for annotation in member.annotations
+            ),
             name_span=span,
             type_span=self.file.span(piece),
         )
 
     def _check_annotations(self, annotations: Sequence[idl.Annotation]) -> None:
-        for one in annotations:
-            if one.name.text not in ANNOTATIONS:
-                self._foreign(one.name, f"the annotation `@{one.name.text}`")
+        for annotation in annotations:
+            if annotation.name.text not in ANNOTATIONS:
+                self._foreign(annotation.name, f"the annotation `@{annotation.name.text}`")
 
     def _default(
         self, type_: ir.FieldType, annotations: Sequence[idl.Annotation]
@@ -292,13 +294,13 @@ class _Lowering:
         if isinstance(element, ir.Ref):
             self._foreign(value.whole, "a default for a message")
             return None
-        found = default(type_, value)
-        if isinstance(found, Fault):
-            self._fault(found)
+        lowered = default(type_, value)
+        if isinstance(lowered, Fault):
+            self._fault(lowered)
             return None
-        return found
+        return lowered
 
-    def _constant(self, constant: idl.Constant) -> ir.Constant | None:
+    def _constant(self, constant: idl.IdlConstant) -> ir.Constant | None:
         self._check_annotations(constant.annotations)
         span = self.file.span(constant.name)
         wrong = lower_types.constant_name(constant.name.text, span)

@@ -1,6 +1,6 @@
-"""Mistakes of people who think of another language, and how interface files have it.
+"""Types and names: their meaning, and hints for mistakes of people who think of another language.
 
-Only lines and names that are wrong anyway are looked at: what is right is not decided here.
+The hints are for lines and names that are wrong anyway; they never decide what is right.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from idlc.model import ir, names
 
 
 class Fault(msgspec.Struct, frozen=True):
-    """What is wrong with a value; `start` and `end` count from the beginning of its text."""
+    """A problem of a value; `start` and `end` count from the beginning of its text."""
 
     code: codes.Code
     message: str
@@ -32,7 +32,7 @@ class Fault(msgspec.Struct, frozen=True):
         return msgspec.structs.replace(self, start=self.start + offset, end=self.end + offset)
 
 
-#: What other languages call a type, in lower case, and its name here.
+#: Names of types in other languages, in lower case, and their names in interface files.
 _TYPES = {
     "boolean": "bool",
     "double": "float64",
@@ -78,7 +78,7 @@ _NUMBERS = ("boolean", "double", "float", "int", "integer", "uint")
 _ANY = ("any", "auto", "var", "variant")
 _LISTS = ("array", "deque", "list", "sequence", "set", "tuple", "vector")
 _MAPS = ("dict", "dictionary", "hashmap", "map", "object", "struct", "union", "unordered_map")
-#: What other languages put before a type.
+#: Words that other languages put before a type.
 _QUALIFIERS = ("const", "constexpr", "final", "optional", "required", "static")
 
 _COMMENTS = ("//", "/*")
@@ -117,7 +117,7 @@ def ros_spelling(name: str) -> str | None:
 
 
 def is_comment(text: str) -> bool:
-    """Return whether a text begins with what begins a comment in other languages."""
+    """Return whether a text begins as a comment does in other languages."""
     return text.startswith(_COMMENTS)
 
 
@@ -127,7 +127,7 @@ def has_comment(value: str) -> bool:
 
 
 def find_slip(text: str, body: tree.Body, kind: ir.Kind) -> Fault | None:
-    """Return what is wrong with a line as a whole, so that nothing else need be said about it."""
+    """Return the fault of a line as a whole, which makes all other problems of it needless."""
     if is_comment(text):
         message = f"`{text[:2]}` does not begin a comment"
         return Fault(codes.MALFORMED_TYPE, message, 0, 2, COMMENT_HINT)
@@ -156,17 +156,17 @@ def _qualified(text: str, body: tree.Field | tree.Constant) -> Fault | None:
 
 
 def _of_c(text: str, body: tree.Field | tree.Constant) -> Fault | None:
-    """Return what is wrong with a type of several words, such as `unsigned int`."""
+    """Return the fault of a type of several words, such as `unsigned int`."""
     if body.type.whole.text not in _C_WORDS:
         return None
     words = list(takewhile(lambda word: word.group() in _C_WORDS, re.finditer(r"\S+", text)))
     if len(words) == 1 or words[0].group() == "char":
         return None
     whole = " ".join(word.group() for word in words)
-    known = whole.removesuffix(" int").removeprefix("signed ")
-    meant = _C_TYPES.get(known) or _TYPES.get(known) or "int32"
+    c_type = whole.removesuffix(" int").removeprefix("signed ")
+    primitive = _C_TYPES.get(c_type) or _TYPES.get(c_type) or "int32"
     message = f"unknown type `{whole}`"
-    return Fault(codes.UNKNOWN_TYPE, message, 0, words[-1].end(), f"did you mean `{meant}`?")
+    return Fault(codes.UNKNOWN_TYPE, message, 0, words[-1].end(), f"did you mean `{primitive}`?")
 
 
 def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
@@ -175,8 +175,8 @@ def _other_shape(body: tree.Field | tree.Constant) -> Fault | None:
         return _constant(body)
     if "," in name.text:
         listed = f"{name.text} {body.default.text if body.default else ''}".split(",")
-        found = [f"`{type_} {one.strip()}`" for one in listed if one.strip()]
-        hint = f"write each on a line of its own: {', '.join(found[:4])}"
+        definitions = [f"`{type_} {part.strip()}`" for part in listed if part.strip()]
+        hint = f"write each on a line of its own: {', '.join(definitions[:4])}"
         return _name_fault(name, "a line defines one field", hint)
     plain, bracket, size = name.text.partition("[")
     if bracket and size.endswith("]"):
@@ -274,8 +274,10 @@ def _element(type_: tree.Type, package: str) -> ir.Element | Fault:
     if name in ir.PRIMITIVES:
         return ir.Primitive(name)
     if name in ROS1_TYPES:
-        known = "builtin_interfaces/" + name.capitalize()
-        return _fault(codes.ROS1_TYPE, type_.name, f"`{name}` is a ROS 1 type", f"write `{known}`")
+        ros2_type = "builtin_interfaces/" + name.capitalize()
+        return _fault(
+            codes.ROS1_TYPE, type_.name, f"`{name}` is a ROS 1 type", f"write `{ros2_type}`"
+        )
     return _reference(type_.name, package)
 
 
@@ -306,22 +308,22 @@ def _bad_name(piece: tree.Piece, *, qualified: bool) -> Fault:
         if dotted := ros_spelling(name):
             message = f"`{name}` cannot be a type name"
             return _fault(codes.INVALID_TYPE_NAME, piece, message, f"write `{dotted}`")
-        if meant := type_hint(name):
-            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", meant)
+        if spelling := type_hint(name):
+            return _fault(codes.UNKNOWN_TYPE, piece, f"unknown type `{name}`", spelling)
     like = names.message_name_like(name.removesuffix(".msg"))
     hint = f"write `{like}`" if names.is_message_name(like) else names.MESSAGE_HINT
     return _fault(codes.INVALID_TYPE_NAME, piece, f"`{name}` cannot be a type name", hint)
 
 
-def positive(piece: tree.Piece, what: str) -> int | Fault:
-    """Return the size or bound that a piece is."""
+def positive(piece: tree.Piece, subject: str) -> int | Fault:
+    """Return a piece as a size or bound; `subject` begins the message if it is none."""
     try:
         value = int(piece.text)
     except ValueError:
         value = 0
     if value > 0:
         return value
-    message = f"{what} is not a positive integer"
+    message = f"{subject} is not a positive integer"
     return _fault(codes.BAD_BOUND, piece, message, "write a decimal number above 0")
 
 

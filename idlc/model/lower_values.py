@@ -1,6 +1,6 @@
-"""Value text + type → the value, or what is wrong with the text (language 3 and 4).
+"""Value text + type → the value, or the fault of the text (language 3 and 4).
 
-Lives in the model, not in the syntax, because only the type says what a literal means.
+Part of the model, not of the syntax, because the meaning of a literal depends on its type.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ MAX_ELEMENTS = 200_000
 
 def elements(inside: str) -> list[tuple[str, int]] | Fault:
     """Split at commas; each element with its offset."""
-    found: list[tuple[str, int]] = []
+    pieces: list[tuple[str, int]] = []
     at = 0
     for part in inside.split(",") if inside else []:
         stripped = part.strip()
-        found.append((stripped, at + len(part) - len(part.lstrip())))
+        pieces.append((stripped, at + len(part) - len(part.lstrip())))
         if not stripped:
             end = at + max(len(part), 1)
             return Fault(codes.ARRAY_VALUE, "an element is missing", at, end, "remove the comma")
         at += len(part) + 1
-    return found
+    return pieces
 
 
 def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
     """Split as rosidl's scanner does, wrong turns included (language 4)."""
-    found: list[tuple[str, int]] = []
+    pieces: list[tuple[str, int]] = []
     ends = {quote: _Ends(inside, quote) for quote in QUOTES}
     at = 0
-    while at < len(inside) and len(found) <= MAX_ELEMENTS:
+    while at < len(inside) and len(pieces) <= MAX_ELEMENTS:
         at = _after_blanks(inside, at)
         if at == len(inside) or inside[at] == ",":
             return Fault(codes.ARRAY_VALUE, "an element is missing", at, at + 1, "remove the comma")
@@ -58,59 +58,59 @@ def string_elements(inside: str) -> list[tuple[str, int]] | Fault:
                     )
                     return Fault(codes.BAD_VALUE, message, at, len(inside), hint)
                 element = inside[at + 1 : at + end + 1].replace(f"\\{quote}", quote)
-                # upstream strips every element, also what stood in quotes
-                found.append((element.strip(), at))
+                # upstream strips every element, quoted ones included
+                pieces.append((element.strip(), at))
                 at += end + 2
         if not quoted:
             comma = inside.find(",", at)
             end = len(inside) if comma < 0 else comma
-            found.append((inside[at:end].strip(), at))
+            pieces.append((inside[at:end].strip(), at))
             at = end
         at = _after_blanks(inside, at)
         at += inside.startswith(",", at)
-    return found
+    return pieces
 
 
 def _after_blanks(text: str, at: int) -> int:
-    """Return the first place from `at` on where no blank stands."""
-    found = re.compile("[^ ]").search(text, at)  # compiled once, by re
-    return found.start() if found else len(text)
+    """Return the offset of the first character from `at` on that is no space."""
+    match = re.compile("[^ ]").search(text, at)  # compiled once, by re
+    return match.start() if match else len(text)
 
 
 class _Ends:
-    """rosidl's idea of where quoted texts end, without its quadratic search.
+    """The ends of quoted texts as rosidl finds them, without its quadratic search.
 
     Upstream goes from one escaped quote to the next, and counts from the last of them instead of
-    from the start, so that what follows may be looked at again and again.
+    from the start, so it may search the same text again and again.
     """
 
     def __init__(self, text: str, quote: str) -> None:
         self._text = text
         self._quote = quote
         #: place -> the closing quote, the place after the last escaped one, the place before that
-        self._known: dict[int, tuple[int, int, int]] = {}
+        self._ends: dict[int, tuple[int, int, int]] = {}
 
     def after(self, start: int) -> int:
         """Return the length of the text quoted at `start`; -1 if nothing ends it."""
         path = [start]
-        while path[-1] not in self._known:
-            here = path[-1]
-            at = self._text.find(self._quote, here + 1)
+        while path[-1] not in self._ends:
+            quote = path[-1]
+            at = self._text.find(self._quote, quote + 1)
             if at < 0 or self._text[at - 1] != "\\":
-                self._known[here] = (at, here, here)
+                self._ends[quote] = (at, quote, quote)
             else:
                 path.append(at + 1)
         following = path.pop()
-        for here in reversed(path):
-            end, last, before = self._known[following]
-            self._known[here] = (end, last, here if last == following else before)
-            following = here
-        end, last, before = self._known[start]
+        for quote in reversed(path):
+            end, last, before = self._ends[following]
+            self._ends[quote] = (end, last, quote if last == following else before)
+            following = quote
+        end, last, before = self._ends[start]
         return -1 if end < 0 else end - 1 - before
 
 
 FLOAT32_MAX = 3.402823466e38
-#: Characters from which on Python itself judges numbers: patterns take much memory for them.
+#: Longer texts are judged by Python's own conversion: patterns take much memory for them.
 LONG = 1000
 
 
@@ -307,7 +307,7 @@ def _too_many(text: str) -> Fault:
 
 
 def wrong_length(type_: ir.Array | ir.Sequence, count: int, text: str) -> Fault | None:
-    """Return what is wrong with a default of so many elements, or `None`."""
+    """Return the fault of a default with this number of elements, or `None`."""
     if isinstance(type_, ir.Array):
         expected, wrong = f"exactly {type_.size}", count != type_.size
     else:

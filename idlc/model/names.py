@@ -1,4 +1,4 @@
-"""Which names ROS 2 allows (language 2.2)."""
+"""The names that ROS 2 allows (language 2.2)."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ MESSAGE_HINT = "use letters and digits, a capital letter first"
 
 
 def is_package_name(name: str) -> bool:
-    """Return whether a package may be called so."""
+    """Return whether a package may have this name."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_field_name(name: str) -> bool:
-    """Return whether a field may be called so."""
+    """Return whether a field may have this name."""
     return _LOWER.fullmatch(name) is not None
 
 
 def is_constant_name(name: str) -> bool:
-    """Return whether a constant may be called so."""
+    """Return whether a constant may have this name."""
     return _UPPER.fullmatch(name) is not None
 
 
 def is_message_name(name: str) -> bool:
-    """Return whether a message may be called so; each derived suffix counts once, in this order."""
+    """Return whether a message may have this name; derived suffixes count once, in this order."""
     name = name.removeprefix("Sample_")
     for suffix in _MESSAGE_SUFFIXES:
         name = name.removesuffix(suffix)
@@ -64,16 +64,18 @@ def snake_case(name: str) -> str:
 _LOADED = frozenset(
     ("abc", "codecs", "encodings", "genericpath", "io", "ntpath", "os", "posixpath", "site", "stat")
 )
-#: What generated code, and the nodes and builds that use it, import beside the standard library.
+#: Imports of generated code, nodes and builds beside the standard library.
 _NEEDED = frozenset(("idlc", "numpy", "rclpy"))
 
 
 def why_not_package(name: str) -> str:
-    """Return why a package cannot be called so and imported, in words that follow its name."""
+    """Return the reason why a package cannot have this name, in words that follow the name."""
     if not is_package_name(name):
         like = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-        meant = f"; did you mean `{like}`?" if is_package_name(like) else ""
-        return f"is not a package name: lower-case letters, digits and single underscores{meant}"
+        suggestion = f"; did you mean `{like}`?" if is_package_name(like) else ""
+        return (
+            f"is not a package name: lower-case letters, digits and single underscores{suggestion}"
+        )
     if keyword.iskeyword(name):
         return "is a keyword of Python and cannot be imported"
     if name in _LOADED or FrozenImporter.find_spec(name) or BuiltinImporter.find_spec(name):

@@ -43,7 +43,7 @@ METHODS = frozenset(
     | {"serialize_many", "to_arrow", "to_columns", "to_dict", "validate"}
 )
 
-#: Names that no local variable can have, or should.
+#: Names that no local variable should have.
 RESERVED = CODEC_NAMES | set(keyword.kwlist) | set(dir(builtins))
 
 
@@ -53,12 +53,12 @@ def modules(names: Iterable[ir.TypeName]) -> Modules:
     Names that rosidl would put into one module, such as FooBar and FOOBar, get one each.
     """
     taken: dict[tuple[ir.Kind, str], int] = {}
-    found: dict[ir.TypeName, ModuleName] = {}
+    named: dict[ir.TypeName, ModuleName] = {}
     for name in sorted(names):
         module = f"_{snake_case(name.name)}"
         number = taken[name.kind, module] = taken.get((name.kind, module), 0) + 1
-        found[name] = ModuleName(module if number == 1 else f"{module}_{number}")
-    return found
+        named[name] = ModuleName(module if number == 1 else f"{module}_{number}")
+    return named
 
 
 def codec_module(module: str) -> ModuleName:
@@ -67,7 +67,7 @@ def codec_module(module: str) -> ModuleName:
 
 
 def protocol_module(module: str) -> ModuleName:
-    """Return the module of what ROS 2 adds to the service or action of a module."""
+    """Return the module of the types that ROS 2 adds to the service or action of a module."""
     return ModuleName(f"{module}__protocol")
 
 
@@ -97,18 +97,18 @@ def slot(name: str) -> SlotName:
 
 
 class Locals:
-    """The local variables of one function: each name is given once."""
+    """The local variables of one function: each name is used once."""
 
     def __init__(self) -> None:
         self._taken: set[str] = set(RESERVED)
 
-    def new(self, wanted: str) -> LocalName:
-        """Return `wanted`, or a name like it that is free and shadows nothing."""
-        name = wanted
+    def new(self, base: str) -> LocalName:
+        """Return `base`, or a name like it that is free and shadows nothing."""
+        name = base
         count = 1
         while name in self._taken:
             count += 1
-            name = f"{wanted}_{count}"
+            name = f"{base}_{count}"
         self._taken.add(name)
         return LocalName(name)
 
@@ -121,9 +121,9 @@ class Locals:
         return self.new(name)
 
     def mark(self) -> frozenset[str]:
-        """Return what `reset` needs to forget all names given from now on."""
+        """Return a mark with which `reset` forgets all names used from now on."""
         return frozenset(self._taken)
 
     def reset(self, mark: frozenset[str]) -> None:
-        """Forget the names given since `mark`."""
+        """Forget the names used since `mark`."""
         self._taken = set(mark)

@@ -21,7 +21,7 @@ from idlc.recordings.types import BORROWED, NAMED
 if TYPE_CHECKING:
     import pyarrow as pa
 
-#: What stands in OUT for the name of a topic.
+#: The placeholder in OUT for the name of a topic.
 MARK = "{topic}"
 STDOUT = "-"
 
@@ -34,12 +34,12 @@ class UnknownFieldError(Exception):
         self.topic = topic
 
 
-#: Told how many messages of a topic are done.
+#: Called with a topic, the number of messages done, and of all.
 Progress = Callable[[str, int, int], None]
 
 
 class ColumnsOptions(NamedTuple):
-    """What `idlc columns` was asked to do; several recordings are read as one."""
+    """The arguments of `idlc columns`; several recordings are read as one."""
 
     recordings: tuple[str, ...]
     topics: tuple[str, ...] = ()
@@ -98,7 +98,7 @@ def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list
 
 @contextmanager
 def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
-    """Report what is wrong with a recording, or with what is wanted of it."""
+    """Report problems of a recording, or of the topics and fields that were selected."""
     try:
         yield
     except UnknownTopicError as error:
@@ -113,12 +113,12 @@ def _problems(options: ColumnsOptions, report: Report) -> Iterator[None]:
 
 @contextmanager
 def _warnings(report: Report) -> Iterator[None]:
-    """Report IDL652 and IDL654 for definitions that are not there, or of something else."""
-    with warnings.catch_warnings(record=True) as found:
+    """Report IDL652 and IDL654 for definitions that are missing, or have another hash."""
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
     missing: dict[str, list[str]] = {}
-    for message in (one.message for one in found):
+    for message in (warning.message for warning in caught):
         if isinstance(message, OtherDefinitionWarning):
             report.add(codes.RECORDED_HASH_DIFFERS.of("", str(message)))
         if isinstance(message, MissingDefinitionWarning):
@@ -129,11 +129,11 @@ def _warnings(report: Report) -> Iterator[None]:
 
 
 def _jobs(recording: Recording, options: ColumnsOptions, report: Report) -> Sequence[Job]:
-    """Return what there is to do; empty if it cannot be done."""
+    """Return a job for each topic; empty if one of them cannot be done."""
     names = tuple(dict.fromkeys(options.topics or recording))
     topics = []
     for name in names:
-        # what was not asked for by its name does not keep others from being written
+        # a topic that was not selected by name does not keep others from being written
         with nullcontext() if options.topics else _problems(options, report):
             topics.append(recording[name].between(options.start, options.end))
     jobs = [_job(topic, options, len(names) > 1) for topic in topics]
@@ -169,10 +169,13 @@ def _file_name(topic: str) -> str:
 
 
 def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | None:
-    """Return why there is no place for columns, and a hint."""
+    """Return why columns cannot be written, and a hint."""
     if any(not job.style for job in jobs):
-        known = ", ".join(export.STYLES)
-        return f"`{options.out}` does not say which format is meant", f"--format, or one of {known}"
+        suffixes = ", ".join(export.STYLES)
+        return (
+            f"`{options.out}` does not say which format is meant",
+            f"--format, or one of {suffixes}",
+        )
     paths = [job.path for job in jobs]
     twice = next((path for path, count in Counter(paths).items() if count > 1), None)
     if twice is not None:
@@ -189,9 +192,9 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
     """Write the columns of one topic."""
     name = job.topic.topic.name
     flat = job.style == "csv" or not options.nested
-    wanted = {"fields": options.fields, "flat": flat, "datetimes": options.datetimes}
+    reading = {"fields": options.fields, "flat": flat, "datetimes": options.datetimes}
     try:
-        reader = job.topic.to_reader(**wanted)
+        reader = job.topic.to_reader(**reading)
     except ValueError as error:
         raise UnknownFieldError(str(error), name) from None
     counted = _Counted(reader, name, job.topic.topic.count, progress)
@@ -204,7 +207,7 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
 
 
 class _Counted:
-    """Counts rows while they pass, and tells of it."""
+    """Counts rows while they pass, and reports progress."""
 
     def __init__(self, reader: Any, topic: str, total: int, progress: Progress) -> None:
         self._reader = reader

@@ -1,7 +1,7 @@
-"""What a recording says of its types → interface texts by name.
+"""The type definitions in a recording → interface texts by name.
 
-The texts are anybody's: a name that ROS 2 would not allow is no name, and what is said twice
-counts once.
+The texts are not trusted: names that ROS 2 does not allow are ignored, and of repeated
+definitions the first counts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from idlc.project.files import MAX_LINES
 from idlc.recordings.containers.container import Schema, Topic
 
 IDL = "ros2idl"
-#: `unknown` is what a recorder says of a service that refers to no message.
+#: A recorder writes `unknown` for a service that refers to no message.
 ENCODINGS = ("ros2msg", IDL, "unknown", "")
 #: Characters of a definition with all that it refers to, and of one in IDL, each word of which
 #: takes memory; real ones stay below a tenth of it.
@@ -27,10 +27,10 @@ _DELIMITER = re.compile(
     r"^={80}[ \t]*\r?\n(MSG|IDL|SRV|ACTION):[ \t]*([^\s]*)[^\n]*(?:\n|\Z)", re.MULTILINE
 )
 _KINDS: dict[str, ir.Kind] = {"MSG": "msg", "IDL": "msg", "SRV": "srv", "ACTION": "action"}
-#: A field whose type is written as pkg/msg/Name, as some recorders do; and what has no effect and
-#: only newer distributions read.
+#: A field whose type is written as pkg/msg/Name, as some recorders do; and an annotation without
+#: effect that only newer distributions read.
 _ODDITIES = re.compile(r"^(?:@optional[ \t]*)?(?:(\w+/)msg/(?=\w))?", re.MULTILINE)
-#: What ROS 2 adds to the names of services and actions.
+#: Suffixes that ROS 2 adds to the names of services and actions.
 _DERIVED = re.compile(
     r"_((SendGoal|GetResult)_)?(Request|Response|Event)$|_(SendGoal|GetResult|FeedbackMessage)$"
     r"|_(Goal|Result|Feedback)$"
@@ -40,9 +40,9 @@ _DERIVED = re.compile(
 class Recorded(NamedTuple):
     """A topic, the interface that its messages are of, and all texts that came with it.
 
-    `name` may be derived from the `interface`; both are `None` for what is no type of ROS 2.
-    `recording` is how messages call the recording. Of what is defined twice the first counts, and
-    the others are `repeated`.
+    `name` may be derived from the `interface`; both are `None` for types that are not of ROS 2.
+    `recording` is the recording's name in reports. Of repeated definitions the first counts, and
+    the others are in `repeated`.
     """
 
     recording: str
@@ -53,27 +53,27 @@ class Recorded(NamedTuple):
     repeated: tuple[tuple[ir.TypeName, Source], ...] = ()
 
 
-#: What came with topics, by definition and interface.
-Known: TypeAlias = dict[
+#: The texts recorded with topics, by definition and interface.
+TextCache: TypeAlias = dict[
     tuple[Schema | None, ir.TypeName],
     tuple[dict[ir.TypeName, Source], tuple[tuple[ir.TypeName, Source], ...]],
 ]
 
 
-def recorded(topic: Topic, recording: str, known: Known | None = None) -> Recorded:
-    """Return what a recording, as it is called in messages, says of a topic.
+def recorded(topic: Topic, recording: str, cache: TextCache | None = None) -> Recorded:
+    """Return the texts that a recording, by its name in reports, has for a topic.
 
-    What is `known` of other topics of the recording is used again, and added to.
+    The `cache` has the texts of other topics of the recording, and is added to.
     """
     name = type_name(topic.type)
     if name is None:
         return Recorded(recording, topic, None, None, {})
     interface = interface_of(name)
     key = topic.schema, interface
-    known = {} if known is None else known
-    if key not in known:
-        known[key] = _texts(topic, interface, recording)
-    return Recorded(recording, topic, name, interface, *known[key])
+    cache = {} if cache is None else cache
+    if key not in cache:
+        cache[key] = _texts(topic, interface, recording)
+    return Recorded(recording, topic, name, interface, *cache[key])
 
 
 def _texts(
@@ -85,13 +85,13 @@ def _texts(
     """
     texts: dict[ir.TypeName, Source] = {}
     repeated = []
-    for one, extension, text in _definitions(topic, interface):
-        source = Source(f"{recording}: topic {topic.name}: {one}.{extension}", text, recording)
-        first = texts.setdefault(one, source)
+    for name, extension, text in _definitions(topic, interface):
+        source = Source(f"{recording}: topic {topic.name}: {name}.{extension}", text, recording)
+        first = texts.setdefault(name, source)
         if not first.text and source.is_idl:
-            texts[one] = source
+            texts[name] = source
         elif first.text != text and (text or not first.is_idl):
-            repeated.append((one, source))
+            repeated.append((name, source))
     return texts, tuple(repeated)
 
 
@@ -101,10 +101,10 @@ def type_name(text: str, kind: ir.Kind = "msg") -> ir.TypeName | None:
     word, slash, name = rest.rpartition("/")
     if slash and word not in ir.KINDS:
         return None
-    found = ir.TypeName(package, word if slash else kind, name)  # type: ignore[arg-type]
-    own = interface_of(found).name
+    parsed = ir.TypeName(package, word if slash else kind, name)  # type: ignore[arg-type]
+    own = interface_of(parsed).name
     is_sound = names.is_package_name(package) and names.is_message_name(own)
-    return found if is_sound else None
+    return parsed if is_sound else None
 
 
 def interface_of(name: ir.TypeName) -> ir.TypeName:

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 def storable(schema: pa.Schema) -> pa.Schema:
-    """Return a schema as Parquet can hold it, which knows no messages without fields.
+    """Return a schema as Parquet can hold it, which has no structs without fields.
 
-    They get the one that ROS 2 gives them for C++, for the same reason.
+    They get the field that ROS 2 adds for C++, for the same reason.
     """
-    return _with_types(schema, lambda kind: _each(kind, _filled_type))
+    return _with_types(schema, lambda kind: _converted(kind, _filled_type))
 
 
 def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
@@ -40,25 +40,25 @@ def stored(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 
 
-def _with_types(schema: pa.Schema, made: Any) -> pa.Schema:
+def _with_types(schema: pa.Schema, convert: Any) -> pa.Schema:
     import pyarrow as pa
 
-    fields = [field.with_type(made(field.type)) for field in schema]
+    fields = [field.with_type(convert(field.type)) for field in schema]
     return pa.schema(fields, schema.metadata)
 
 
-def _each(kind: pa.DataType, made: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
-    """Return a type with another in the place of each in it, and of itself, inner ones first."""
+def _converted(kind: pa.DataType, convert: Callable[[pa.DataType], pa.DataType]) -> pa.DataType:
+    """Return a type with each type in it converted, inner ones first, and then itself."""
     import pyarrow as pa
     from pyarrow import types
 
     if types.is_struct(kind):
-        kind = pa.struct([one.with_type(_each(one.type, made)) for one in kind])
+        kind = pa.struct([field.with_type(_converted(field.type, convert)) for field in kind])
     elif types.is_large_list(kind):
-        kind = pa.large_list(_each(kind.value_type, made))
+        kind = pa.large_list(_converted(kind.value_type, convert))
     elif types.is_fixed_size_list(kind):
-        kind = pa.list_(_each(kind.value_type, made), kind.list_size)
-    return made(kind)
+        kind = pa.list_(_converted(kind.value_type, convert), kind.list_size)
+    return convert(kind)
 
 
 def _filled_type(kind: pa.DataType) -> pa.DataType:
@@ -78,9 +78,9 @@ def _filled(column: pa.Array, kind: pa.DataType) -> pa.Array:
         return column
     if types.is_struct(kind):
         pairs = zip(column.flatten(), kind, strict=False)
-        made = [_filled(one, field.type) for one, field in pairs]
+        columns = [_filled(child, field.type) for child, field in pairs]
         zeros = pa.array(bytes(len(column)), pa.uint8())
-        return pa.StructArray.from_arrays(made or [zeros], fields=list(kind))
+        return pa.StructArray.from_arrays(columns or [zeros], fields=list(kind))
     if types.is_fixed_size_list(kind):
         return pa.FixedSizeListArray.from_arrays(
             _filled(column.flatten(), kind.value_type), kind.list_size
@@ -103,7 +103,7 @@ def as_text(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
 
 
 def _text_type(kind: pa.DataType) -> pa.DataType:
-    """Return the type that a column has in a file which knows no lists."""
+    """Return the type of a column in a file format without lists."""
     import pyarrow as pa
     from pyarrow import types
 
@@ -127,18 +127,18 @@ def _as_text(column: pa.Array, kind: pa.DataType) -> pa.Array:
     if column.type == kind:
         return column
     if _is_bytes(column.type):
-        return pa.array([_base64(one) for one in column.to_pylist()], kind)
+        return pa.array([_base64(value) for value in column.to_pylist()], kind)
     if types.is_nested(column.type):
         values = _timeless(column).to_pylist()
         return pa.array(
-            [json.dumps(one, default=_base64, ensure_ascii=False) for one in values], kind
+            [json.dumps(value, default=_base64, ensure_ascii=False) for value in values], kind
         )
     return column.cast(kind)
 
 
 def _timeless(column: pa.Array) -> pa.Array:
-    """Return a column with times as texts: Python's own know no nanoseconds."""
-    return column.cast(_each(column.type, _timeless_type))
+    """Return a column with times as texts: those of Python have no nanoseconds."""
+    return column.cast(_converted(column.type, _timeless_type))
 
 
 def _timeless_type(kind: pa.DataType) -> pa.DataType:
@@ -152,11 +152,11 @@ def _timeless_type(kind: pa.DataType) -> pa.DataType:
     return kind
 
 
-def _base64(one: bytes) -> str:
-    return b64encode(one).decode()
+def _base64(data: bytes) -> str:
+    return b64encode(data).decode()
 
 
-#: What a name ends with, and the format that it means.
+#: Formats by the suffix of a file name.
 STYLES = {
     ".parquet": "parquet",
     ".pq": "parquet",
@@ -204,7 +204,7 @@ def _parquet(batches: Iterator[pa.RecordBatch], schema: pa.Schema, file: Any) ->
     kept = storable(schema)
     with parquet.ParquetWriter(file, kept) as writer:
         for group in _groups(batches):
-            table = pa.Table.from_batches([stored(one, kept) for one in group], kept)
+            table = pa.Table.from_batches([stored(batch, kept) for batch in group], kept)
             writer.write_table(table, row_group_size=ROWS * 2)
 
 
@@ -226,7 +226,7 @@ def _arrow(
 ) -> None:
     import pyarrow as pa
 
-    # a file has its index at the end, which nobody can ask a pipe for
+    # the index of a file is at its end, where a reader of a pipe cannot seek
     with (pa.ipc.new_stream if stream else pa.ipc.new_file)(file, schema) as writer:
         for batch in batches:
             writer.write_batch(batch)
@@ -252,5 +252,5 @@ def is_folder(path: str) -> bool:
 
 
 def exists(path: str) -> bool:
-    """Return whether there is something at a path already."""
+    """Return whether a path exists, also as a broken link."""
     return os.path.lexists(path)

@@ -1,4 +1,4 @@
-"""Which words on the command line mean recordings."""
+"""Recordings among the words of a command line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from idlc.project.find import KIND_FOLDERS, KINDS
 from idlc.project.root import MANIFEST, Root
 from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
 
-#: What cannot be read, which opening it says.
+#: Cannot be read, which opening it reports.
 ROS_1 = ".bag"
 
 
@@ -28,14 +28,15 @@ def is_recording(word: str, root: Root) -> bool:
 
 def _is_bag(folder: Path) -> bool:
     try:
-        found = list(folder.iterdir())
+        entries = list(folder.iterdir())
     except OSError:
         return False
-    if not any(one.name.endswith((*SUFFIXES, *COMPRESSED)) and is_file(one) for one in found):
+    recorded = (entry for entry in entries if entry.name.endswith((*SUFFIXES, *COMPRESSED)))
+    if not any(map(is_file, recorded)):
         return False
-    names = {one.name for one in found}
+    names = {entry.name for entry in entries}
     is_package = bool(names & {*KIND_FOLDERS, MANIFEST}) or any(
-        one.suffix in KINDS for one in found
+        entry.suffix in KINDS for entry in entries
     )
     return METADATA in names or not is_package
 
@@ -57,7 +58,7 @@ def divided(words: Iterable[str], root: Root) -> tuple[list[str], list[str]]:
 def files(words: Iterable[str], root: Root) -> list[Path]:
     """Return the files of the recordings among words."""
     paths = [Path(root.path(word)) for word in words if is_recording(word, root)]
-    return [one for path in paths for one in (path.iterdir() if is_folder(path) else [path])]
+    return [file for path in paths for file in (path.iterdir() if is_folder(path) else [path])]
 
 
 def expanded(word: str) -> list[str]:
@@ -74,8 +75,8 @@ def recordings_of(
 
     A shell that expands the pattern itself leaves all but the first among the paths.
     """
-    found = expanded(against)
-    if not divided(found, root)[0]:
+    matches = expanded(against)
+    if not divided(matches, root)[0]:
         return (), paths
     more, others = divided(paths, root)
-    return tuple(dict.fromkeys((*found, *more))), tuple(others)
+    return tuple(dict.fromkeys((*matches, *more))), tuple(others)

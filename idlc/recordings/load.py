@@ -1,4 +1,4 @@
-"""Classes without files of one's own: compiled when a program asks, and kept in a cache."""
+"""Classes without generated files: compiled on request, and kept in a cache."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.check.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report, Severity
-from idlc.generate.requested import wanted
+from idlc.generate.requested import requested_packages
 from idlc.generate.target import last_change
 from idlc.model import ir
 from idlc.model.python_names import class_
@@ -28,7 +28,7 @@ from idlc.project.templates import RenderedFile
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
-from idlc.recordings.types import Around, RecordedTypes, recorded_types
+from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types
 from idlc.recordings.versions import read, versions
 from idlc.version import __version__
 
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
 
 @cache
 def folder() -> Path:
-    """Return where packages are kept, by default with idlc's other caches.
+    """Return the folder of cached packages, by default with idlc's other caches.
 
-    Where nothing can be kept, it is a folder that lives as long as this process.
+    Without a writable cache, it is a folder that is removed when this process ends.
     """
     chosen = os.environ.get("IDLC_CACHE")
     base = Path(chosen) if chosen else cache_folder()
@@ -55,37 +55,37 @@ def folder() -> Path:
         pass
     import atexit
 
-    made = tempfile.mkdtemp(prefix="idlc-")
-    atexit.register(rmtree, made, ignore_errors=True)
-    return Path(made)
+    temporary = tempfile.mkdtemp(prefix="idlc-")
+    atexit.register(rmtree, temporary, ignore_errors=True)
+    return Path(temporary)
 
 
-def has(name: str) -> bool:
+def is_stored(name: str) -> bool:
     """Return whether packages are there under a name."""
     return (folder() / name).is_dir()
 
 
-def keep(name: str, files: Iterable[RenderedFile]) -> None:
-    """Write packages under a name, whole or not at all; what another process wrote stays."""
+def store(name: str, files: Iterable[RenderedFile]) -> None:
+    """Write packages under a name, whole or not at all; packages of other processes stay."""
     target = folder() / name
-    made = Path(tempfile.mkdtemp(dir=folder(), prefix=".new-"))
+    draft = Path(tempfile.mkdtemp(dir=folder(), prefix=".new-"))
     try:
         for file in files:
-            path = made / file.path
+            path = draft / file.path
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(file.text, encoding="utf-8")
         try:
-            made.rename(target)
+            draft.rename(target)
         except OSError:
             if not target.is_dir():
                 raise
     finally:
-        rmtree(made, ignore_errors=True)
+        rmtree(draft, ignore_errors=True)
 
 
 @cache
 def newest() -> int:
-    """Return when idlc itself was changed last: its version does not change with each edit."""
+    """Return the time of the last change of idlc: its version does not change with each edit."""
     package = Path(__file__).parents[1]
     return last_change((package, package.parent / "templates"))
 
@@ -96,71 +96,72 @@ Models = dict[str, "Model"]
 def asked_models(
     what: str, include: tuple[str, ...], distro: str | None, report: Report
 ) -> tuple[Models, list[ir.TypeName]]:
-    """Return the models of packages, and which interfaces in them were asked for."""
+    """Return the models of packages, and the requested interfaces in them."""
     where = scope(Config(Root.here()), None, include, distro=distro)
     if is_recording(what, where.root):
         return _of_recording(what, where, report)
     if is_path(what, where.root):
-        given = wanted([what], [], "", where, report)
-        library = library_for(given, where, report)
-        names = [name for one in given for name in one.names]
+        packages = requested_packages([what], [], "", where, report)
+        library = library_for(packages, where, report)
+        names = [name for package in packages for name in package.names]
         compiler = Compiler(library)
-        for one in given:
-            compiler.add(sources_of(one, report), report)
+        for package in packages:
+            compiler.add(sources_of(package, report), report)
     else:
-        library, meant = resolve(what, where, report)
-        names = [one.interface for one in meant]
+        library, definitions = resolve(what, where, report)
+        names = [definition.interface for definition in definitions]
         compiler = Compiler(library)
     return ({}, []) if report.had_errors else (_models(compiler, names, report), names)
 
 
 def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) -> Models:
     """Return the models of interfaces and of all that these need, by package."""
-    found: dict[str, list[ir.Interface]] = {}
+    interfaces: dict[str, list[ir.Interface]] = {}
     for name, interface in sorted(compiler.reached(names).items()):
-        found.setdefault(name.package, []).append(interface)
+        interfaces.setdefault(name.package, []).append(interface)
     every = Report()
-    models = {package: compiler.model(package, own, every) for package, own in found.items()}
-    report.extend(one for one in every if one.severity is Severity.ERROR)
+    models = {package: compiler.model(package, own, every) for package, own in interfaces.items()}
+    report.extend(diagnostic for diagnostic in every if diagnostic.severity is Severity.ERROR)
     return models
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
     recording = read(path, report)
-    found = versions(recording.topics) if recording else []
-    if len(found) != 1:
+    groups = versions(recording.topics) if recording else []
+    if len(groups) != 1:
         from idlc.recordings.packages import check_versions
 
-        check_versions(found, report)
+        check_versions(groups, report)
         return {}, []
-    types = recorded_types(found[0], Around(where, report), where, Report())
+    types = recorded_types(groups[0], LocalTypes(where, report), where, Report())
     models = types.models
     report.extend(types.errors)
-    return models, sorted({one.interface for one in types.topics})
+    return models, sorted({topic.interface for topic in types.topics})
 
 
 def topic_models(topic: Topic, include: tuple[str, ...]) -> tuple[Models, Report]:
-    """Return the models of a topic's type, and what there is to say if not all was recorded."""
-    types, told = _types(topic, include)
-    if not types.topics or types.errors or told.had_errors:
-        first = min([*types.errors, *told], key=lambda one: one.severity, default=None)
+    """Return the models of a topic's type, and a report if not all was recorded."""
+    types, report = _types(topic, include)
+    if not types.topics or types.errors or report.had_errors:
+        problems = [*types.errors, *report]
+        first = min(problems, key=lambda problem: problem.severity, default=None)
         why = first.message if first else "its type is not known"
         why = why.removeprefix(f"`{topic.name}` is left out: ")
         raise RecordingError(f"`{topic.name}` cannot be read: {why}", first and first.hint)
-    return types.models, told
+    return types.models, report
 
 
 def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
     """Return the hash of a topic's type by its definition, or `None` if there is none."""
     types, _ = _types(topic, include)
-    return next((types.hash(one) for one in types.topics), None)
+    return next((types.hash(typed) for typed in types.topics), None)
 
 
 def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
-    where, told = Scope(Root.here(), include=include), Report()
+    where, report = Scope(Root.here(), include=include), Report()
     (version,) = versions([recorded(topic, topic.name)])
-    types = recorded_types(version, Around(where, told), where, told)
-    return types, told
+    types = recorded_types(version, LocalTypes(where, report), where, report)
+    return types, report
 
 
 #: The package that all loaded ones are in.
@@ -185,11 +186,11 @@ objects.HIDDEN = __name__.rsplit(".", 2)[0] + "."
 
 
 class CompileError(ValueError):
-    """What was to be loaded has errors, or does not exist; its text is that of the problems."""
+    """Interfaces that cannot be loaded: they have errors, or do not exist."""
 
 
 class Loaded(ModuleType):
-    """Packages that were compiled together, and by their own names the interfaces asked for."""
+    """Packages that were compiled together; requested interfaces also by their own names."""
 
     def __init__(
         self, name: str, models: Mapping[str, Model], asked: Iterable[ir.TypeName]
@@ -199,7 +200,7 @@ class Loaded(ModuleType):
             package: sorted({own.name.kind for own in model.own})
             for package, model in sorted(models.items())
         }
-        self._asked = {str(class_(one)): one for one in asked}
+        self._asked = {str(class_(type_name)): type_name for type_name in asked}
 
     def __getattr__(self, name: str) -> Any:
         if name in self._packages:
@@ -232,7 +233,7 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     report = Report()
     models, asked = asked_models(str(what), tuple(include), distro, report)
     _raise_for(report)
-    name = _kept(models)
+    name = _stored(models)
     return Loaded(f"{LOADED}.{name}", models, asked)
 
 
@@ -246,12 +247,12 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
         converts = Scope(Root.here(), include=include).distro.converts_values
         texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
         key = _key(texts, converts=converts)
-    if not (key and has(key)):
-        models, told = topic_models(topic, include)
-        for one in told:
-            warnings.warn(MissingDefinitionWarning(topic.name, one.message), stacklevel=2)
-        # what was borrowed from around here may be another thing tomorrow
-        key = _kept(models, "" if list(told) else key)
+    if not (key and is_stored(key)):
+        models, report = topic_models(topic, include)
+        for diagnostic in report:
+            warnings.warn(MissingDefinitionWarning(topic.name, diagnostic.message), stacklevel=2)
+        # local definitions that were used instead may change
+        key = _stored(models, "" if list(report) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
     if topic.hash not in (None, _type_of(kind).hash):
         message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
@@ -260,11 +261,11 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
 
 
 class OtherDefinitionWarning(UserWarning):
-    """The definition in a recording has another hash than that which the publisher announced."""
+    """The definition in a recording does not have the hash that the publisher announced."""
 
 
 class MissingDefinitionWarning(UserWarning):
-    """A recording does not define a type in it; what is known here by its name is used."""
+    """A recording does not define one of its types; the local type of that name is used."""
 
     def __init__(self, topic: str, message: str) -> None:
         super().__init__(topic, message)
@@ -276,20 +277,21 @@ class MissingDefinitionWarning(UserWarning):
 
 
 def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
-    """Return a class that a program gave; raise RecordingError if messages are of another type."""
+    """Return the class of a program; raise RecordingError if messages are of another type."""
     try:
-        given = _type_of(kind)
+        class_type = _type_of(kind)
     except (AttributeError, ImportError, KeyError, TypeError):
         hint = "leave it out, or give one that `idlc gen` made"
         raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
-    if given.name != topic.type:
-        raise RecordingError(f"`{topic.name}` has messages of {topic.type}, not of {given.name}")
-    if given.hash != topic.hash:
-        found = recorded_hash(topic, include)
-        if given.hash != found:
+    if class_type.name != topic.type:
+        message = f"`{topic.name}` has messages of {topic.type}, not of {class_type.name}"
+        raise RecordingError(message)
+    if class_type.hash != topic.hash:
+        digest = recorded_hash(topic, include)
+        if class_type.hash != digest:
             raise RecordingError(
-                f"{given.name} was another type when `{topic.name}` was recorded: its hash is "
-                f"{found or topic.hash or 'not known'}, that of the class is {given.hash}",
+                f"{class_type.name} was another type when `{topic.name}` was recorded: its hash is "
+                f"{digest or topic.hash or 'not known'}, that of the class is {class_type.hash}",
                 "leave the class out to read what was recorded",
             )
     return kind
@@ -310,11 +312,11 @@ def _type_of(kind: Any) -> _Type:
 
 def _class(home: str, name: str) -> Any:
     package, kind, short = name.split("/")
-    found: Any = import_module(f"{home}.{package}.{kind}")
-    return getattr(found, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
+    module: Any = import_module(f"{home}.{package}.{kind}")
+    return getattr(module, class_(ir.TypeName(package, kind, short)))  # type: ignore[arg-type]
 
 
-def _kept(models: Mapping[str, Model], key: str = "") -> str:
+def _stored(models: Mapping[str, Model], key: str = "") -> str:
     """Return the name under which the packages are kept, after they are written if need be."""
     if not key:
         texts = [
@@ -325,19 +327,19 @@ def _kept(models: Mapping[str, Model], key: str = "") -> str:
         ]
         converts = any(model.distro.converts_values for model in models.values())
         key = _key(texts, converts=converts)
-    if not has(key):
-        keep(key, _files(models, f"{LOADED}.{key}"))
+    if not is_stored(key):
+        store(key, _files(models, f"{LOADED}.{key}"))
         invalidate_caches()
     return key
 
 
-def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
+def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     """Yield the files of packages, which share the support code of this idlc."""
     from idlc.generate.python.render import render_package
 
     for package, model in models.items():
         yield RenderedFile(f"{package}/_idlc/__init__.py", SUPPORT)
-        for file in render_package(model, around):
+        for file in render_package(model, parent):
             if not file.path.startswith("_idlc/") or file.path == "_idlc/type_data.py":
                 yield RenderedFile(f"{package}/{file.path}", file.text)
 
@@ -345,7 +347,7 @@ def _files(models: Mapping[str, Model], around: str) -> Iterator[RenderedFile]:
 def _key(texts: Iterable[str], *, converts: bool) -> str:
     """Return a name for packages that are compiled from these texts by this idlc.
 
-    `converts` is whether their classes convert values as those of Lyrical do.
+    With `converts`, their classes convert values as Lyrical's do.
     """
     from hashlib import sha256
 

@@ -18,7 +18,7 @@ from idlc.model import ir
 from idlc.project import inputs, prefixes
 from idlc.project.library import Library
 from idlc.project.settings import Scope
-from idlc.recordings.types import NAMED, Around, RecordedTypes, recorded_types
+from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
@@ -26,24 +26,24 @@ from idlc.recordings.versions import Version, contradictions, read, topics_of, v
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
-    """Report what is wrong with what recordings say of their types."""
-    around = Around(scope, report)
+    """Report problems in the type definitions stored in recordings."""
+    local = LocalTypes(scope, report)
     for path in paths:
         recording = read(path, report, look=True)
-        found = versions(recording.topics) if recording else []
+        groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
             report.add(msgspec.structs.replace(problem, severity=Severity.WARNING))
-        check_versions(found, report)
-        for version in found:
-            types = recorded_types(version, around, scope, report)
+        check_versions(groups, report)
+        for version in groups:
+            types = recorded_types(version, local, scope, report)
             report.extend(contradicted(types))
             report.extend(types.errors)
 
 
-def check_versions(found: Sequence[Version], report: Report) -> None:
+def check_versions(groups: Sequence[Version], report: Report) -> None:
     """Report IDL653 for each name with several definitions."""
-    for name, first, second in contradictions(found):
+    for name, first, second in contradictions(groups):
         report.add(
             codes.SEVERAL_DEFINITIONS.at(
                 Span(second, 0, 0),
@@ -55,15 +55,15 @@ def check_versions(found: Sequence[Version], report: Report) -> None:
 
 
 def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
-    """Yield IDL654 for each topic whose definition is not that of what was recorded."""
-    for one in types.topics:
-        topic, hash_ = one.recorded.topic, types.hash(one)
+    """Yield IDL654 for each topic whose definition does not have the recorded hash."""
+    for typed in types.topics:
+        topic, hash_ = typed.recorded.topic, types.hash(typed)
         if topic.hash and hash_ and topic.hash != hash_:
             yield codes.RECORDED_HASH_DIFFERS.of(
-                f"{one.recorded.recording}: topic {topic.name}",
-                f"the definition of `{one.name}` is not that of what was recorded",
+                f"{typed.recorded.recording}: topic {topic.name}",
+                f"the definition of `{typed.name}` is not that of what was recorded",
                 hint=f"{including('DIR')} with the files that the publisher used",
-                place=one.recorded.recording,
+                place=typed.recorded.recording,
                 detail=f"type hash recorded  {topic.hash}\nof the definition   {hash_}",
             )
 
@@ -71,14 +71,14 @@ def contradicted(types: RecordedTypes) -> Iterator[Diagnostic]:
 def recorded_models(
     paths: Sequence[str], scope: Scope, report: Report
 ) -> Iterator[tuple[Model, list[str]]]:
-    """Yield the models of recordings, without what has errors, and the names of all in them."""
-    around = Around(scope, report)
+    """Yield the models of recordings, without faulty interfaces, and the names of their types."""
+    local = LocalTypes(scope, report)
     for path in paths:
         recording = read(path, report)
         for version in versions(recording.topics) if recording else ():
-            types = recorded_types(version, around, scope, report)
+            types = recorded_types(version, local, scope, report)
             for model in types.models.values():
-                yield model, [name for one in model.own for name in derived_names(one)]
+                yield model, [name for interface in model.own for name in derived_names(interface)]
             report.extend(types.errors)
 
 
@@ -92,11 +92,11 @@ def recorded_packages(
     topics = topics_of(paths, topics_wanted, report)
     if topics is None:
         return [], {}
-    found = versions(topics)
-    check_versions(found, report)
-    if report.had_errors or not found:
+    groups = versions(topics)
+    check_versions(groups, report)
+    if report.had_errors or not groups:
         return [], {}
-    types = recorded_types(found[0], Around(scope, report), scope, report)
+    types = recorded_types(groups[0], LocalTypes(scope, report), scope, report)
     report.extend(contradicted(types))
     names = types.names
     if whole:
@@ -107,16 +107,16 @@ def recorded_packages(
         )
         report.add(codes.NO_INTERFACES.of(paths[0], message))
     if not whole:
-        _tell_hidden(names, types.library, report)
+        _note_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
     home = scope.root.absolute(paths[0])
-    return [msgspec.structs.replace(one, home=home) for one in packages], types.texts
+    return [msgspec.structs.replace(package, home=home) for package in packages], types.texts
 
 
-def _tell_hidden(
+def _note_hidden(
     names: Mapping[str, AbstractSet[ir.TypeName]], library: Library, report: Report
 ) -> None:
-    """Note the packages that are installed here with more than was recorded."""
+    """Note the packages that are installed here with more interfaces than were recorded."""
     hidden = [
         package
         for package, mine in names.items()

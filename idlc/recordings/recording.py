@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 Kind = TypeVar("Kind")
-#: How errors name a message of many, and what is in it.
+#: The path in errors of many messages: the index of a message, and the path in it.
 _INDEXED = re.compile(r"\[(\d+)\]\.?(.*)")
-#: What is known of a message besides its fields.
+#: The columns of a message besides its fields.
 TIMES = ("log_time", "publish_time")
 
 
 if TYPE_CHECKING:
 
     class Stamped(tuple[int, Kind]):
-        """What type checkers see: named tuples can be generic from Python 3.11 on."""
+        """The class for type checkers: named tuples can be generic from Python 3.11 on."""
 
         log_time: int
         message: Kind
@@ -75,16 +75,16 @@ class Selection:
 
         return class_of(self.topic, self.include)
 
-    def _kind(self, given: Any) -> Any:
-        """Return the class to read with: what was recorded, or one of the same type."""
+    def _kind(self, kind: Any) -> Any:
+        """Return the class to read with: `kind` if it is of the recorded type, or the recorded."""
         if self.topic.encoding != CDR:
             what = f"messages of `{self.topic.name}` are written as `{self.topic.encoding}`"
             raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
-        if given is None:
+        if kind is None:
             return self.kind
         from idlc.recordings.load import accepted
 
-        return accepted(given, self.topic, self.include)
+        return accepted(kind, self.topic, self.include)
 
     def __iter__(self) -> Iterator[Stamped[Any]]:
         return self.messages()
@@ -116,14 +116,14 @@ class Selection:
         kind = self._kind(kind)
         batch = joined(list(self.batches()))
         with _at(self.topic, batch.views):
-            made = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
-        times = zip(_names(made.keys()), (batch.log_times, batch.publish_times), strict=True)
+            table = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
+        times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
         columns = {
             name: values.view("M8[ns]") if datetimes else values
             for name, values in times
             if values is not None
         }
-        return type(made)({**columns, **{name: made[name] for name in made.keys()}}, len(made))  # noqa: SIM118
+        return type(table)({**columns, **{name: table[name] for name in table.keys()}}, len(table))  # noqa: SIM118
 
     def to_arrow(self, kind: Any = None, **options: Any) -> pa.Table:
         """Return a table of Arrow: log_time, publish_time and the fields of the messages.
@@ -132,22 +132,22 @@ class Selection:
         """
         pa = arrow()
         kind = self._kind(kind)
-        found = list(self._tables(kind, options))
-        return pa.concat_tables(found) if found else _empty(kind, options)
+        tables = list(self._tables(kind, options))
+        return pa.concat_tables(tables) if tables else _empty(kind, options)
 
     def to_reader(self, kind: Any = None, **options: Any) -> pa.RecordBatchReader:
-        """Return the same piece by piece, for what need not be in memory as a whole."""
+        """Return the same piece by piece, without the whole table in memory."""
         pa = arrow()
         kind = self._kind(kind)
-        batches = (batch for one in self._tables(kind, options) for batch in one.to_batches())
+        batches = (batch for table in self._tables(kind, options) for batch in table.to_batches())
         return pa.RecordBatchReader.from_batches(_empty(kind, options).schema, batches)
 
     def _tables(self, kind: Any, options: Any) -> Iterator[pa.Table]:
         done = 0
         for batch in self.batches():
             with _at(self.topic, batch.views, done):
-                made = kind.to_arrow(batch, **options)
-            yield _with_times(made, batch)
+                table = kind.to_arrow(batch, **options)
+            yield _with_times(table, batch)
             done += len(batch)
 
 
@@ -169,10 +169,10 @@ def _with_times(table: pa.Table, batch: Messages) -> pa.Table:
     names = _names(table.column_names)
     for name, times in zip(names[::-1], (batch.publish_times, batch.log_times), strict=True):
         if times is None:
-            made = pa.nulls(len(batch), kind)
+            column = pa.nulls(len(batch), kind)
         else:
-            made = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
-        table = table.add_column(0, pa.field(name, kind), made)
+            column = pa.Array.from_buffers(kind, len(batch), [None, pa.py_buffer(times)])
+        table = table.add_column(0, pa.field(name, kind), column)
     return table
 
 
@@ -187,15 +187,15 @@ def arrow() -> Any:
 
 @contextmanager
 def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator[None]:
-    """Have errors in messages say which message of the recording it is."""
+    """Turn errors in messages into errors that name the message of the recording."""
     try:
         yield
     except ValueError as caught:
         error: Any = caught
         if not hasattr(error, "problem"):  # each package has a DecodeError of its own
             raise
-        found = _INDEXED.match(error.path)
-        number, path = (int(found[1]), found[2]) if found else (0, error.path)
+        match = _INDEXED.match(error.path)
+        number, path = (int(match[1]), match[2]) if match else (0, error.path)
         why = unread(topic.name, bytes(views()[number][:START]))
         if why:
             raise RecordingError(*why) from error
@@ -245,10 +245,10 @@ def divided(
     """Yield the parts of a topic, each of about `size` bytes of a file."""
     for file, ids, _ in container.ids_of(topic):
         if isinstance(file, McapFile):
-            found: Iterator[tuple[Any, ...]] = _chunks(file, ids, window, size)
+            divisions: Iterator[tuple[Any, ...]] = _chunks(file, ids, window, size)
         else:
-            found = _rows(file, size)
-        for pieces in found:
+            divisions = _rows(file, size)
+        for pieces in divisions:
             yield Part(topic, file.place, tuple(ids), pieces, window, include)
 
 
@@ -305,25 +305,25 @@ class Recording(Mapping[str, "RecordedTopic"]):
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """What was recorded: name, type, count, hash, encoding and definition of each topic."""
+        """The recorded topics: name, type, count, hash, encoding and definition of each."""
         return self._container.topics
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is unusual about the recording, such as that it was not closed."""
+        """Notes about anomalies of the recording, such as that it was not closed."""
         return self._container.notes
 
     def __getitem__(self, name: str) -> RecordedTopic:
-        found = self._topics.get(name)
-        if not found:
+        topics = self._topics.get(name)
+        if not topics:
             from idlc.diagnostics.text import did_you_mean
 
             hint = did_you_mean(name, list(self)) or f"it has {', '.join(self) or 'none'}"
             raise UnknownTopicError(f"`{self._container.name}` has no topic `{name}`", hint)
-        if len(found) > 1:
-            kinds = ", ".join(sorted({one.type for one in found}))
+        if len(topics) > 1:
+            kinds = ", ".join(sorted({topic.type for topic in topics}))
             raise RecordingError(f"`{name}` has messages of several definitions, of {kinds}")
-        return RecordedTopic(self._container, found[0], include=self._include)
+        return RecordedTopic(self._container, topics[0], include=self._include)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._topics)
@@ -332,7 +332,7 @@ class Recording(Mapping[str, "RecordedTopic"]):
         return len(self._topics)
 
     def __repr__(self) -> str:
-        rows = [(one.name, one.type, f"{one.count:,}") for one in self.topics]
+        rows = [(topic.name, topic.type, f"{topic.count:,}") for topic in self.topics]
         name, kind, count = (max((len(row[at]) for row in rows), default=0) for at in range(3))
         lines = [f"{row[0]:{name}}  {row[1]:{kind}}  {row[2]:>{count}}" for row in rows]
         return "\n".join([f"<Recording {self._container.name}>", *lines])
@@ -379,7 +379,7 @@ class RecordedTopic(Selection):
         in UTC. Times of numpy and pandas may be of any unit; a timedelta counts from the start.
         """
         first, last = (
-            None if one is None else moment(one, self._container.start) for one in (start, end)
+            None if time is None else moment(time, self._container.start) for time in (start, end)
         )
         window = self._window.narrowed(first, last)
         return RecordedTopic(self._container, self.topic, window, self.include)

@@ -1,4 +1,4 @@
-"""The pipeline of `idlc show REC`: what is in a recording, compared with what is known here."""
+"""The pipeline of `idlc show REC`: the topics of a recording, compared with local types."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from idlc.diagnostics.report import Report
 from idlc.documents.show import shown
 from idlc.project.settings import Scope
 from idlc.recordings.definitions import Recorded
-from idlc.recordings.types import Around, recorded_types
+from idlc.recordings.types import LocalTypes, recorded_types
 from idlc.recordings.versions import read, topics_of, versions
 
 
@@ -18,8 +18,8 @@ class TopicFacts(NamedTuple):
     """One line of the table.
 
     `hash` is the recorded one, or that of the recorded definition. `here` compares it with the
-    type of the same name that is known here: same, differs or unknown. `definition` is the
-    encoding of the recorded one.
+    local type of the same name: same, differs or unknown. `definition` is the encoding of the
+    recorded one.
     """
 
     name: str
@@ -33,39 +33,43 @@ class TopicFacts(NamedTuple):
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
     recording = read(path, report, look=True)
-    report.notes += [one.message for one in recording.unread] if recording else []
-    around = Around(scope, report)
-    found = []
+    report.notes += [topic.message for topic in recording.unread] if recording else []
+    local = LocalTypes(scope, report)
+    facts = []
     for version in versions(recording.topics) if recording else ():
-        types = recorded_types(version, around, scope, Report())
-        own = (one for one in types.topics if one.interface in types.texts)
+        types = recorded_types(version, local, scope, Report())
+        own = (typed for typed in types.topics if typed.interface in types.texts)
         # a name may stand for several topics, of different types
-        hashes = {id(one.recorded): types.hash(one) for one in own}
-        found += [_facts(one, hashes.get(id(one)), around) for one in version.topics]
-    return sorted(found, key=lambda one: (one.name, one.type_name))
+        hashes = {id(typed.recorded): types.hash(typed) for typed in own}
+        facts += [_facts(recorded, hashes.get(id(recorded)), local) for recorded in version.topics]
+    return sorted(facts, key=lambda row: (row.name, row.type_name))
 
 
-def _facts(one: Recorded, compiled: str | None, around: Around) -> TopicFacts:
-    topic = one.topic
+def _facts(recorded: Recorded, compiled: str | None, local: LocalTypes) -> TopicFacts:
+    topic = recorded.topic
     hash_ = topic.hash or compiled
-    known = around.hash(one.name, one.interface) if one.name and one.interface else None
-    here = "unknown"
-    if known and hash_:
-        here = "same" if known == hash_ else "differs"
+    local_hash = (
+        local.hash(recorded.name, recorded.interface)
+        if recorded.name and recorded.interface
+        else None
+    )
+    comparison = "unknown"
+    if local_hash and hash_:
+        comparison = "same" if local_hash == hash_ else "differs"
     schema = None if topic.schema and topic.schema.is_blank and not compiled else topic.schema
     definition = schema.encoding or "unknown" if schema else None
-    return TopicFacts(topic.name, topic.type, topic.count, hash_, here, definition)
+    return TopicFacts(topic.name, topic.type, topic.count, hash_, comparison, definition)
 
 
 def definitions(
-    path: str, wanted: Sequence[str], style: str, scope: Scope, report: Report
+    path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
 ) -> Iterator[str]:
     """Yield the interfaces of topics, each once, as text in a format."""
-    found = topics_of([path], wanted, report)
-    around = Around(scope, report)
-    for version in versions(found or ()):
-        types = recorded_types(version, around, scope, report)
-        for name in dict.fromkeys(one.interface for one in types.topics):
+    recorded = topics_of([path], selected, report)
+    local = LocalTypes(scope, report)
+    for version in versions(recorded or ()):
+        types = recorded_types(version, local, scope, report)
+        for name in dict.fromkeys(typed.interface for typed in types.topics):
             model = types.models[name.package]
             if name in model.interfaces:
                 with stage("show", str(name)):

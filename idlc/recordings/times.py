@@ -39,7 +39,7 @@ HINT = "write `10`, `1m30s`, a time of ROS such as `1700000000.5`, or a date in 
 
 
 def moment(value: Any, start: Callable[[], int]) -> int:
-    """Return the nanoseconds since 1970 that a value means; `start` is asked for what is relative.
+    """Return the nanoseconds since 1970 that a value means; relative times are added to `start()`.
 
     An int is nanoseconds, a timedelta counts from the start, a datetime without a zone is in UTC.
     Those of numpy and pandas are taken to the last digit. Fractions of a nanosecond are rounded
@@ -95,9 +95,10 @@ def _text(text: str, start: Callable[[], int]) -> int:
     if _LENGTH.fullmatch(text):
         seconds = sum(Fraction(number) * UNITS[unit] for number, unit in _PART.findall(text))
         return start() + ceil(seconds * SECOND)
-    found = _FRACTION.search(text)  # datetime has six digits, and before Python 3.11 three or six
-    digits = found[2].ljust(9, "0") if found else ""
-    plain = text[: found.end(1)] + text[found.end() :] if found else text
+    # datetime has six digits, and before Python 3.11 three or six
+    fraction = _FRACTION.search(text)
+    digits = fraction[2].ljust(9, "0") if fraction else ""
+    plain = text[: fraction.end(1)] + text[fraction.end() :] if fraction else text
     try:
         date = datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", plain))
         return _nanoseconds(_in_utc(date) - _EPOCH) + int(digits or 0)

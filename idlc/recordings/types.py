@@ -1,4 +1,4 @@
-"""The types of recorded topics, compiled; what a recording does not define is looked up here."""
+"""The types of recorded topics, compiled; missing definitions are looked up locally."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.definitions import ENCODINGS, Recorded
 from idlc.recordings.versions import Contents, Version
-from idlc.wire.layout import Extents, oversized
+from idlc.wire.layout import ContentSizes, oversized
 
-#: Names that are told in a sentence.
+#: Names that are listed in a sentence.
 NAMED = 5
-#: What to do where another definition is used than the recording's.
+#: The hint where a local definition is used instead of the recording's.
 BORROWED = "see to it that it is what was recorded, or point -I to it"
-#: Why a definition is not the recording's.
+#: Reasons why a definition is not the recording's.
 ABSENT, UNREADABLE = "there is no definition of", "there are errors in the definition of"
 WRONG = "the recorded hash is not that of the definition of"
 
 
 class Typed(NamedTuple):
-    """A topic of a type that is known, by the recording or by what is around here."""
+    """A topic of a type that is defined, in the recording or locally."""
 
     recorded: Recorded
     name: ir.TypeName
     interface: ir.TypeName
 
 
-class Around:
-    """The types that are known here without any recording."""
+class LocalTypes:
+    """The types that are defined locally, without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
         self.near = inputs.near(scope.root)
@@ -51,109 +51,112 @@ class Around:
         self._hashes: dict[ir.TypeName, str | None] = {}
 
     def model(self, package: str, names: Iterable[ir.TypeName]) -> Model:
-        """Return the model of those of a package's interfaces that are known and sound."""
-        found = self._compiler.reached(names)
+        """Return the model of the interfaces of a package that are known and sound."""
+        interfaces = self._compiler.reached(names)
         report = Report()
-        model = self._compiler.model(package, list(found.values()), report)
-        return model.sound({one.where[0] for one in report if one.severity is Severity.ERROR})
+        model = self._compiler.model(package, list(interfaces.values()), report)
+        errors = (each for each in report if each.severity is Severity.ERROR)
+        return model.sound({error.where[0] for error in errors})
 
     def hash(self, name: ir.TypeName, interface: ir.TypeName) -> str | None:
-        """Return the hash of a type, which an interface implies; `None` if it is not known."""
+        """Return the hash of a type that an interface defines; `None` if it is not known."""
         if name not in self._hashes:
             model = self.model(interface.package, [interface])
-            known = has(model, name)
-            self._hashes[name] = model.describer.hash(str(name)) if known else None
+            is_known = defines(model, name)
+            self._hashes[name] = model.describer.hash(str(name)) if is_known else None
         return self._hashes[name]
 
 
-def has(model: Model, name: ir.TypeName) -> bool:
+def defines(model: Model, name: ir.TypeName) -> bool:
     """Return whether a structure or interface is in a model."""
     return name in model.messages or name in model.interfaces
 
 
-def recorded_types(version: Version, around: Around, scope: Scope, report: Report) -> RecordedTypes:
-    """Return what the topics of a version mean; reports IDL652 for what it does not define.
+def recorded_types(
+    version: Version, local: LocalTypes, scope: Scope, report: Report
+) -> RecordedTypes:
+    """Return the types of the topics of a version; reports IDL652 for undefined ones.
 
-    What is known here stands in for definitions that have errors or another hash than the recorded
-    one, unless a recorded hash says that something else was recorded. Then these are in `errors`.
+    Local definitions replace those that have errors or another hash than the recorded one, unless
+    a recorded hash says that something else was recorded. Then the errors are in `errors`.
     """
-    told, others = Report(), Report()
-    types = RecordedTypes(version, around, scope, told)
+    problems, others = Report(), Report()
+    types = RecordedTypes(version, local, scope, problems)
     broken = {
         **dict.fromkeys(types.empty, ABSENT),
         **dict.fromkeys(types.wrong, WRONG),
         **dict.fromkeys(types.broken, UNREADABLE),
     }
-    broken = {name: why for name, why in broken.items() if around.library.source(name) is not None}
+    broken = {name: why for name, why in broken.items() if local.library.source(name) is not None}
     if broken:
-        trial = RecordedTypes(version, around, scope, others, broken)
-        if trial.may_stand_in(version.topics, broken.keys()):
-            types, told = trial, others
-    report.extend(told)
+        trial = RecordedTypes(version, local, scope, others, broken)
+        if trial.fit_locally(version.topics, broken.keys()):
+            types, problems = trial, others
+    report.extend(problems)
     return types
 
 
 class RecordedTypes:
-    """What the topics of a version mean, and all that these types refer to."""
+    """The types of the topics of a version, and all that these refer to."""
 
     def __init__(
         self,
         version: Version,
-        around: Around,
+        local: LocalTypes,
         scope: Scope,
         report: Report,
         broken: Mapping[ir.TypeName, str] | None = None,
     ) -> None:
-        """Look the types up; reports IDL652 for what the recording does not define.
+        """Look the types up; reports IDL652 for types that the recording does not define.
 
-        Definitions that are `broken` are none; it says why.
+        Definitions in `broken` are ignored; its values say why.
         """
         self._broken = broken = broken or {}
-        self._around = around
+        self._local = local
         self._names: dict[ir.TypeName, set[ir.TypeName]] = {}
-        texts = {name: one for name, one in version.texts.items() if name not in broken}
-        texts |= _empty_ones(version.topics, texts, around)
+        texts = {name: source for name, source in version.texts.items() if name not in broken}
+        texts |= _empty_ones(version.topics, texts, local)
         self.library = Library(
             scope.include,
             scope.root,
             Report(),
-            own=around.near,
+            own=local.near,
             distro=scope.distro,
             texts=texts,
         )
-        self.topics = tuple(_typed(version.topics, texts, around, report))
+        self.topics = tuple(_typed(version.topics, texts, local, report))
         self._compiler = Compiler(self.library)
-        self.interfaces = self._compiler.reached(one.interface for one in self.topics)
-        report.extend(self._doubts())
+        self.interfaces = self._compiler.reached(typed.interface for typed in self.topics)
+        report.extend(self._substitutions())
 
     @property
     def texts(self) -> Mapping[ir.TypeName, Source]:
-        """The definitions that are the recording's."""
+        """The definitions of the recording."""
         return self.library.texts
 
     @property
     def names(self) -> dict[str, set[ir.TypeName]]:
         """The names of all that is needed, by package."""
-        found: dict[str, set[ir.TypeName]] = {}
+        names: dict[str, set[ir.TypeName]] = {}
         for name in self.interfaces:
-            found.setdefault(name.package, set()).add(name)
-        return found
+            names.setdefault(name.package, set()).add(name)
+        return names
 
-    def _doubts(self) -> Iterator[Diagnostic]:
+    def _substitutions(self) -> Iterator[Diagnostic]:
         """Yield IDL652 or IDL654 for definitions that are not the recording's.
 
-        If none is there, and the recorded hash confirms the other, nothing is to be said.
+        A local definition that replaces a missing one and has the recorded hash is not reported.
         """
         doubtful: dict[tuple[str, str, bool], set[ir.TypeName]] = {}
-        for one in self.topics:
-            missing = {name for name in self.names_of(one) if name not in self.texts}
-            sure = bool(missing) and one.recorded.topic.hash == self.hash(one)
+        for typed in self.topics:
+            missing = {name for name in self.names_of(typed) if name not in self.texts}
+            sure = bool(missing) and typed.recorded.topic.hash == self.hash(typed)
             for name in missing:
                 why = self._broken.get(name, ABSENT)
                 if why != ABSENT or not sure:
-                    doubtful.setdefault((one.recorded.recording, why, sure), set()).add(name)
-        for (recording, why, sure), found in doubtful.items():
-            names = first_few((f"`{name}`" for name in sorted(found)), NAMED)
+                    doubtful.setdefault((typed.recorded.recording, why, sure), set()).add(name)
+        for (recording, why, sure), undefined in doubtful.items():
+            names = first_few((f"`{name}`" for name in sorted(undefined)), NAMED)
             which = "has the recorded hash and" if sure else "by that name"
             code = codes.RECORDED_HASH_DIFFERS if why == WRONG else codes.MISSING_DEFINITION
             yield code.of(
@@ -171,105 +174,110 @@ class RecordedTypes:
 
     @property
     def models(self) -> dict[str, Model]:
-        """The model of each package, without what has errors."""
+        """The model of each package, without faulty interfaces."""
         return self._compiled[0]
 
     @property
     def errors(self) -> Report:
-        """What is wrong with the definitions."""
+        """The errors in the definitions."""
         return self._compiled[1]
 
     @cached_property
     def _compiled(self) -> tuple[dict[str, Model], Report]:
-        found = Report()
+        report = Report()
         models = {
             package: self._compiler.model(
-                package, [self.interfaces[name] for name in sorted(names)], found
+                package, [self.interfaces[name] for name in sorted(names)], report
             )
             for package, names in sorted(self.names.items())
         }
-        if not found.had_errors:
-            extents: Extents = {}
+        if not report.had_errors:
+            extents: ContentSizes = {}
             for model in models.values():
-                found.extend(oversized(model, extents))
+                report.extend(oversized(model, extents))
         errors = Report()
-        errors.extend(one for one in found if one.severity is Severity.ERROR)
-        broken = {one.where[0] for one in errors}
+        errors.extend(diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR)
+        broken = {diagnostic.where[0] for diagnostic in errors}
         if broken:
-            models = {name: one.sound(broken) for name, one in models.items()}
+            models = {name: model.sound(broken) for name, model in models.items()}
         return models, errors
 
     @property
     def broken(self) -> set[ir.TypeName]:
         """The definitions of the recording that have errors."""
-        wrong = {one.where[0] for one in self.errors}
-        return {name for name, one in self.texts.items() if one.path in wrong}
+        wrong = {diagnostic.where[0] for diagnostic in self.errors}
+        return {name for name, source in self.texts.items() if source.path in wrong}
 
     @property
     def wrong(self) -> set[ir.TypeName]:
-        """The definitions of the recording that are others here, where the recorded hash is."""
+        """The definitions that differ from the local ones, where these have the recorded hash."""
         contents = Contents()
-        found: set[ir.TypeName] = set()
+        names: set[ir.TypeName] = set()
         seen: set[tuple[ir.TypeName, str | None]] = set()
-        for one in self.topics:
-            digest = one.recorded.topic.hash
-            if (one.name, digest) in seen or digest in (None, self.hash(one)):
+        for typed in self.topics:
+            digest = typed.recorded.topic.hash
+            if (typed.name, digest) in seen or digest in (None, self.hash(typed)):
                 continue
-            seen.add((one.name, digest))
-            if digest == self._around.hash(one.name, one.interface):
-                for name in self.names_of(one) & self.texts.keys():
-                    here = self._around.library.source(name)
-                    if here is None or not contents.same(name, self.texts[name], here):
-                        found.add(name)
-        return found
+            seen.add((typed.name, digest))
+            if digest == self._local.hash(typed.name, typed.interface):
+                for name in self.names_of(typed) & self.texts.keys():
+                    local_source = self._local.library.source(name)
+                    recorded = self.texts[name]
+                    if local_source is None or not contents.same(name, recorded, local_source):
+                        names.add(name)
+        return names
 
     @property
     def empty(self) -> set[ir.TypeName]:
-        """The empty definitions of types that have fields here, unless a recorded hash agrees."""
-        found: set[ir.TypeName] = set()
+        """The empty definitions of types with fields locally, unless a recorded hash agrees."""
+        names: set[ir.TypeName] = set()
         contents = Contents()
-        for name, one in self.texts.items():
-            here = None if one.text else self._around.library.source(name)
-            if here is not None and not contents.same(name, one, here):
-                found.add(name)
-        for topic in self.topics if found else ():
+        for name, source in self.texts.items():
+            local_source = None if source.text else self._local.library.source(name)
+            if local_source is not None and not contents.same(name, source, local_source):
+                names.add(name)
+        for topic in self.topics if names else ():
             if topic.recorded.topic.hash and topic.recorded.topic.hash == self.hash(topic):
-                found -= self.names_of(topic)
-        return found
+                names -= self.names_of(topic)
+        return names
 
-    def may_stand_in(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
-        """Return whether no recorded hash says that broken definitions were others than here."""
-        typed = {id(one.recorded): one for one in self.topics}
-        for one in topics:
-            found = typed.get(id(one))
-            if found is None and one.interface in broken:
+    def fit_locally(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
+        """Return whether no recorded hash contradicts the local `broken` definitions."""
+        typed = {id(typed.recorded): typed for typed in self.topics}
+        for recorded in topics:
+            typed_topic = typed.get(id(recorded))
+            if typed_topic is None and recorded.interface in broken:
                 return False
-            if found is None or not one.topic.hash or broken.isdisjoint(self.names_of(found)):
+            if (
+                typed_topic is None
+                or not recorded.topic.hash
+                or broken.isdisjoint(self.names_of(typed_topic))
+            ):
                 continue
-            if self.hash(found) != one.topic.hash:
+            if self.hash(typed_topic) != recorded.topic.hash:
                 return False
         return True
 
     def hash(self, topic: Typed) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
         model = self.models[topic.name.package]
-        return model.describer.hash(str(topic.name)) if has(model, topic.name) else None
+        return model.describer.hash(str(topic.name)) if defines(model, topic.name) else None
 
 
 def _empty_ones(
-    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source], around: Around
+    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source], local: LocalTypes
 ) -> Iterator[tuple[ir.TypeName, Source]]:
-    """Yield the messages whose definitions are empty because they are.
+    """Yield the messages whose definitions are empty because they have no fields.
 
-    Their hashes say so, or what is known here where none was recorded. Otherwise an empty
-    definition may be one that the recorder did not find.
+    Their recorded hashes say so, or else the local definition. Otherwise an empty definition may
+    be one that the recorder did not find.
     """
     for topic in topics:
         name, recorded = topic.interface, topic.topic.hash
         if name is None or name.kind != "msg" or name in texts:
             continue
         empty = Describer({name: ir.Message(name=name)}).hash(str(name))
-        if (recorded or around.hash(name, name)) == empty:
+        if (recorded or local.hash(name, name)) == empty:
             path = f"{topic.recording}: topic {topic.topic.name}: {name}.msg"
             yield name, Source(path, "", topic.recording)
 
@@ -277,20 +285,20 @@ def _empty_ones(
 def _typed(
     topics: Iterable[Recorded],
     texts: Mapping[ir.TypeName, Source],
-    around: Around,
+    local: LocalTypes,
     report: Report,
 ) -> Iterator[Typed]:
     """Yield the topics whose types are known; report the others."""
     missing: dict[tuple[str, str], list[str]] = {}
-    for one in topics:
-        if one.name is None or one.interface is None:
-            why = _foreign(one)
+    for topic in topics:
+        if topic.name is None or topic.interface is None:
+            why = _foreign(topic)
         else:
-            why = "" if one.interface in texts else _why_not_around(one, around)
+            why = "" if topic.interface in texts else _why_not_local(topic, local)
             if not why:
-                yield Typed(one, one.name, one.interface)
+                yield Typed(topic, topic.name, topic.interface)
         if why:
-            missing.setdefault((one.recording, why), []).append(one.topic.name)
+            missing.setdefault((topic.recording, why), []).append(topic.topic.name)
     for (recording, why), names in missing.items():
         listed = first_few((f"`{name}`" for name in names), NAMED)
         hint = None if "no type of" in why else f"{including('DIR')} with the package's sources"
@@ -299,33 +307,33 @@ def _typed(
         )
 
 
-def _foreign(one: Recorded) -> str:
-    schema = one.topic.schema
-    if not one.topic.type:
+def _foreign(topic: Recorded) -> str:
+    schema = topic.topic.schema
+    if not topic.topic.type:
         return "it has no type of ROS 2"
     what = f", but of {schema.encoding}" if schema and schema.encoding not in ENCODINGS else ""
-    return f"`{one.topic.type}` is no type of ROS 2{what}"
+    return f"`{topic.topic.type}` is no type of ROS 2{what}"
 
 
-def _why_not_around(one: Recorded, around: Around) -> str:
-    """Return why what is known here does not stand in for a definition; empty if it does."""
-    assert one.name is not None
-    assert one.interface is not None
-    if around.library.source(one.interface) is None:
-        return f"there is no definition of `{one.interface}`"
-    if one.topic.hash and one.topic.hash != around.hash(one.name, one.interface):
-        return f"there is no definition of `{one.interface}`, and the one known here is another"
+def _why_not_local(topic: Recorded, local: LocalTypes) -> str:
+    """Return why a local definition does not replace a missing one; empty if it does."""
+    assert topic.name is not None
+    assert topic.interface is not None
+    if local.library.source(topic.interface) is None:
+        return f"there is no definition of `{topic.interface}`"
+    if topic.topic.hash and topic.topic.hash != local.hash(topic.name, topic.interface):
+        return f"there is no definition of `{topic.interface}`, and the one known here is another"
     return ""
 
 
 def _explicit(
     names: Iterable[ir.TypeName], interfaces: Mapping[ir.TypeName, ir.Interface]
 ) -> set[ir.TypeName]:
-    """Return what files name, and the files of these, without what ROS 2 adds by itself."""
-    found: set[ir.TypeName] = set()
+    """Return interfaces and those they refer to in files, without those that ROS 2 adds."""
+    reached: set[ir.TypeName] = set()
     waiting = set(names) & interfaces.keys()
     while waiting:
-        found |= waiting
-        named = set[ir.TypeName]().union(*(derive.references(interfaces[one]) for one in waiting))
-        waiting = (named & interfaces.keys()) - found
-    return found
+        reached |= waiting
+        named = set[ir.TypeName]().union(*(derive.references(interfaces[name]) for name in waiting))
+        waiting = (named & interfaces.keys()) - reached
+    return reached

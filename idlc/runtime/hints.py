@@ -22,12 +22,12 @@ else:
 #: What numeric sequences take.
 Integers: TypeAlias = Iterable[int]
 Floats: TypeAlias = Iterable[float]
-#: What a message's parts are given to.
+#: The function that receives a message's parts.
 Join: TypeAlias = Callable[[list[Any]], Any]
 
 
 class Options(TypedDict, total=False):
-    """What every constructor takes besides the fields."""
+    """The keywords of every constructor besides the fields."""
 
     #: Raise AssertionError when a wrong value is assigned, as rosidl's classes do.
     check_fields: bool

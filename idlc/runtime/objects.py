@@ -1,4 +1,4 @@
-"""What messages need to be compared, copied and shown."""
+"""Comparing, copying and showing messages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .names import slot_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from typing import Any
 
 #: Values that a copy may share.
@@ -18,9 +18,9 @@ ATOMIC = frozenset({bool, bytes, float, int, str})
 SMALL = 64
 #: Elements of large arrays that are compared at once.
 PIECE = 1 << 16
-#: What is not shown of the names of modules.
+#: The prefix of modules' names that is not shown.
 HIDDEN = ""
-_found: Any = None
+_memcmp_function: Any = None
 #: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
 _of_numpy: set[type] = set()
 
@@ -56,30 +56,34 @@ def _same_memory(mine: array[Any], other: array[Any]) -> bool:
     """Return whether two arrays of one size and kind hold the same bytes."""
     if len(mine) <= PIECE:  # only `bytes` and `bytearray` compare memory at once
         return bytearray(mine) == memoryview(other)
-    with memoryview(mine) as one, memoryview(other) as two:  # no thread moves them now
+    with (
+        memoryview(mine) as left,
+        memoryview(other) as right,
+    ):  # no thread moves them now
         compare = _memcmp()
         if compare is None:  # a copy of a piece stays in a cache
-            pieces = range(0, len(one), PIECE)
+            pieces = range(0, len(left), PIECE)
             return all(
-                bytearray(one[at : at + PIECE]) == two[at : at + PIECE] for at in pieces
+                bytearray(left[at : at + PIECE]) == right[at : at + PIECE]
+                for at in pieces
             )
-        (here, _), (there, _) = mine.buffer_info(), other.buffer_info()
-        return bool(compare(here, there, one.nbytes) == 0)
+        (left_address, _), (right_address, _) = mine.buffer_info(), other.buffer_info()
+        return bool(compare(left_address, right_address, left.nbytes) == 0)
 
 
 def _memcmp() -> Any:
     """Return the function of C, if ctypes has been loaded, as it is with numpy and rclpy."""
-    global _found
-    if _found is None and "ctypes" in sys.modules:
+    global _memcmp_function
+    if _memcmp_function is None and "ctypes" in sys.modules:
         import ctypes
 
         try:
-            made = ctypes.pythonapi["memcmp"]
+            function = ctypes.pythonapi["memcmp"]
         except AttributeError:  # Windows
             return None
-        made.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
-        _found = made  # not before: another thread may be waiting for it
-    return _found
+        function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
+        _memcmp_function = function  # not before: another thread may be waiting for it
+    return _memcmp_function
 
 
 def copied(message: Any) -> Any:
@@ -87,10 +91,10 @@ def copied(message: Any) -> Any:
     kind = type(message)
     if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: value)
-    made = object.__new__(kind)
+    duplicate = object.__new__(kind)
     for slot in kind.__slots__:
-        setattr(made, slot, getattr(message, slot))
-    return made
+        setattr(duplicate, slot, getattr(message, slot))
+    return duplicate
 
 
 def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
@@ -100,13 +104,13 @@ def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
     kind = type(message)
     if owner_of(kind) is not kind:
         return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
-    made = memo[id(message)] = object.__new__(kind)
+    duplicate = memo[id(message)] = object.__new__(kind)
     for slot in kind.__slots__:
         value = getattr(message, slot)
         if type(value) not in ATOMIC:
             value = deepcopy(value, memo)
-        setattr(made, slot, value)
-    return made
+        setattr(duplicate, slot, value)
+    return duplicate
 
 
 def _reconstructed(
@@ -115,13 +119,13 @@ def _reconstructed(
     """Return a copy of an instance of a user's subclass, which may have more than slots."""
     reduced: Any = object.__reduce_ex__(message, 4)
     state = reduced[2]
-    made = object.__new__(type(message))
+    duplicate = object.__new__(type(message))
     if memo is not None:
-        memo[id(message)] = made
+        memo[id(message)] = duplicate
     for part in state if isinstance(state, tuple) else (state,):
         for name, value in (part or {}).items():
-            object.__setattr__(made, name, copy_of(value))
-    return made
+            object.__setattr__(duplicate, name, copy_of(value))
+    return duplicate
 
 
 def represented(message: Any) -> str:
@@ -144,10 +148,16 @@ def _shown_name(kind: type) -> str:
     return f"{package}.{kind.__name__}" if package else kind.__name__
 
 
+def named_values(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield each field's Python name and value, those that a user's subclass adds included."""
+    import dataclasses
+
+    for field in dataclasses.fields(message):
+        yield field.name, getattr(message, field.name)
+
+
 def pretty(message: Any, printer: Any, cycle: bool) -> None:
     """Show a message on as many lines as it takes, with IPython's pretty printer."""
-    from .on_demand.fields import named_values
-
     name = _shown_name(type(message))
     if cycle:
         printer.text(f"{name}(...)")

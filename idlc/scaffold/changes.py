@@ -1,4 +1,4 @@
-"""What the commands of `idlc scaffold` share: the package around, then all changes or none."""
+"""The steps that the commands of `idlc scaffold` share: finding the package, making changes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from idlc.scaffold.templates import (
 
 
 class Settings(NamedTuple):
-    """What every scaffold command can be told, and the folder that it works in."""
+    """The options of every scaffold command, and the folder that it works in."""
 
     root: Root
     dry_run: bool = False
@@ -45,9 +45,9 @@ class Settings(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What a command did, or would do: its files, and a diff where nothing was written.
+    """The files that a command wrote or would write, with a diff if it wrote nothing.
 
-    `notes` say what is left to do by hand, `following` which arguments of `idlc` come next.
+    `notes` list steps to do by hand, `following` the arguments of the next `idlc` command.
     """
 
     folder: str
@@ -58,18 +58,18 @@ class Result(NamedTuple):
 
 
 def templates(settings: Settings, report: Report) -> Templates:
-    """Return idlc's templates, and those of the user's folder instead of them."""
+    """Return idlc's templates, where templates in the user's folder replace them."""
     folder = settings.templates or load_settings(settings.root, report).templates
     if folder is None:
         return Templates()
-    found = Templates(read(folder, folders(), ENDING, settings.root, report))
-    found.check(report)
-    return found
+    user_templates = Templates(read(folder, folders(), ENDING, settings.root, report))
+    user_templates.check(report)
+    return user_templates
 
 
 @contextmanager
 def rendering(subject: str, report: Report) -> Iterator[None]:
-    """Report what is wrong with a user's template within; anything else is idlc's own fault."""
+    """Report problems of a user's template within; other exceptions are bugs of idlc."""
     keep()
     with stage("scaffold", subject):
         try:
@@ -97,7 +97,7 @@ def find_package(settings: Settings, report: Report) -> tuple[Project, str] | No
 
 
 def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
-    """Return the library that has a package and what is used in it."""
+    """Return a library with a package and the packages that it may use."""
     distro = scope(load_settings(settings.root, Report())).distro
     own = {package: (project.path,)}
     return Library(settings.include, settings.root, report, own=own, distro=distro)
@@ -147,11 +147,11 @@ def write(
     settings: Settings,
     report: Report,
 ) -> Result | None:
-    """Write all files or none, or show what that would change; `None` after a problem."""
-    found = project.plan(added, edited)
-    if found is None or report.had_errors:
+    """Write all files or none, or only show the changes; `None` after a problem."""
+    planned = project.plan(added, edited)
+    if planned is None or report.had_errors:
         return None
-    changes, done = found
+    changes, done = planned
     if settings.dry_run:
         return Result(project.name, tuple(done), tuple(project.diff(changes)))
     if not project.apply(changes):
@@ -159,7 +159,7 @@ def write(
     return Result(project.name, tuple(done))
 
 
-#: Where copies go unless that is set.
+#: The default folder of copies.
 FOLDER = "templates"
 
 
@@ -173,18 +173,18 @@ class Listed(NamedTuple):
 def listed(settings: Settings, report: Report) -> list[Listed]:
     """Return the templates that a user can replace."""
     folder = settings.templates or load_settings(settings.root, report).templates
-    found = read(folder, folders(), ENDING, settings.root, report) if folder else {}
-    return [Listed(name, found[name].path if name in found else "") for name in names()]
+    sources = read(folder, folders(), ENDING, settings.root, report) if folder else {}
+    return [Listed(name, sources[name].path if name in sources else "") for name in names()]
 
 
-def copied(wanted: Sequence[str], settings: Settings, report: Report) -> Result | None:
+def copied(chosen: Sequence[str], settings: Settings, report: Report) -> Result | None:
     """Copy templates into the user's folder, to be changed there."""
     set_already = settings.templates or load_settings(settings.root, report).templates
     if report.had_errors:
         return None
     folder = set_already or FOLDER
     project = Project(folder, settings.root, report, force=settings.force)
-    result = write(project, {name: copy(name) for name in wanted}, {}, settings, report)
+    result = write(project, {name: copy(name) for name in chosen}, {}, settings, report)
     if result is None or set_already:
         return result
     note = f'set `templates = "{folder}"` in [tool.idlc] of pyproject.toml, or use --templates'
@@ -194,11 +194,12 @@ def copied(wanted: Sequence[str], settings: Settings, report: Report) -> Result 
 def check(role: Role, type_: str, settings: Settings) -> None:
     """Raise ValueError if there is no such interface for the package of the working folder."""
     report = Report()
-    found = find_package(settings, report)
-    if found is None or role.kind is None:
-        return  # which is said when the node is written
-    library = library_around(found[1], found[0], settings, report)
-    type_name(Endpoint(role, type_, ""), found[1], library, report)
+    located = find_package(settings, report)
+    if located is None or role.kind is None:
+        return  # a missing package is reported when the node is written
+    project, own = located
+    library = library_around(own, project, settings, report)
+    type_name(Endpoint(role, type_, ""), own, library, report)
     for problem in report:
         raise ValueError("; ".join(filter(None, (problem.message, problem.hint))))
 
@@ -222,7 +223,7 @@ _ARTICLES: dict[ir.Kind, str] = {"msg": "message", "srv": "service", "action": "
 
 
 def _hint(name: ir.TypeName, own: str, library: Library) -> str | None:
-    """Return what may have been meant by an interface that there is not."""
+    """Return a hint for the name of an interface that does not exist."""
     for kind, what in _ARTICLES.items():
         if kind != name.kind and library.source(name._replace(kind=kind)) is not None:
             options = " or ".join(role.option for role in ROLES if role.kind == kind)
@@ -235,8 +236,9 @@ def _hint(name: ir.TypeName, own: str, library: Library) -> str | None:
         ]
         if elsewhere:
             return f"did you mean {' or '.join(elsewhere)}?"
-    known = [str(one) for one in library.interfaces(name.package) if one.kind == name.kind]
-    hint = did_you_mean(str(name), known)
+    interfaces = library.interfaces(name.package)
+    names_of_kind = [str(other) for other in interfaces if other.kind == name.kind]
+    hint = did_you_mean(str(name), names_of_kind)
     if name.package == own:
         return hint or f"write it with `idlc scaffold interface {name.kind} {name.name} FIELD...`"
     if hint or name.package in library.packages():

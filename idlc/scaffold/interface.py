@@ -31,7 +31,7 @@ from idlc.scaffold.project import Project
 from idlc.scaffold.templates import Templates
 
 SEPARATOR = "---"
-#: The folder of what is installed for ROS 2's tools only.
+#: The folder of files that only tools of ROS 2 read.
 RESOURCE = "resource"
 
 
@@ -50,23 +50,23 @@ def interface_text(kind: str, fields: Sequence[str], comment: str = "") -> str:
             parts.append([])
         else:
             parts[-1].append(field.strip())
-    wanted = {"msg": 1, "srv": 2, "action": 3}[kind]
-    if len(parts) > wanted:
-        rule = f"a .{kind} file has {wanted} part{'s' * (wanted > 1)}"
+    part_count = {"msg": 1, "srv": 2, "action": 3}[kind]
+    if len(parts) > part_count:
+        rule = f"a .{kind} file has {part_count} part{'s' * (part_count > 1)}"
         raise ValueError(f"{rule}, here are {len(parts)}: there is one `---` too many")
-    if fields and len(parts) < wanted:
+    if fields and len(parts) < part_count:
         rest = {"srv": "the response", "action": "the result and the feedback"}[kind]
         raise ValueError(
-            f"a .{kind} file has {wanted} parts: add `---` before the fields of {rest}"
+            f"a .{kind} file has {part_count} parts: add `---` before the fields of {rest}"
         )
-    parts += [[] for _ in range(wanted - len(parts))]
+    parts += [[] for _ in range(part_count - len(parts))]
     head = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
     gap = "\n" if head and parts[0] else ""
     body = f"{SEPARATOR}\n".join("".join(f"{line}\n" for line in part) for part in parts)
     return head + gap + body
 
 
-#: What a new file holds to begin with.
+#: The first content of a new file.
 _STARTERS = {
     "msg": ("float32 speed  # forwards [m/s]",),
     "srv": ("bool enable  # what is wanted", "---", "bool enabled  # what is so now"),
@@ -114,11 +114,12 @@ _LIST = "dependencies"
 def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
     """Return the file with packages added to its list of dependencies."""
     commands = list(calls(Source("CMakeLists.txt", text)))
-    there = {word for one in commands for word in one.words}
-    missing = [name for name in names if name not in there]
+    words = {word for command in commands for word in command.words}
+    missing = [name for name in names if name not in words]
     if not missing:
         return Edited(text)
-    lists = [one for one in commands if one.name == "set" and one.words[:1] == (_LIST,)]
+    assigned = (command for command in commands if command.name == "set")
+    lists = [command for command in assigned if command.words[:1] == (_LIST,)]
     if len(lists) != 1:
         why = f"there is no `set({_LIST} ...)`, or more than one"
         return Refused(why, " ".join(missing), WHERE)
@@ -130,7 +131,7 @@ MANIFEST = "package.xml"
 SETUP = "setup.py"
 
 
-def enter_interface(
+def interface_edits(
     model: Model,
     texts: Mapping[str, str],
     keys: Iterable[str],
@@ -138,7 +139,7 @@ def enter_interface(
     *,
     tested: bool,
 ) -> dict[str, Outcome]:
-    """Return the edits of a package that has got the interfaces of a model.
+    """Return the edits of a package that gets the interfaces of a model.
 
     `texts` are those of the package's files that exist, `keys` all its interfaces as
     `kind/Name.kind`, `folders` those that there are by dotted name, and whether each is a Python
@@ -167,9 +168,9 @@ def index_interface(model: Model, texts: Mapping[str, str], keys: Iterable[str])
 
 def implied_packages(model: Model) -> list[str]:
     """Return the packages that a package depends on for its own interfaces."""
-    implied = {p for one in model.own for p in derive.IMPLICIT_PACKAGES[one.name.kind]}
+    implied = {p for own in model.own for p in derive.IMPLICIT_PACKAGES[own.name.kind]}
     implied &= {*catalog.packages(model.distro)}  # older distributions lack some
-    used = {target.package for one in model.own for target in derive.references(one)}
+    used = {target.package for own in model.own for target in derive.references(own)}
     return sorted((implied | used) - {model.package})
 
 
@@ -182,10 +183,10 @@ def interface(
     report: Report,
 ) -> Result | None:
     """Write an interface file into the package that the working folder belongs to."""
-    found = find_package(settings, report)
-    if found is None:
+    located = find_package(settings, report)
+    if located is None:
         return None
-    project, own = found
+    project, own = located
     path = f"{kind}/{name}.{kind}"
     text = interface_text(kind, fields, comment)
     used = templates(settings, report)
@@ -195,10 +196,10 @@ def interface(
     added = {path: text}
     with rendering(name, report):
         added |= _test_of_interfaces(project, own, used)
-    read = {one: project.text(one) for one in (CMAKE, MANIFEST, SETUP)}
-    texts = {one: text for one, text in read.items() if text is not None}
-    keys, there = {*keys_of(project), path}, folders(project.path)
-    edits = enter_interface(model, texts, keys, there, tested=len(added) > 1)
+    read = {file: project.text(file) for file in (CMAKE, MANIFEST, SETUP)}
+    texts = {file: text for file, text in read.items() if text is not None}
+    keys, present = {*keys_of(project), path}, folders(project.path)
+    edits = interface_edits(model, texts, keys, present, tested=len(added) > 1)
     edited = accepted(project, edits, report)
     if edited is None:
         return None
@@ -211,7 +212,7 @@ def interface(
 def _model(
     project: Project, name: ir.TypeName, path: str, text: str, settings: Settings, report: Report
 ) -> Model:
-    """Return the model of a package that has a new interface only; report what is wrong with it."""
+    """Return the model of a package with only the new interface; report its problems."""
     library = library_around(name.package, project, settings, report)
     problems = Report()
     source = Source(project.shown(path), text)
@@ -221,7 +222,7 @@ def _model(
 
 
 def _test_of_interfaces(project: Project, own: str, used: Templates) -> dict[str, str]:
-    """Return the test that `colcon test` runs, for a package that says what idlc generates."""
+    """Return the test that `colcon test` runs, for a package with [tool.idlc]."""
     path = "test/test_interfaces.py"
     if "[tool.idlc]" not in (project.text("pyproject.toml") or "") or project.has(path):
         return {}

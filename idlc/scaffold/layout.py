@@ -49,16 +49,16 @@ def _literal(text: str) -> str:
 
 def imports(modules: Mapping[str, Iterable[str]], plain: Iterable[str]) -> list[str]:
     """Return import lines, sorted by module: `modules` with names, `plain` as they are."""
-    found = [(name.lower(), "", f"import {name}") for name in plain]
+    entries = [(name.lower(), "", f"import {name}") for name in plain]
     for module, names in modules.items():
         renamed = {name for name in names if " as " in name}
-        found += [(module.lower(), n.lower(), f"from {module} import {n}") for n in renamed]
+        entries += [(module.lower(), n.lower(), f"from {module} import {n}") for n in renamed]
         ordered = sorted(set(names) - renamed, key=lambda name: (name.lower(), name))
         if not ordered:
             continue
         line = "\n".join(import_from(module, ordered, width=WIDTH))
-        found.append((module.lower(), ordered[0].lower(), line))
-    return [line for *_, line in sorted(found)]
+        entries.append((module.lower(), ordered[0].lower(), line))
+    return [line for *_, line in sorted(entries)]
 
 
 def signature(head: str, parameters: Sequence[str], returns: str, *, depth: int) -> str:
@@ -70,7 +70,7 @@ def signature(head: str, parameters: Sequence[str], returns: str, *, depth: int)
     inner = f"{margin}    {', '.join(parameters)}"
     if len(inner) <= WIDTH:
         return f"{head}(\n{inner}\n{margin}) -> {returns}:"
-    each = "".join(f"{margin}    {one},\n" for one in parameters)
+    each = "".join(f"{margin}    {parameter},\n" for parameter in parameters)
     return f"{head}(\n{each}{margin}) -> {returns}:"
 
 
@@ -78,7 +78,7 @@ class ImportList:
     """Names by the modules that they come from."""
 
     def __init__(self, names: Mapping[str, Iterable[str]]) -> None:
-        self._names = {module: set(found) for module, found in names.items()}
+        self._names = {module: set(imported) for module, imported in names.items()}
 
     def add(self, module: str, *names: str) -> None:
         """Add names from a module."""
@@ -87,8 +87,8 @@ class ImportList:
 
     def add_all(self, names: Mapping[str, Iterable[str]]) -> None:
         """Add names from several modules."""
-        for module, found in names.items():
-            self.add(module, *found)
+        for module, imported in names.items():
+            self.add(module, *imported)
 
     def packages(self) -> set[str]:
         """Return the packages that are imported, but for the standard library."""
@@ -100,11 +100,12 @@ class ImportList:
         `plain` modules are imported as they are.
         """
         modules = {*self._names, *plain}
-        standard = {one for one in modules if one.partition(".")[0] in sys.stdlib_module_names}
+        library = sys.stdlib_module_names
+        standard = {name for name in modules if name.partition(".")[0] in library}
         groups = (
             imports(
-                {one: self._names[one] for one in group if one in self._names},
-                [one for one in plain if one in group],
+                {module: self._names[module] for module in group if module in self._names},
+                [module for module in plain if module in group],
             )
             for group in (standard, modules - standard)
         )
@@ -113,7 +114,7 @@ class ImportList:
 
 #: Fields that are named in one line.
 FIELDS = 6
-#: As much of a line as tests look for.
+#: The length of the line's start that tests look for.
 HEAD = 50
 
 
@@ -123,7 +124,7 @@ def log_lines(title: str, variable: str, message: ir.Message) -> tuple[str, ...]
 
 
 def log_head(title: str, variable: str, message: ir.Message) -> str:
-    """Return how the line begins that these lines log."""
+    """Return the start of the line that these lines log."""
     return " ".join(_parts(title, variable, message)).partition("{")[0][:HEAD]
 
 

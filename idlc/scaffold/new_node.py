@@ -1,4 +1,4 @@
-"""Entering a node in its package: the files that a node needs beside it, and those that list it.
+"""Adding a node to its package: the files that a node needs, and those that list it.
 
 Everything is a function of the texts of the package's files.
 """
@@ -45,7 +45,7 @@ LAUNCH_ENDING = "launch.py"
 
 
 class Entry(NamedTuple):
-    """What entering a node makes of a package: files to add, files to edit, things to do by hand.
+    """The changes that add a node to a package: new files, edits, and steps to do by hand.
 
     `notes` name the file that each is about.
     """
@@ -63,7 +63,7 @@ def paths(package: str, launch_files: Iterable[str]) -> list[str]:
     ]
 
 
-def enter_node(
+def node_entry(
     planned: Plan,
     texts: Mapping[str, str],
     files: Mapping[str, str],
@@ -72,14 +72,15 @@ def enter_node(
     keys: Iterable[str] = (),
     folders: Mapping[str, bool] = MappingProxyType({}),
 ) -> Entry:
-    """Return how a node, whose own files are `files`, is entered, but for the launch file.
+    """Return the changes that add a node, whose own files are `files`, but for the launch file.
 
     `texts` are those of the package's files that exist. A package with interfaces,
     whose `keys` are as `kind/Name.kind`, installs them; `folders` are its folders by dotted name.
     """
     node = planned.node
     script = Script(node.name, f"{node.package}.{node.name}:main")
-    described = {one: texts[one] for one in ("pyproject.toml", "setup.cfg", SETUP) if one in texts}
+    setup_files = ("pyproject.toml", "setup.cfg", SETUP)
+    described = {name: texts[name] for name in setup_files if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
         described[SETUP] = data_files.add_interfaces(text, node.package, own, folders)
@@ -92,7 +93,7 @@ def enter_node(
     return Entry(support, {path: outcome, MANIFEST: manifest})
 
 
-def enter_launch(
+def with_launch_entry(
     planned: Plan, texts: Mapping[str, str], entry: Entry, templates: Templates
 ) -> Entry:
     """Return an entry that lists the node in the launch file, too, which may be new.
@@ -107,7 +108,7 @@ def enter_launch(
         needed = package_xml.add_dependencies(manifest.text, executes=("launch", "launch_ros"))
         entry = entry._replace(edits={**entry.edits, MANIFEST: needed})
     started = launch_py.Started(node.package, node.name, node.lifecycle)
-    path = next((one for one in texts if one.startswith("launch/")), "")
+    path = next((name for name in texts if name.startswith("launch/")), "")
     if path:
         outcome = launch_py.add_node(texts[path], started)
         return _launched(entry, path, outcome)
@@ -125,7 +126,7 @@ def enter_launch(
 
 
 def _launched(entry: Entry, path: str, outcome: Outcome) -> Entry:
-    """Return an entry with the edited launch file, or with what to do by hand."""
+    """Return an entry with the edited launch file, or with a note of what to do by hand."""
     if isinstance(outcome, Edited):
         return entry._replace(edits={**entry.edits, path: outcome})
     text = f"is not edited: {outcome.why}; add this {outcome.where}: {outcome.line.rstrip(',')}"
@@ -137,16 +138,16 @@ def _support(
 ) -> dict[str, str]:
     """Return the files that nodes need beside them and that their package lacks."""
     plain = package_view(package)
-    found = {}
+    support = {}
     if CONFTEST not in texts:
-        found[CONFTEST] = rendered("package/conftest.py.jinja", plain, templates)
+        support[CONFTEST] = rendered("package/conftest.py.jinja", plain, templates)
     if f"{package}/__init__.py" not in texts:
-        found[f"{package}/__init__.py"] = ""
+        support[f"{package}/__init__.py"] = ""
     module = _main_module(package)
     imported = any(f"{package}.{MAIN_MODULE} " in text for text in files.values())
     if imported and "def until_shutdown" not in texts.get(module, ""):
-        found[module] = rendered("package/node_main.py.jinja", plain, templates)
-    return found
+        support[module] = rendered("package/node_main.py.jinja", plain, templates)
+    return support
 
 
 def _main_module(package: str) -> str:
@@ -155,47 +156,48 @@ def _main_module(package: str) -> str:
 
 def _launch_file(package: str, names: Iterable[str]) -> str:
     """Return the launch file that lists the package's nodes, of the names in `launch/`."""
-    found = [name for name in names if name.endswith(LAUNCH_ENDING)]
+    launch_files = [name for name in names if name.endswith(LAUNCH_ENDING)]
     preferred = [f"{package}_launch.py", f"{package}.launch.py"]
-    for name in (*preferred, *(found if len(found) == 1 else ())):
-        if name in found:
+    for name in (*preferred, *(launch_files if len(launch_files) == 1 else ())):
+        if name in launch_files:
             return f"launch/{name}"
     return f"launch/{preferred[0]}"
 
 
-def node(wanted: spec.Node, settings: Settings, report: Report) -> Result | None:
-    """Write a node and its test, and enter it wherever its package lists its nodes."""
-    found = find_package(settings, report)
-    if found is None:
+def node(requested: spec.Node, settings: Settings, report: Report) -> Result | None:
+    """Write a node and its test, and add it to the files that list the nodes of its package."""
+    located = find_package(settings, report)
+    if located is None:
         return None
-    project, own = found
+    project, own = located
     used = templates(settings, report)
-    planned = _planned(wanted._replace(package=own), project, settings, report)
+    planned = _planned(requested._replace(package=own), project, settings, report)
     if planned is None or report.had_errors:
         return None
     entry = Entry({}, {})
-    with rendering(wanted.name, report):
+    with rendering(requested.name, report):
         entry = _entry(planned, project, used, launch=settings.launch)
     edited = accepted(project, entry.edits, report)
     result = None if edited is None else write(project, entry.added, edited, settings, report)
     if result is None:
         return None
     missing = not project.has(f"{own}/_idlc")
-    compiled = any(one.interface and one.interface.name.package == own for one in planned.endpoints)
+    used_names = (placed.interface.name for placed in planned.endpoints if placed.interface)
+    compiled = any(name.package == own for name in used_names)
     after = generation(project, own, settings) if missing and compiled else ()
     notes = (f"`{project.shown(path)}` {text}" for path, text in entry.notes)
     return result._replace(notes=(*notes, *_absent(planned)), following=after)
 
 
 def _planned(
-    wanted: spec.Node, project: Project, settings: Settings, report: Report
+    requested: spec.Node, project: Project, settings: Settings, report: Report
 ) -> Plan | None:
-    """Return the node with the interfaces of its endpoints; report those that there are not."""
-    library = library_around(wanted.package, project, settings, report)
+    """Return the node with the interfaces of its endpoints; report missing ones."""
+    library = library_around(requested.package, project, settings, report)
     interfaces: list[ir.Interface | None] = []
     messages: dict[ir.TypeName, ir.Message] = {}
-    for endpoint in wanted.endpoints:
-        name = type_name(endpoint, wanted.package, library, report)
+    for endpoint in requested.endpoints:
+        name = type_name(endpoint, requested.package, library, report)
         source = name and library.source(name)
         if not name or source is None:
             interfaces.append(None)
@@ -207,11 +209,11 @@ def _planned(
         else:
             interfaces.append(model.interfaces[name])
             messages.update(model.messages)
-    return None if report.had_errors else plan(wanted, interfaces, messages)
+    return None if report.had_errors else plan(requested, interfaces, messages)
 
 
 def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) -> Entry:
-    """Return the files of a node, and how its package lists it."""
+    """Return the files of a node, and the edits that list it in its package."""
     own, name = planned.node.package, planned.node.name
     files = {
         f"{own}/{name}.py": render(planned, used),
@@ -221,18 +223,18 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
         compile(text, path, "exec", dont_inherit=True)
     read = {path: project.text(path) for path in paths(own, project.names("launch"))}
     texts = {path: text for path, text in read.items() if text is not None}
-    keys, there = keys_of(project), folders(project.path)
-    entry = enter_node(planned, texts, files, used, keys=keys, folders=there)
+    keys, present = keys_of(project), folders(project.path)
+    entry = node_entry(planned, texts, files, used, keys=keys, folders=present)
     if launch:
-        entry = enter_launch(planned, texts, entry, used)
+        entry = with_launch_entry(planned, texts, entry, used)
     return entry._replace(added={**files, **entry.added})
 
 
 def _absent(planned: Plan) -> list[str]:
-    """Return what to install, where there is ROS 2 but not all that the node imports."""
+    """Return a note if ROS 2 is installed, but not all packages that the node imports."""
     absent = [name for name in planned.packages if not python_folders(name)]
     if not absent or not python_folders("rclpy"):
         return []
     names = ", ".join(f"`{name}`" for name in absent)
-    here = BY_NAME.get(distribution().name, DEFAULT)
-    return [f"{names} cannot be imported here: {here.installing(absent)}"]
+    distro = BY_NAME.get(distribution().name, DEFAULT)
+    return [f"{names} cannot be imported here: {distro.installing(absent)}"]

@@ -1,4 +1,4 @@
-"""A node's module: from what it is to do to the lines that its template lays out."""
+"""A node's module: from its plan to the lines that its template lays out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from idlc.scaffold.templates import Templates
 
 
 class StatesView(NamedTuple):
-    """What a lifecycle node does when its state changes."""
+    """The statements of a lifecycle node for changes of its state."""
 
     on_configure: tuple[str, ...]
     on_activate: tuple[str, ...]
@@ -35,7 +35,7 @@ def remembered(parts: Sequence[Part], *, waits: bool) -> tuple[str, ...]:
 
 
 def states(parts: Sequence[Part], tasks: Iterable[tuple[str, str]], *, waits: bool) -> StatesView:
-    """Return what a lifecycle node does when it is configured, and when it starts to work.
+    """Return the statements of a lifecycle node for being configured and activated.
 
     `tasks` are the methods that begin to ask others, each with the function that makes a request.
     A node that `waits` has coroutines, which must know how long it is active.
@@ -54,7 +54,7 @@ def _lines(parts: Iterable[Part], which: str) -> tuple[str, ...]:
     return tuple(line for part in parts for line in getattr(part, which))
 
 
-#: The module of the package that has what every `main` needs.
+#: The module of the package with the functions that every `main` needs.
 MAIN_MODULE = "node_main"
 #: Names that a module of a node uses itself, whatever its roles.
 _OWN = (
@@ -63,14 +63,14 @@ _OWN = (
     *(name for preset in role.QOS_PRESETS for name in (*preset.imports, preset.source)),
     *(name for role in ROLES for names in role.imports.values() for name in names),
 )
-#: The longest description of a node that fits wherever it stands.
+#: The longest description of a node that fits everywhere.
 SUMMARY = 70
 CLOCK = "self.get_clock().now().to_msg()"
 TIMEOUT = "server_timeout"
 
 
 class ParameterView(NamedTuple):
-    """A parameter as its property shows it: its name, that in Python, its type and its value."""
+    """A parameter and its property: its name, its name in Python, its type and its value."""
 
     name: str
     word: str
@@ -79,7 +79,7 @@ class ParameterView(NamedTuple):
 
 
 class MainView(NamedTuple):
-    """The function `main`: the template that lays it out, and what it does.
+    """The function `main`: its template, and its statements.
 
     `run` calls it, `node` makes the node. `tasks` start what the node asks others for;
     `arguments` are the lines that declare the command line, `requests` the functions that make
@@ -95,10 +95,10 @@ class MainView(NamedTuple):
 
 
 class NodeView(NamedTuple):
-    """What the template of a node shows; lines are finished, without their indentation.
+    """The content of a node's template; lines are finished, without their indentation.
 
-    `base` is the class that it extends, `setup` its `__init__`, `states` what it does when the
-    state of its lifecycle changes. `has_pause`, `has_until` and `has_retire` say which methods
+    `base` is the class that it extends, `setup` its `__init__`, `states` its statements for changes
+    of its lifecycle. `has_pause`, `has_until` and `has_retire` say which methods
     its parts need.
     """
 
@@ -135,7 +135,7 @@ def view(planned: Plan) -> NodeView:
     class_name = spec.class_name(node.name)
     class_name += "Node" if class_name in page.names or class_name in _OWN else ""
     main = _main(planned, page, class_name)
-    given, helpers = _given(planned), _helpers(node)
+    constructor, helpers = _constructor(planned), _helpers(node)
     waits = "pause" in helpers
     created = remembered(parts, waits=waits) if node.lifecycle else ()
     begun = () if node.lifecycle else plain(parts)
@@ -146,8 +146,8 @@ def view(planned: Plan) -> NodeView:
         summary=_summary(node),
         imports=_imports(planned, page),
         constants=node_constants(node),
-        init_head=given.head,
-        setup=(*given.setup, *created, *_declarations(node), *begun),
+        init_head=constructor.head,
+        setup=(*constructor.setup, *created, *_declarations(node), *begun),
         parameters=tuple(map(_parameter, node.parameters)),
         parts=parts,
         has_pause=waits,
@@ -179,7 +179,7 @@ def _main(planned: Plan, page: Page, class_name: str) -> MainView:
     return MainView(
         template="node/main_once.py.jinja" if planned.once else "node/main.py.jinja",
         run="sys.exit(main())" if planned.once else "main()",
-        node=f"{class_name}({_given(planned).call})",
+        node=f"{class_name}({_constructor(planned).call})",
         tasks=_started(planned),
         arguments=tuple(declared),
         requests=tuple(requests),
@@ -187,33 +187,37 @@ def _main(planned: Plan, page: Page, class_name: str) -> MainView:
 
 
 def _summary(node: spec.Node) -> str:
-    """Return what the node does, if that fits into a line."""
+    """Return a summary of the node, with its roles if they fit into a line."""
     kind = "lifecycle node" if node.lifecycle else "node"
-    does = [one.role.summary.format(one.topic) for one in node.endpoints if one.role.summary]
+    summaries = ((endpoint.role.summary, endpoint.topic) for endpoint in node.endpoints)
+    does = [summary.format(topic) for summary, topic in summaries if summary]
     *most, last = does or [""]
-    said = f"{', '.join(most)} and {last}" if most else last
-    text = f"The {kind} {node.name} {said}.".replace(" .", ".")
+    phrase = f"{', '.join(most)} and {last}" if most else last
+    text = f"The {kind} {node.name} {phrase}.".replace(" .", ".")
     return text if len(text) <= SUMMARY else f"The {kind} {node.name}."
 
 
 def node_constants(node: spec.Node) -> tuple[str, ...]:
-    """Return the lines that define what qualities of service are called."""
-    lines = {one.qos.constant: None for one in node.endpoints if one.qos.constant}
+    """Return the lines that define constants of qualities of service."""
+    lines = {endpoint.qos.constant: None for endpoint in node.endpoints if endpoint.qos.constant}
     return (*lines, "") if lines else ()
 
 
 def _declarations(node: spec.Node) -> list[str]:
-    found = []
-    for one in node.parameters:
-        default = list(one.default) if isinstance(one.default, tuple) else one.default
-        found.append(f"self.declare_parameter({one.name!r}, {default!r})")
-    return found
+    lines = []
+    for parameter in node.parameters:
+        default = (
+            list(parameter.default) if isinstance(parameter.default, tuple) else parameter.default
+        )
+        lines.append(f"self.declare_parameter({parameter.name!r}, {default!r})")
+    return lines
 
 
-def _parameter(one: spec.Parameter) -> ParameterView:
-    value = f"self.get_parameter({one.name!r}).value"
-    several = one.annotation.startswith("list")
-    return ParameterView(one.name, one.word, one.annotation, f"list({value})" if several else value)
+def _parameter(parameter: spec.Parameter) -> ParameterView:
+    value = f"self.get_parameter({parameter.name!r}).value"
+    several = parameter.annotation.startswith("list")
+    value = f"list({value})" if several else value
+    return ParameterView(parameter.name, parameter.word, parameter.annotation, value)
 
 
 def _requests(planned: Plan, page: Page) -> tuple[list[samples.RequestView], list[str]]:
@@ -231,63 +235,68 @@ def _requests(planned: Plan, page: Page) -> tuple[list[samples.RequestView], lis
 
 def _tasks(planned: Plan) -> list[tuple[str, str]]:
     """Return the methods that begin to ask others, each with the function that makes a request."""
-    return [(f"{one.request.method}_{one.word}", f"{one.word}_request") for one in planned.asking]
+    methods = ((asking.request.method, asking.word) for asking in planned.asking)
+    return [(f"{method}_{word}", f"{word}_request") for method, word in methods]
 
 
 def _started(planned: Plan) -> tuple[str, ...]:
-    """Return what `main` starts, unless it waits for the node's activation."""
+    """Return the lines that start tasks in `main`, unless they wait for the node's activation."""
     if planned.node.lifecycle:
         return ()
     calls = []
-    for one, (method, request) in zip(planned.asking, _tasks(planned), strict=True):
+    for asking, (method, request) in zip(planned.asking, _tasks(planned), strict=True):
         words = [f"node.{method}", f"{request}(given)"]
         if planned.once:
-            undone = [f"node.{one.request.cancel}_{one.word}"] if one.request.cancel else []
+            undone = (
+                [f"node.{asking.request.cancel}_{asking.word}"] if asking.request.cancel else []
+            )
             calls.append(call("once.run", ["node", *words, *undone], depth=2))
         else:
             calls.append(call("executor.create_task", words, depth=1))
     return tuple(line for lines in calls for line in lines)
 
 
-class _Given(NamedTuple):
+class _Constructor(NamedTuple):
     head: str
     setup: tuple[str, ...]
     call: str
 
 
-def _given(planned: Plan) -> _Given:
-    """Return how the class is told what the command line says."""
+def _constructor(planned: Plan) -> _Constructor:
+    """Return the constructor, which takes the arguments of the command line."""
     if not planned.asking:
-        return _Given("def __init__(self) -> None:", (), "")
+        return _Constructor("def __init__(self) -> None:", (), "")
     if planned.node.lifecycle:
         setup = ("self.given = given", f"self.timeout: float = given.{TIMEOUT}")
-        return _Given("def __init__(self, given: argparse.Namespace) -> None:", setup, "given")
+        head = "def __init__(self, given: argparse.Namespace) -> None:"
+        return _Constructor(head, setup, "given")
     head = "def __init__(self, timeout: float) -> None:"
-    return _Given(head, ("self.timeout = timeout",), f"given.{TIMEOUT}")
+    return _Constructor(head, ("self.timeout = timeout",), f"given.{TIMEOUT}")
 
 
 def _imports(planned: Plan, page: Page) -> tuple[tuple[str, ...], ...]:
     """Return the import lines in groups: the standard library, then everything else."""
     node = planned.node
     waits = "pause" in _helpers(node)
-    found = ImportList(page.imports())
+    imports = ImportList(page.imports())
     for endpoint in node.endpoints:
-        found.add_all(endpoint.role.imports)
-        found.add("rclpy.qos", *endpoint.qos.imports)
+        imports.add_all(endpoint.role.imports)
+        imports.add("rclpy.qos", *endpoint.qos.imports)
     if waits:
-        found.add("rclpy.task", "Future")
+        imports.add("rclpy.task", "Future")
     if planned.asking:
-        found.add("collections.abc", "Callable")
-        found.add("rclpy.utilities", "remove_ros_args")
+        imports.add("collections.abc", "Callable")
+        imports.add("rclpy.utilities", "remove_ros_args")
     main = ("interruptible",) if planned.once else ("until_shutdown", "WakingExecutor")
-    found.add(f"{node.package}.{MAIN_MODULE}", *main)
+    imports.add(f"{node.package}.{MAIN_MODULE}", *main)
     if node.lifecycle:
-        found.add("contextlib", "ExitStack")
-        found.add("rclpy.lifecycle", "LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
+        imports.add("contextlib", "ExitStack")
+        states = ("LifecycleNode", "LifecycleState", "TransitionCallbackReturn")
+        imports.add("rclpy.lifecycle", *states)
         if waits:
-            found.add("collections.abc", "Callable", "Coroutine")
-            found.add("typing", "Any")
+            imports.add("collections.abc", "Callable", "Coroutine")
+            imports.add("typing", "Any")
     else:
-        found.add("rclpy.node", "Node")
+        imports.add("rclpy.node", "Node")
     reading = ("argparse", "sys", "time") if planned.asking else ()
-    return found.groups((*reading, *(() if planned.once else ("rclpy",))))
+    return imports.groups((*reading, *(() if planned.once else ("rclpy",))))

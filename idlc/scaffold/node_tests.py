@@ -24,7 +24,7 @@ _TAKEN = (
 
 
 class TestView(NamedTuple):
-    """What the template of a test shows; `waiting` starts a node that does not end by itself.
+    """The content of a test's template; `waiting` starts a node that does not end by itself.
 
     `interrupted` is the status with which it ends when it is asked to.
     """
@@ -80,10 +80,11 @@ def _part(planned: Plan, placed: Placed, page: Page) -> TestPart:
 
 
 def _constants(planned: Plan) -> Iterator[str]:
-    """Yield the lines of what the tests compare with."""
+    """Yield the lines of constants that the tests compare with."""
     node = planned.node
     if node.lifecycle:
-        offered = (_resolved(one, node.name) for one in node.endpoints if one.role.kind)
+        served = (endpoint for endpoint in node.endpoints if endpoint.role.kind)
+        offered = (_resolved(endpoint, node.name) for endpoint in served)
         names = sorted(set(map(repr, offered)))
         yield from (
             collection("OFFERED = ", "{", names, "}") if names else ["OFFERED: set[str] = set()"]
@@ -97,7 +98,7 @@ def _constants(planned: Plan) -> Iterator[str]:
 
 
 def _resolved(endpoint: Endpoint, node: str) -> str:
-    """Return a name that says in ROS 2's graph that an endpoint is there."""
+    """Return the name of an endpoint in ROS 2's graph."""
     topic = endpoint.topic.replace("~", f"/{node}")
     whole = topic if topic.startswith("/") else f"/{topic}"
     return f"{whole}/_action/send_goal" if endpoint.role.kind == "action" else whole
@@ -112,20 +113,20 @@ def packages(planned: Plan) -> list[str]:
 
 
 def _collected(planned: Plan, parts: tuple[TestPart, ...], page: Page) -> ImportList:
-    """Return what the test imports, besides pytest."""
+    """Return the imports of the test, besides pytest."""
     node = planned.node
-    found = ImportList(page.imports())
+    imports = ImportList(page.imports())
     for endpoint, part in zip(node.endpoints, parts, strict=True):
-        found.add_all(endpoint.role.test_imports)
-        found.add_all(part.imports)
-        found.add("rclpy.qos", *endpoint.qos.imports)
+        imports.add_all(endpoint.role.test_imports)
+        imports.add_all(part.imports)
+        imports.add("rclpy.qos", *endpoint.qos.imports)
     if node.lifecycle:
-        found.add("lifecycle_msgs.msg", "Transition")
-        found.add("lifecycle_msgs.srv", "ChangeState")
+        imports.add("lifecycle_msgs.msg", "Transition")
+        imports.add("lifecycle_msgs.srv", "ChangeState")
     if node.parameters:
-        found.add("rcl_interfaces.srv", "GetParameters")
-        found.add("rclpy.parameter", "parameter_value_to_python")
-    found.add("rclpy.node", "Node")
-    found.add("collections.abc", "Callable")
-    found.add("typing", "Any")
-    return found
+        imports.add("rcl_interfaces.srv", "GetParameters")
+        imports.add("rclpy.parameter", "parameter_value_to_python")
+    imports.add("rclpy.node", "Node")
+    imports.add("collections.abc", "Callable")
+    imports.add("typing", "Any")
+    return imports

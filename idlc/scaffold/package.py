@@ -25,12 +25,12 @@ _TEXTS = Path(__file__).parent / "licenses"
 
 PYTHON = "ament_python"
 CMAKE = "ament_cmake"
-#: What interfaces need of ROS 2 itself: events of services, goals and states of actions.
+#: Packages of ROS 2 that interfaces need: events of services, goals and states of actions.
 IMPLIED = ("action_msgs", "service_msgs", "unique_identifier_msgs")
 
 
 class Package(NamedTuple):
-    """What the templates of a new package show.
+    """The content of the templates of a new package.
 
     `depends` are the packages that one of interfaces only depends on.
     """
@@ -46,7 +46,7 @@ class Package(NamedTuple):
 
     @property
     def is_python(self) -> bool:
-        """Whether the package has nodes."""
+        """True if the package has nodes."""
         return self.build_type == PYTHON
 
     @property
@@ -135,7 +135,7 @@ GROWING = (
     *("package.xml", "setup.py", "pyproject.toml", "setup.cfg", "CMakeLists.txt"),
     *("README.md", ".gitattributes", ".gitignore"),
 )
-#: What would not be found any more next to a package of such a name.
+#: Modules and folders that a package of such a name would hide.
 _TAKEN = frozenset(
     "action idlc launch launch_ros msg pytest rclpy resource setuptools srv test".split()
 )
@@ -159,15 +159,15 @@ def package_view(name: str) -> Package:
 def package_files(package: Package, templates: Templates) -> dict[str, str]:
     """Return the texts of a new package's files by their paths in its folder."""
     listed = _CMAKE_FILES if package.build_type == CMAKE else _PYTHON_FILES
-    found = {
+    files = {
         path.replace("NAME", package.name): rendered(template, package, templates)
         for path, template in listed.items()
     }
-    found["LICENSE"] = license_text(package)
+    files["LICENSE"] = license_text(package)
     if package.build_type == PYTHON:
-        found[f"resource/{package.name}"] = ""
-        found[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
-    return found
+        files[f"resource/{package.name}"] = ""
+        files[f"{package.name}/__init__.py"] = f'"""Nodes and interfaces of {package.name}."""\n'
+    return files
 
 
 def rendered(template: str, package: Package, templates: Templates) -> str:
@@ -193,34 +193,34 @@ _ARGUMENTS = {
 
 
 def package(
-    wanted: Package,
+    requested: Package,
     folder: str,
     settings: Settings,
     report: Report,
     starters: Mapping[str, str] | None = None,
-    given: Collection[str] = (),
+    chosen: Collection[str] = (),
 ) -> Result | None:
     """Write a new package below `folder`, with interfaces if it has none yet.
 
-    `given` are the fields of `wanted`, and `starters`, that the user chose. Reports IDL620 where
-    files that stay as they are say otherwise.
+    `chosen` are the fields of `requested`, and `starters`, that the user chose. Reports IDL620
+    where files that stay as they are contradict them.
     """
-    name = wanted.name if folder in ("", ".") else f"{folder}/{wanted.name}"
+    name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
     project = Project(name, settings.root, report, force=settings.force)
     used = templates(settings, report)
     if report.had_errors:
         return None
     files: dict[str, str] = {}
-    with rendering(wanted.name, report):
-        there = catalog.packages(scope(load_settings(settings.root, report)).distro)
-        depends = tuple(name for name in wanted.depends if name in there)  # Humble lacks one
-        files = package_files(wanted._replace(depends=depends), used)
+    with rendering(requested.name, report):
+        available = catalog.packages(scope(load_settings(settings.root, report)).distro)
+        depends = tuple(name for name in requested.depends if name in available)  # Humble lacks one
+        files = package_files(requested._replace(depends=depends), used)
     if not any(project.names(kind) for kind in ir.KINDS):
         files |= starters or {}
-    elif "starters" in given:
+    elif "starters" in chosen:
         report.extend(_absent(project, starters or {}))
-    # what later commands add to stays as it is
-    growing = (*GROWING, f"launch/{wanted.name}_launch.py")
+    # files that later commands add to stay as they are
+    growing = (*GROWING, f"launch/{requested.name}_launch.py")
     new = {
         path: text
         for path, text in files.items()
@@ -229,7 +229,8 @@ def package(
     for path, look in (("package.xml", _other_manifest), ("setup.py", _other_setup)):
         text = project.text(path) if path in files and path not in new else None
         if text is not None:
-            report.extend(look(Source(project.shown(path), text), wanted, {*given, "build_type"}))
+            source = Source(project.shown(path), text)
+            report.extend(look(source, requested, {*chosen, "build_type"}))
     return write(project, new, {}, settings, report)
 
 
@@ -247,42 +248,45 @@ def _absent(project: Project, starters: Mapping[str, str]) -> Iterator[Diagnosti
 
 
 def _other_manifest(
-    source: Source, wanted: Package, given: Collection[str]
+    source: Source, requested: Package, chosen: Collection[str]
 ) -> Iterator[Diagnostic]:
-    """Yield where a package.xml says other than what was given."""
-    known = statements(source)
+    """Yield a problem for each choice that a package.xml contradicts."""
+    declared = statements(source)
     for field, tag in _TAGS.items():
-        lines = [one for one in known if one.tag == tag]
-        values = [
-            one.attributes.get("email", "") if field == "email" else one.text for one in lines
-        ]
-        values = [" ".join(text.split()) for text in values]
-        said = getattr(wanted, field)
-        if field in given and lines and said not in values:
-            line = f"<{tag}>{escape(said)}</{tag}>"
+        lines = [statement for statement in declared if statement.tag == tag]
+        emails = field == "email"
+        texts = (line.attributes.get("email", "") if emails else line.text for line in lines)
+        values = [" ".join(text.split()) for text in texts]
+        value = getattr(requested, field)
+        if field in chosen and lines and value not in values:
+            line = f"<{tag}>{escape(value)}</{tag}>"
             if tag == "maintainer":
-                name = wanted.maintainer if "maintainer" in given else lines[0].text
-                email = wanted.email if "email" in given else lines[0].attributes.get("email", "")
+                name = requested.maintainer if "maintainer" in chosen else lines[0].text
+                email = (
+                    requested.email if "email" in chosen else lines[0].attributes.get("email", "")
+                )
                 line = f"<maintainer email={quoteattr(email)}>{escape(name)}</maintainer>"
             yield codes.EXISTING_FILE.at(
                 lines[0].span,
-                f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{said}`; "
+                f"the {field.replace('_', ' ')} is `{values[0]}` here, not `{value}`; "
                 "the file was not changed",
                 hint=f"write `{line}`" if field != "build_type" else "choose another name",
             )
 
 
-def _other_setup(source: Source, wanted: Package, given: Collection[str]) -> Iterator[Diagnostic]:
-    """Yield where a setup.py says other than what was given."""
+def _other_setup(
+    source: Source, requested: Package, chosen: Collection[str]
+) -> Iterator[Diagnostic]:
+    """Yield a problem for each choice that a setup.py contradicts."""
     from idlc.check.package.setup_py import Setup, span_of
 
     setup = Setup(source)
     for field, argument in _ARGUMENTS.items():
-        node, said = setup.arguments.get(argument), getattr(wanted, field)
+        node, value = setup.arguments.get(argument), getattr(requested, field)
         text = setup.text(node)
-        if node is not None and field in given and text not in (None, said):
+        if node is not None and field in chosen and text not in (None, value):
             yield codes.EXISTING_FILE.at(
                 span_of(source, node),
-                f"the {field} is `{text}` here, not `{said}`; the file was not changed",
-                hint=f"write `{argument}={said!r}`",
+                f"the {field} is `{text}` here, not `{value}`; the file was not changed",
+                hint=f"write `{argument}={value!r}`",
             )

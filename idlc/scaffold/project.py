@@ -1,6 +1,6 @@
-"""A folder of the user's own: files that are added to it, files in it that are edited.
+"""A folder of the user: files that are added to it, files in it that are edited.
 
-Other than a generated package it has no lock: a file that exists and differs from what is to be
+Unlike a generated package it has no lock: a file that exists and differs from the one to be
 added is the user's. All changes are made in one go, or none.
 """
 
@@ -22,14 +22,14 @@ from idlc.project.write import Change, Plan, difference
 
 
 class Done(NamedTuple):
-    """What happened to a file: `created`, `edited`, `replaced` or `unchanged`."""
+    """A file and its outcome: `created`, `edited`, `replaced` or `unchanged`."""
 
     path: str
     what: str
 
 
 class Project:
-    """A package's folder, existing or not; `name` is how messages call it."""
+    """A package's folder, existing or not; `name` is its name in reports."""
 
     def __init__(self, name: str, root: Root, report: Report, *, force: bool = False) -> None:
         self.name = name
@@ -38,11 +38,11 @@ class Project:
         self._force = force
 
     def shown(self, path: str) -> str:
-        """Return how messages call a file in the folder."""
+        """Return the name of a file in the folder for reports."""
         return path if self.name in ("", ".") else f"{self.name}/{path}"
 
     def has(self, path: str) -> bool:
-        """Return whether there is anything of this name."""
+        """Return whether a file or folder of this name exists."""
         return (self.path / path).exists()
 
     def text(self, path: str) -> str | None:
@@ -63,7 +63,7 @@ class Project:
     def plan(
         self, added: Mapping[str, str], edited: Mapping[str, str] | None = None
     ) -> tuple[Plan, list[Done]] | None:
-        """Return what to change so that files are as given; `None` if something is in the way.
+        """Return the changes that write files; `None` if something is in the way.
 
         `edited` texts replace what was read before; `added` ones only an equal file, unless the
         folder is written with force. Reports IDL614 and IDL620.
@@ -97,7 +97,7 @@ class Project:
         return None if refused else (Plan(self.path, tuple(changes), {}), done)
 
     def apply(self, plan: Plan) -> bool:
-        """Make planned changes, all or none; reports IDL612 and returns `False` else."""
+        """Make planned changes, all or none; report IDL612 and return `False` otherwise."""
         return write.apply_changes(plan, self.name, self._report)
 
     def diff(self, plan: Plan) -> Iterator[str]:

@@ -24,10 +24,10 @@ Messages = Mapping[ir.TypeName, ir.Message]
 
 
 class Page:
-    """What one module of Python imports of interfaces, and how it calls what it imports.
+    """The interfaces that one module of Python imports, and their names in it.
 
-    `clock` is the source of the time now, where there is a clock. `taken` names mean other things.
-    Comments are copied from the interfaces of the package `own`: others' say what everybody knows.
+    `clock` is the expression of the current time, where there is a clock. `taken` names are used
+    otherwise. Comments are copied from interfaces of the package `own` only.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Page:
         self._taken = set(taken)
 
     def use(self, name: ir.TypeName) -> str:
-        """Return how a class is called here, and import it."""
+        """Return the name of a class in this module, and import it."""
         base, part = _spoken(name)
         key = (f"{name.package}.{name.kind}", base)
         if key not in self._names:
@@ -60,12 +60,12 @@ class Page:
         return set(self._names.values())
 
     def imports(self) -> dict[str, set[str]]:
-        """Return, for each module, what is imported from it."""
-        found: dict[str, set[str]] = {}
+        """Return the imported names by module."""
+        imported: dict[str, set[str]] = {}
         for (module, base), called in self._names.items():
             what = base if called == base else f"{base} as {called}"
-            found.setdefault(module, set()).add(what)
-        return found
+            imported.setdefault(module, set()).add(what)
+        return imported
 
 
 def _spoken(name: ir.TypeName) -> tuple[str, str]:
@@ -92,19 +92,19 @@ def constructed(
     *,
     head: str,
     depth: int,
-    given: Mapping[str, str] | None = None,
+    values: Mapping[str, str] | None = None,
 ) -> str:
     """Return the lines that make a message, after `head`, at a depth of indentation.
 
-    `given` holds the values of fields that come from elsewhere.
+    `values` holds the values of fields that come from elsewhere.
     """
-    lines = list(_construct(message, page, head, depth, "", given or {}))
+    lines = list(_construct(message, page, head, depth, "", values or {}))
     return "\n".join(map(str, lines)).lstrip()
 
 
 def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list[str]:
     """Return the lines that give each field of a variable a value, with its documentation."""
-    found: list[str] = []
+    statements: list[str] = []
     for field in message.fields:
         head = f"{variable}.{python_names.field(field.name)} = "
         nested = _nested(field, page)
@@ -113,16 +113,16 @@ def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list
         else:
             lines = [head + sample(message, field, page)]
         if all(len(line) + depth * len(INDENT) <= WIDTH for line in lines):
-            found += [*_documented(message, field, page, depth), *lines]
-    return found
+            statements += [*_documented(message, field, page, depth), *lines]
+    return statements
 
 
 def _construct(
-    message: ir.Message, page: Page, head: str, depth: int, tail: str, given: Mapping[str, str]
+    message: ir.Message, page: Page, head: str, depth: int, tail: str, values: Mapping[str, str]
 ) -> Iterator[Line]:
     name = page.use(message.name)
     inner = [
-        line for field in message.fields for line in _field(message, field, page, depth + 1, given)
+        line for field in message.fields for line in _field(message, field, page, depth + 1, values)
     ]
     if not inner:
         yield Line(depth, f"{head}{name}(){tail}")
@@ -133,25 +133,25 @@ def _construct(
 
 
 def _field(
-    message: ir.Message, field: ir.Field, page: Page, depth: int, given: Mapping[str, str]
+    message: ir.Message, field: ir.Field, page: Page, depth: int, values: Mapping[str, str]
 ) -> Iterator[Line]:
     name = python_names.field(field.name)
     nested = _nested(field, page)
-    if field.name in given:
-        value = [Line(depth, f"{name}={given[field.name]},")]
+    if field.name in values:
+        value = [Line(depth, f"{name}={values[field.name]},")]
     elif nested:
         value = list(_construct(nested, page, f"{name}=", depth, ",", {}))
     else:
         value = [Line(depth, f"{name}={sample(message, field, page)},")]
     if any(len(str(line)) > WIDTH for line in value):
         return
-    if field.name not in given:
+    if field.name not in values:
         yield from (Line(depth, text) for text in _documented(message, field, page, depth))
     yield from value
 
 
 def _documented(message: ir.Message, field: ir.Field, page: Page, depth: int) -> list[str]:
-    """Return what the interface says about a field, as comments that fit."""
+    """Return the interface's comments on a field, in lines that fit."""
     if message.name.package != page.own:
         return []
     text = " ".join(filter(None, (clean(line) for line in field.comment)))
@@ -201,7 +201,7 @@ def sample(message: ir.Message, field: ir.Field, page: Page) -> str:
 
 
 def _choice(message: ir.Message, field: ir.Field) -> str | None:
-    """Return the first of the constants that a field is to hold one of."""
+    """Return the first constant among the values of a field."""
     fitting = [constant.name for constant in message.constants if constant.type == field.type]
     prefixed = [name for name in fitting if name.startswith(field.name.upper() + "_")]
     if prefixed:
@@ -223,15 +223,17 @@ def _element(element: ir.Element, page: Page, name: str) -> str:
 
 
 def _array(element: ir.Element, size: int, page: Page) -> str:
-    one = _element(element, page, "")
-    return f"[{one} for _ in range({size})]" if isinstance(element, ir.Ref) else f"[{one}] * {size}"
+    item = _element(element, page, "")
+    return (
+        f"[{item} for _ in range({size})]" if isinstance(element, ir.Ref) else f"[{item}] * {size}"
+    )
 
 
 def literal(type_: ir.FieldType, value: ir.Value) -> str:
     """Return a value as Python source."""
     element = ir.element_of(type_)
     if isinstance(value, tuple):
-        return "[" + ", ".join(literal(element, one) for one in value) + "]"
+        return "[" + ", ".join(literal(element, item) for item in value) + "]"
     if isinstance(element, ir.Primitive):
         if element.name == "byte":
             return repr(bytes([int(value)]))
@@ -241,13 +243,13 @@ def literal(type_: ir.FieldType, value: ir.Value) -> str:
     return repr(value)
 
 
-#: What the parser has already.
+#: Arguments that the parser has already.
 _TAKEN = {"help", "server_timeout"}
 HELP_WIDTH = 60
 
 
 class RequestView(NamedTuple):
-    """The function that makes a request or goal of what the command line says."""
+    """The function that makes a request or goal from the arguments of the command line."""
 
     function: str
     type: str
@@ -257,12 +259,12 @@ class RequestView(NamedTuple):
 
 def request(message: ir.Message, page: Page, word: str, what: str, prefix: str) -> RequestView:
     """Return the function for one request."""
-    given = {
+    values = {
         field.name: f"given.{_dest(field, prefix)}"
         for field in message.fields
         if _type(field) is not None
     }
-    value = constructed(message, page, head="return ", depth=1, given=given)
+    value = constructed(message, page, head="return ", depth=1, values=values)
     return RequestView(f"{word}_request", page.use(message.name), what, value)
 
 
@@ -310,7 +312,7 @@ def _dest(field: ir.Field, prefix: str) -> str:
 
 
 def _type(field: ir.Field) -> str | None:
-    """Return the type of a field's values on the command line; `None` where it has no place."""
+    """Return the type of a field's values on the command line; `None` if it has none."""
     match ir.element_of(field.type):
         case ir.String():
             return "str"

@@ -1,6 +1,6 @@
-"""What a node is to do, read from the words on the command line.
+"""The plan of a node, read from the words on the command line.
 
-Raises ValueError with a message for people where a word cannot be understood.
+Raises ValueError with a message for people for a word that is invalid.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NODE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]*(\.[A-Za-z][A-Za-z0-9_]*)*")
 
 Scalar: TypeAlias = bool | int | float | str
-#: The types of parameters by the names that people know them by.
+#: The types of parameters by their usual names.
 PARAMETERS: dict[str, type[Scalar]] = {
     "bool": bool,
     "int": int,
@@ -48,7 +48,7 @@ class Parameter(NamedTuple):
 
 
 class Node(NamedTuple):
-    """A node as asked for; its endpoints are in the order of the roles."""
+    """A requested node; its endpoints are in the order of the roles."""
 
     name: str
     package: str
@@ -74,7 +74,7 @@ def check_name(name: str) -> str:
 def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
     """Return the endpoint that an option's value means, with a quality of service by its name."""
     if preset is not None and role.kind != "msg":
-        options = ", ".join(one.option for one in ROLES if one.kind == "msg")
+        options = ", ".join(other.option for other in ROLES if other.kind == "msg")
         raise ValueError(f"--qos is for {options}")
     quality = DEFAULT_QOS if preset is None else qos_preset(preset)
     return Endpoint(role, *role.read(text), quality)
@@ -82,7 +82,7 @@ def endpoint(role: Role, text: str, preset: str | None = None) -> Endpoint:
 
 def in_order(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
     """Return endpoints in the order of the roles."""
-    return tuple(sorted(endpoints, key=lambda one: ROLES.index(one.role)))
+    return tuple(sorted(endpoints, key=lambda endpoint: ROLES.index(endpoint.role)))
 
 
 def parameter(text: str) -> Parameter:
@@ -121,17 +121,17 @@ def _value(type_: type[Scalar], text: str, name: str) -> Scalar:
 
 
 def words(endpoints: Iterable[Endpoint]) -> list[str]:
-    """Return a word for each endpoint, no two the same where names are made of them."""
+    """Return a word for each endpoint, different ones within a family."""
     seen: set[tuple[str, str]] = set()
-    found = []
-    for one in endpoints:
-        family, word, count = one.role.family, one.word, 1
+    chosen = []
+    for endpoint in endpoints:
+        family, word, count = endpoint.role.family, endpoint.word, 1
         while (family, word) in seen:
             count += 1
-            word = f"{one.word}_{count}"
+            word = f"{endpoint.word}_{count}"
         seen.add((family, word))
-        found.append(word)
-    return found
+        chosen.append(word)
+    return chosen
 
 
 def class_name(name: str) -> str:
@@ -173,7 +173,7 @@ class Plan(NamedTuple):
 
     @property
     def once(self) -> bool:
-        """Whether the node does what it is asked to and ends: it only calls others."""
+        """True if the node only sends requests, and then ends."""
         endpoints = self.node.endpoints
         only = all(endpoint.role.request for endpoint in endpoints)
         return bool(endpoints) and only and not self.node.lifecycle
@@ -182,7 +182,7 @@ class Plan(NamedTuple):
     def packages(self) -> list[str]:
         """The packages that the node's module imports, rclpy among them; its own is not."""
         used = {placed.interface.name.package for placed in self.endpoints if placed.interface}
-        modules = {module for one in self.node.endpoints for module in one.role.imports}
+        modules = {module for endpoint in self.node.endpoints for module in endpoint.role.imports}
         libraries = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names
         return sorted(({"rclpy"} | used | libraries) - {self.node.package})
 
@@ -194,4 +194,4 @@ def plan(
 ) -> Plan:
     """Return a node with the interfaces of its endpoints, in their order."""
     placed = zip(node.endpoints, words(node.endpoints), interfaces, strict=True)
-    return Plan(node, tuple(Placed(*one) for one in placed), messages)
+    return Plan(node, tuple(Placed(*fields) for fields in placed), messages)

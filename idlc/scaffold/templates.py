@@ -1,7 +1,7 @@
-"""The templates of nodes, their tests and packages: idlc's own, and a user's instead of them.
+"""The templates of nodes, their tests and packages: idlc's own, and a user's that replace them.
 
-A user's templates run in a sandbox: they came with a repository, perhaps, and must not do more than
-write text. Whatever is wrong with one is a problem at a line of it.
+A user's templates run in a sandbox: they may come with a repository, and must only write text.
+Each problem of a template is reported at its line.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _DOCUMENTED = "docs/templates.md lists what templates are shown"
 
 
 class BrokenTemplateError(Exception):
-    """A user's template does not give a file."""
+    """A user's template cannot be rendered to a file."""
 
     def __init__(self, problem: Diagnostic) -> None:
         super().__init__(problem.message)
@@ -39,21 +39,21 @@ class BrokenTemplateError(Exception):
 
 
 def problem(
-    error: Exception, name: str, sources: Mapping[str, Source], known: Iterable[str]
+    error: Exception, name: str, sources: Mapping[str, Source], allowed: Iterable[str]
 ) -> Diagnostic:
-    """Return what is wrong where a template was rendered.
+    """Return the problem of a template that could not be rendered.
 
-    `known` are idlc's templates, and the names that templates may use.
+    `allowed` are idlc's templates, and the names that templates may use.
     """
     source, line = _place(error, name, sources)
-    message, hint = _words(error, [*known, *sources])
+    message, hint = _words(error, [*allowed, *sources])
     if source is None:
         return BROKEN_TEMPLATE.of(name, message, hint=hint)
     return BROKEN_TEMPLATE.at(_span(source, line, message), message, hint=hint)
 
 
 def attributes(shown: object) -> set[str]:
-    """Return the names that a template may use of what it is shown."""
+    """Return the names that a template may use in the values it gets."""
     inner: list[object]
     if isinstance(shown, Mapping):
         inner, names = list(shown.values()), set(shown)
@@ -68,18 +68,18 @@ def attributes(shown: object) -> set[str]:
     return names.union(*map(attributes, inner))
 
 
-def _words(error: Exception, known: Iterable[str]) -> tuple[str, str | None]:
-    """Return what to say of an error, and what to do."""
+def _words(error: Exception, allowed: Iterable[str]) -> tuple[str, str | None]:
+    """Return the message for an error, and a hint."""
     match error:
         case jinja2.TemplateNotFound():
             missing = str(error.name)
-            return f"there is no template `{missing}`", did_you_mean(missing, known)
+            return f"there is no template `{missing}`", did_you_mean(missing, allowed)
         case jinja2.exceptions.SecurityError():
             return _plain(error), "templates run in a sandbox: they can only lay out what is shown"
         case jinja2.UndefinedError():
             message = re.sub(r"'[\w.]*\.(\w+) object' has no", r"`\1` has no", _plain(error))
             quoted = re.search(r"'(\w+)'", message)
-            return message, (quoted and did_you_mean(quoted[1], known)) or _DOCUMENTED
+            return message, (quoted and did_you_mean(quoted[1], allowed)) or _DOCUMENTED
         case RecursionError():
             hint = "include the one that it replaces by a name that begins with `idlc/`"
             return "this never ends: the template includes itself, or is nested too deep", hint
@@ -92,7 +92,7 @@ def _plain(error: Exception) -> str:
 
 
 def _place(error: Exception, name: str, sources: Mapping[str, Source]) -> tuple[Source | None, int]:
-    """Return the user's template, and the line of it, where an error comes from."""
+    """Return the user's template and the line that an error comes from."""
     if isinstance(error, jinja2.TemplateSyntaxError) and (error.name or "") in sources:
         return sources[error.name or ""], error.lineno
     by_path = {source.path: source for source in sources.values()}
@@ -109,7 +109,7 @@ def _steps(traceback: TracebackType | None) -> Iterator[tuple[str, int]]:
 
 
 def _span(source: Source, line: int, message: str) -> Span:
-    """Return the name on a line that a message quotes, or else what stands on the line."""
+    """Return the span of the name that a message quotes on a line, or else of the line's text."""
     ends = [match.span() for match in _LINE_END.finditer(source.text)]
     starts = [0, *(end for _, end in ends)]
     number = min(max(line, 1), len(starts)) - 1
@@ -123,7 +123,7 @@ def _span(source: Source, line: int, message: str) -> Span:
 
 
 def invalid_output(text: str, name: str, sources: Mapping[str, Source]) -> Diagnostic | None:
-    """Return what is wrong with the text that templates gave, if anything."""
+    """Return the problem of a rendered text, if it has one."""
     try:
         text.encode("utf-8")
         if name.endswith(".py.jinja"):
@@ -146,7 +146,7 @@ def invalid_output(text: str, name: str, sources: Mapping[str, Source]) -> Diagn
 
 
 def _entry(name: str, sources: Mapping[str, Source]) -> str:
-    """Return the path of the user's template that most likely wrote something."""
+    """Return the path of the user's template that most likely wrote a file."""
     if name in sources:
         return sources[name].path
     folder = name.partition("/")[0]
@@ -154,12 +154,12 @@ def _entry(name: str, sources: Mapping[str, Source]) -> str:
     return near[0] if near else name
 
 
-#: The version of what templates are shown; it grows when an attribute changes or goes.
+#: The version of the values for templates; it grows when an attribute changes or goes.
 VERSION = 1
 #: Folders of templates that a user can replace.
 FOLDERS = ("node", "node_test", "package")
 ENDING = ".jinja"
-#: By a name that begins so a user's template includes idlc's, even the one that it replaces.
+#: The prefix by which a user's template includes one of idlc's, even the one that it replaces.
 OWN = "idlc/"
 _DECLARED = re.compile(r"\s*\{#-?\s*idlc templates (\d{1,9})\b")
 _HEAD = f"{{# idlc templates {VERSION} (see docs/templates.md) #}}\n"
@@ -172,14 +172,14 @@ def names() -> tuple[str, ...]:
 
 
 def folders() -> tuple[str, ...]:
-    """Return the folders of all templates, also of those that nobody can replace."""
+    """Return the folders of all templates, also of those that users cannot replace."""
     return tuple(sorted({name.partition("/")[0] for name in _all()}))
 
 
 @cache
 def _all() -> tuple[str, ...]:
-    found = environment().list_templates(extensions=[ENDING.removeprefix(".")])
-    return tuple(sorted(found))
+    templates = environment().list_templates(extensions=[ENDING.removeprefix(".")])
+    return tuple(sorted(templates))
 
 
 def copy(name: str) -> str:
@@ -195,7 +195,7 @@ def _own_source(name: str) -> tuple[str, str | None]:
 
 
 class _Loader(jinja2.BaseLoader):
-    """Gives a user's templates by their names, and idlc's where there is none of the user's."""
+    """Loads a user's templates by their names, and idlc's for all others."""
 
     def __init__(self, sources: Mapping[str, Source]) -> None:
         self._sources = sources
@@ -213,7 +213,7 @@ class _Loader(jinja2.BaseLoader):
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
-    """Refuses what is unsafe at once, by its own name."""
+    """Refuses unsafe attributes at once, by their names."""
 
     def unsafe_undefined(self, obj: object, attribute: str) -> jinja2.Undefined:  # noqa: ARG002
         """Refuse an attribute of Python's own."""
@@ -228,9 +228,9 @@ class Templates:
         self._environment = _sandbox(self._sources) if sources else environment()
 
     def render(self, name: str, **shown: object) -> str:
-        """Return what a template makes of what it is shown.
+        """Return the text that a template renders.
 
-        Raises BrokenTemplateError if one of the user's templates is wrong; idlc's own are not.
+        Raises BrokenTemplateError for errors in the user's templates.
         """
         if not self._sources:
             return self._environment.get_template(name).render(shown)
@@ -244,7 +244,7 @@ class Templates:
         return text
 
     def check(self, report: Report) -> None:
-        """Report what is wrong with the user's templates before any is used."""
+        """Report problems of the user's templates before any is used."""
         for name, source in self._sources.items():
             if not _is_known(name):
                 report.add(_unknown(name, source))
@@ -282,14 +282,14 @@ def _unknown(name: str, source: Source) -> Diagnostic:
 def suggestion(name: str) -> str | None:
     """Return the hint for a name that no template has."""
     file = name.rpartition("/")[2].split(".")[0]
-    same = [one for one in names() if one.rpartition("/")[2].split(".")[0] == file]
+    same = [other for other in names() if other.rpartition("/")[2].split(".")[0] == file]
     if same:
-        return f"did you mean {' or '.join(f'`{one}`' for one in same[:2])}?"
+        return f"did you mean {' or '.join(f'`{other}`' for other in same[:2])}?"
     return did_you_mean(name, names())
 
 
 def _sandbox(sources: Mapping[str, Source]) -> jinja2.Environment:
-    """Return an environment that lays out as idlc's own does, and runs nothing."""
+    """Return a sandboxed environment with the settings of idlc's own."""
     own = environment()
     return _Sandbox(
         loader=_Loader(sources),
@@ -306,7 +306,7 @@ def read(
 ) -> dict[str, Source]:
     """Return the files with an ending in a folder and in some folders of it, by `folder/name`.
 
-    What cannot be read is reported.
+    Files that cannot be read are reported.
     """
     path = root.absolute(folder)
     if not is_folder(path):
@@ -314,14 +314,14 @@ def read(
         hint = "`idlc scaffold templates --copy NAME` starts one"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
         return {}
-    found = {}
-    for prefix in ("", *(f"{one}/" for one in sorted(below))):
+    sources = {}
+    for prefix in ("", *(f"{subfolder}/" for subfolder in sorted(below))):
         for file in _files(path / prefix, ending):
             name = f"{prefix}{file.name}"
             source = read_source(file, f"{folder}/{name}", report)
             if source is not None:
-                found[name] = source
-    return found
+                sources[name] = source
+    return sources
 
 
 def _files(folder: Path, ending: str) -> list[Path]:

@@ -1,10 +1,10 @@
-"""Whether bytes that were written for one version of a structure mean the same to another.
+"""The comparison of two versions of a structure on the wire: the new one may misread the old.
 
-Plain CDR has no names and no lengths of structures: what is read depends on where each number,
-text and count stands, so a nested structure and its fields in its place are one and the same.
+Plain CDR has no names and no lengths of structures: a reader depends on the offset of each number,
+text and count, so a nested structure equals its fields in its place.
 Padding is ignored when read and may hold anything; bytes that are left over at the end do no harm.
 
-Both versions are followed through the bytes at once. What precedes a value decides its padding,
+Both versions are followed through the bytes at once. The values before a value decide its padding,
 and texts and sequences make distances variable, so every position modulo eight is followed.
 """
 
@@ -86,7 +86,7 @@ _ONE_BYTE = _OCTET | {"bool", "int8"}
 _FAR = 16
 
 
-class _Place(NamedTuple):
+class _Offset(NamedTuple):
     """Between two values: the old position modulo 8, and how far the new one is ahead of it."""
 
     at: int
@@ -94,18 +94,18 @@ class _Place(NamedTuple):
 
 
 class _MisreadError(Exception):
-    """A value is not what it was; never leaves this module."""
+    """The new version reads a value as something else; never leaves this module."""
 
 
 def reads_alike(old: ir.Message, new: ir.Message, before: Messages, after: Messages) -> bool:
-    """Return whether every value of `old`, as bytes, is read by `new` as what it was.
+    """Return whether `new` reads every value of `old`, as bytes, without changing it.
 
-    A field of the same name must get the same value, any other the value that stands in its
+    A field of the same name must get the same value, any other the value in its
     place; missing fields at the end do no harm, additional ones do.
     """
     runs = _Runs(tuple(structure(old, "", before)), tuple(structure(new, "", after)))
     try:
-        _Follower(before, after).follow(runs, {_Place(0)}, at_end=True)
+        _Follower(before, after).follow(runs, {_Offset(0)}, at_end=True)
     except _MisreadError:
         return False
     return True
@@ -116,7 +116,7 @@ def type_reads_alike(
 ) -> bool:
     """Return whether a field of one type, the last one or not, is read as it was by another."""
     runs = _Runs(tuple(leaves(old, "", before)), tuple(leaves(new, "", after)))
-    starts = {_Place(at) for at in range(8)}
+    starts = {_Offset(at) for at in range(8)}
     try:
         ends = _Follower(before, after).follow(runs, starts, at_end=at_end)
     except _MisreadError:
@@ -143,12 +143,12 @@ class _Follower:
     def __init__(self, before: Messages, after: Messages) -> None:
         self._before = before
         self._after = after
-        self._known: dict[Hashable, set[_Place]] = {}
+        self._ends: dict[Hashable, set[_Offset]] = {}
 
-    def follow(self, runs: _Runs, starts: Iterable[_Place], *, at_end: bool) -> set[_Place]:
-        """Return the places after two runs; raise _MisreadError if a value is not what it was.
+    def follow(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
+        """Return the places after two runs; raise _MisreadError if a value is misread.
 
-        `at_end` says that nothing is read after them.
+        `at_end` means that nothing is read after them.
         """
         states = {(0, place) for place in starts}
         last = max((at for at, leaf in enumerate(runs.new) if leaf.type is not None), default=0)
@@ -162,8 +162,8 @@ class _Follower:
         return {_behind(runs.old[next_old:], place, at_end=at_end) for next_old, place in states}
 
     def _step(
-        self, runs: _Runs, leaf: Leaf, next_old: int, place: _Place, *, at_end: bool
-    ) -> Iterable[tuple[int, _Place]]:
+        self, runs: _Runs, leaf: Leaf, next_old: int, place: _Offset, *, at_end: bool
+    ) -> Iterable[tuple[int, _Offset]]:
         if abs(place.lead) > _FAR:
             raise _MisreadError
         if leaf.type is None:
@@ -181,28 +181,28 @@ class _Follower:
             at += old.size
         raise _MisreadError
 
-    def _read(self, old: Leaf, new: Leaf, start: int, *, at_end: bool) -> set[_Place]:
+    def _read(self, old: Leaf, new: Leaf, start: int, *, at_end: bool) -> set[_Offset]:
         """Return the places after one value that both versions read at the same position."""
         match old.type, new.type:
             case ir.Primitive(), ir.Primitive() if _primitive_alike(old.type.name, new.type.name):
-                return {_Place((start + old.least) % 8)}
+                return {_Offset((start + old.least) % 8)}
             case None, ir.Primitive() if new.type.name in _ONE_BYTE:
-                return {_Place((start + 1) % 8)}
+                return {_Offset((start + 1) % 8)}
             case ir.String(), ir.String() if old.type.wide == new.type.wide:
-                return {_Place(at) for at in ((0, 4) if old.type.wide else range(8))}
+                return {_Offset(at) for at in ((0, 4) if old.type.wide else range(8))}
             case ir.Sequence(), ir.Sequence() if _fits(old.type.bound, new.type.bound):
                 key: Hashable = (old.type, new.type, start % 8, at_end)
-                if key not in self._known:
+                if key not in self._ends:
                     ends = self._sequence(old.type, new.type, (start + 4) % 8, at_end=at_end)
-                    self._known[key] = ends
-                return self._known[key]
+                    self._ends[key] = ends
+                return self._ends[key]
             case ir.Array(), ir.Array() if old.type.size == new.type.size or (
                 at_end and new.type.size < old.type.size
             ):
                 key = (old.type, new.type, start % 8)
-                if key not in self._known:
-                    self._known[key] = self._array(old.type, new.type, start % 8)
-                return self._known[key]
+                if key not in self._ends:
+                    self._ends[key] = self._array(old.type, new.type, start % 8)
+                return self._ends[key]
         raise _MisreadError
 
     def _elements(self, old: ir.Element, new: ir.Element) -> _Runs:
@@ -210,10 +210,10 @@ class _Follower:
 
     def _sequence(
         self, old: ir.Sequence, new: ir.Sequence, start: int, *, at_end: bool
-    ) -> set[_Place]:
+    ) -> set[_Offset]:
         """Return the places after any number of elements that the old bound allows."""
         runs = self._elements(old.element, new.element)
-        ends = {_Place(start)}
+        ends = {_Offset(start)}
         if at_end and all(leaf.type is None for leaf in runs.new):
             if sum(leaf.least for leaf in runs.old) < len(runs.new):
                 raise _MisreadError
@@ -226,9 +226,9 @@ class _Follower:
             count += 1
         return ends
 
-    def _array(self, old: ir.Array, new: ir.Array, start: int) -> set[_Place]:
+    def _array(self, old: ir.Array, new: ir.Array, start: int) -> set[_Offset]:
         runs = self._elements(old.element, new.element)
-        seen = [frozenset((_Place(start),))]
+        seen = [frozenset((_Offset(start),))]
         while len(seen) <= new.size:
             places = frozenset(self.follow(runs, seen[-1], at_end=False))
             if places in seen:  # from here on they repeat
@@ -238,7 +238,7 @@ class _Follower:
         return set(seen[new.size])
 
 
-def _behind(rest: Iterable[Leaf], place: _Place, *, at_end: bool) -> _Place:
+def _behind(rest: Iterable[Leaf], place: _Offset, *, at_end: bool) -> _Offset:
     """Return the place after old values that the new version does not read."""
     at = place.at
     for leaf in rest:
@@ -248,7 +248,7 @@ def _behind(rest: Iterable[Leaf], place: _Place, *, at_end: bool) -> _Place:
     lead = place.at + place.lead - at
     if at_end and lead > 0:
         raise _MisreadError
-    return _Place(at % 8, lead)
+    return _Offset(at % 8, lead)
 
 
 def _primitive_alike(old: str, new: str) -> bool:

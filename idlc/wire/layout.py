@@ -1,6 +1,6 @@
-"""Where the fields of a structure stand in its bytes (language 8), as far as that is known.
+"""The offsets of a structure's fields in its bytes (language 8), as far as they are known.
 
-Offsets count from the end of the four bytes of the header, from where values align.
+Offsets count from the end of the four bytes of the header, where alignment starts.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ class Alignment(msgspec.Struct, frozen=True):
         return self.knows(align) and self.padding(align) == 0
 
     def after(self, size: int) -> Alignment:
-        """Return what is known `size` bytes further."""
+        """Return the alignment `size` bytes further."""
         return Alignment(self.modulus, (self.residue + size) % self.modulus)
 
     def modulo(self, modulus: int) -> Alignment:
-        """Return what is known modulo no more than `modulus`."""
+        """Return the alignment modulo no more than `modulus`."""
         modulus = min(self.modulus, modulus)
         return Alignment(modulus, self.residue % modulus)
 
     def meet(self, other: Alignment) -> Alignment:
-        """Return only what is true of both."""
+        """Return the alignment that holds for both positions."""
         modulus = min(self.modulus, other.modulus)
         while self.residue % modulus != other.residue % modulus:
             modulus //= 2
@@ -55,12 +55,12 @@ class Alignment(msgspec.Struct, frozen=True):
 
 
 def multiple_of(align: int) -> Alignment:
-    """Return what is known of a multiple of `align`."""
+    """Return the alignment of any multiple of `align`."""
     return Alignment(align, 4 % align)
 
 
 Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
-#: The widest alignment that there is.
+#: The widest alignment in CDR.
 _WIDEST = 8
 _COUNT = 4
 
@@ -98,7 +98,7 @@ class _Layouts:
 
     def __init__(self, messages: Messages) -> None:
         self._messages = messages
-        self._known: dict[tuple[ir.TypeName, int], Extent] = {}
+        self._sizes: dict[tuple[ir.TypeName, int], Extent] = {}
 
     def fields(self, fields: Iterable[ir.Field], start: int) -> tuple[list[Placed], Extent]:
         """Return fields from an offset on, and the bytes to the end of the last."""
@@ -112,7 +112,7 @@ class _Layouts:
         return placed, Extent(at - start, exact)
 
     def _alignment(self, type_: ir.FieldType) -> int:
-        """Return what the first value of a type aligns to."""
+        """Return the alignment of a type's first value."""
         match type_:
             case ir.Primitive():
                 return type_.info.size
@@ -123,7 +123,7 @@ class _Layouts:
         return _COUNT
 
     def _size(self, type_: ir.FieldType, at: int) -> Extent:
-        """Return the size of a value at an offset; of what varies, the least."""
+        """Return the size of a value at an offset; the least, if it varies."""
         match type_:
             case ir.Primitive():
                 return Extent(type_.info.size)
@@ -137,11 +137,11 @@ class _Layouts:
         return Extent(_COUNT, exact=False)
 
     def _structure(self, name: ir.TypeName, residue: int) -> Extent:
-        known = self._known.get((name, residue))
-        if known is None:
-            known = self.fields(self._messages[name].wire_fields, residue)[1]
-            self._known[name, residue] = known
-        return known
+        extent = self._sizes.get((name, residue))
+        if extent is None:
+            extent = self.fields(self._messages[name].wire_fields, residue)[1]
+            self._sizes[name, residue] = extent
+        return extent
 
     def _repeated(self, element: ir.Element, count: int, at: int) -> Extent:
         """Return the size of an array; after eight elements at most, all repeats."""
@@ -171,30 +171,30 @@ MAX_DEPTH = 50
 MAX_PACKAGE_FIELDS = 2_000_000
 
 
-class _Extent(NamedTuple):
-    """The fields of a structure with all that it holds, and how deep they nest."""
+class _ContentSize(NamedTuple):
+    """The number of a structure's fields, nested ones included, and the depth of its nesting."""
 
     fields: int
     depth: int
 
 
-Extents: TypeAlias = dict[ir.TypeName, _Extent]
+ContentSizes: TypeAlias = dict[ir.TypeName, _ContentSize]
 
 
-def oversized(model: Model, extents: Extents | None = None) -> Iterator[Diagnostic]:
+def oversized(model: Model, sizes: ContentSizes | None = None) -> Iterator[Diagnostic]:
     """Yield a problem for each of the model's own interfaces that is over a limit, or for all.
 
-    Packages that were compiled together share `extents`, so that each structure is measured once.
+    Packages that were compiled together share `sizes`, so that each structure is measured once.
     """
-    extents = {} if extents is None else extents
+    sizes = {} if sizes is None else sizes
     for interface in model.own:
-        _measure(interface, model, extents)
+        _measure(interface, model, sizes)
     total, refused = 0, False
     for interface in model.own:
-        worst = [extents[message.name] for message in derive.messages(interface)]
-        fields, depth = max(e.fields for e in worst), max(e.depth for e in worst)
+        parts = [sizes[message.name] for message in derive.messages(interface)]
+        fields, depth = max(part.fields for part in parts), max(part.depth for part in parts)
         path = interface.source.path if interface.source else str(interface.name)
-        total += sum(extent.fields for extent in worst)
+        total += sum(part.fields for part in parts)
         if fields > MAX_FIELDS:
             number = f"{fields:,}" if fields < 10**12 else "more than 10^12"
             message = f"`{interface.name}` has {number} fields, nested ones included"
@@ -212,8 +212,8 @@ def oversized(model: Model, extents: Extents | None = None) -> Iterator[Diagnost
         yield codes.STRUCTURE_TOO_LARGE.of(model.package, message, hint=hint)
 
 
-def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
-    """Measure structures after those that they hold; with a stack, so depth is no limit."""
+def _measure(interface: ir.Interface, model: Model, contents: ContentSizes) -> None:
+    """Measure each structure after its parts; with a stack, so depth is no limit."""
     parts = {message.name: message for message in derive.messages(interface)}
     waiting = list(parts)
     while waiting:
@@ -221,12 +221,12 @@ def _measure(interface: ir.Interface, model: Model, found: Extents) -> None:
         message = parts[name] if name in parts else model.interfaces[name]
         assert isinstance(message, ir.Message)
         held = message.references
-        missing = [one for one in held if one not in found]
+        missing = [reference for reference in held if reference not in contents]
         if missing:
             waiting += missing
             continue
         del waiting[-1]
-        found[name] = _Extent(
-            len(message.wire_fields) + sum(found[one].fields for one in held),
-            1 + max((found[one].depth for one in held), default=0),
+        contents[name] = _ContentSize(
+            len(message.wire_fields) + sum(contents[reference].fields for reference in held),
+            1 + max((contents[reference].depth for reference in held), default=0),
         )

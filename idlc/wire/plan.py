@@ -17,7 +17,7 @@ Messages: TypeAlias = Mapping[ir.TypeName, ir.Message]
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a value lives: a slot of the object in a local variable, of the structure `type`."""
+    """The location of a value: a slot of the object in a local variable, of structure `type`."""
 
     owner: str
     slot: str
@@ -69,7 +69,7 @@ class Block(msgspec.Struct, frozen=True):
 
     @property
     def is_large(self) -> bool:
-        """Whether moving the bytes once more would be noticed: it is a buffer of its own."""
+        """True for a buffer of its own, because one more copy of the bytes would be noticed."""
         return self.size > LARGE
 
 
@@ -94,7 +94,7 @@ class Numbers(msgspec.Struct, frozen=True):
 
     @property
     def numpy(self) -> str:
-        """What numpy calls an element."""
+        """Numpy's name of an element's type."""
         return ir.PRIMITIVES[self.primitive].dtype
 
     @property
@@ -143,11 +143,11 @@ Step: TypeAlias = Number | Dummy | Block | Text | Numbers | Bytes | Texts | Ente
 
 #: The struct character where it is not the one of PRIMITIVES.
 CODES = {"bool": "?", "byte": "c"}
-#: What is a list in Python, and the runtime's word for it.
+#: Primitives whose arrays are lists in Python, and the runtime's word for such a list.
 LIST_PRIMITIVES = {"bool": "flags", "byte": "octets"}
-#: From more than so many bytes on, a fixed-size array is not part of a Struct.
+#: A fixed-size array of more bytes than this is not part of a Struct.
 LARGE = 1024
-#: Up to so many elements, what is done once for all of them costs more than it saves.
+#: Below this element count, setup costs more than it saves.
 FEW = 4
 
 
@@ -165,17 +165,17 @@ def _steps(
 ) -> list[Step]:
     if not message.fields:
         return [Dummy()]
-    found: list[Step] = []
+    plan: list[Step] = []
     for field in message.fields:
         inner = (*path, field.name)
         place = Place(owner, python_names.slot(field.name), names.shortest(inner), message.name)
         if isinstance(field.type, ir.Ref):
             nested = messages[field.type.target]
-            found.append(Enter(place, field.type.target, not nested.fields))
-            found += _steps(nested, messages, names, place.local, inner)
+            plan.append(Enter(place, field.type.target, not nested.fields))
+            plan += _steps(nested, messages, names, place.local, inner)
         else:
-            found.append(_step(field.type, place, messages, names))
-    return found
+            plan.append(_step(field.type, place, messages, names))
+    return plan
 
 
 def _step(
@@ -204,7 +204,7 @@ def _step(
 
 
 def alignment(step: Step) -> int:
-    """Return the alignment at which a step begins; 1 for what takes no bytes itself."""
+    """Return the alignment at which a step begins; 1 for a step without bytes of its own."""
     match step:
         case Number() | Dummy():
             return step.size
@@ -239,7 +239,7 @@ def smallest(body: tuple[Step, ...]) -> int:
 
 
 def is_many(step: Items) -> bool:
-    """Return whether there may be so many elements that preparing for them is worth its cost."""
+    """Return whether there may be enough elements to make setup worth its cost."""
     most = step.bound if step.size is None else step.size
     return most is None or most > FEW
 
@@ -260,7 +260,7 @@ def is_text(body: tuple[Step, ...]) -> bool:
 class Fixed(msgspec.Struct, frozen=True):
     """Elements that repeat at a constant distance.
 
-    `size` is what one takes, `stride` what it takes with the padding before the next.
+    `size` is the bytes of an element, `stride` its bytes with the padding before the next.
     """
 
     align: int

@@ -121,7 +121,7 @@ def _definitions(text):
 
 
 def test_a_layout_that_would_change_the_meaning_is_never_written(here, monkeypatch, capsys):
-    monkeypatch.setattr("idlc.language.format.format_file", lambda _: "int16 a\n")
+    monkeypatch.setattr("idlc.check.format.format_file", lambda _: "int16 a\n")
     (here / "A.msg").write_text("int8 a\n")
     assert main(["fmt"]) == 3
     assert (here / "A.msg").read_text() == "int8 a\n"

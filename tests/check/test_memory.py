@@ -2,7 +2,7 @@
 
 import pytest
 
-from idlc.check.registry import Memory
+from idlc.check.registry import IncrementalFindings
 from idlc.editor.workspace import EditorOptions, Workspace
 
 FILES = {
@@ -44,8 +44,8 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
         seen.append("".join(sorted(name.name for name in found)))
         return found
 
-    real = Memory.of
-    monkeypatch.setattr(Memory, "of", of)
+    real = IncrementalFindings.of
+    monkeypatch.setattr(IncrementalFindings, "of", of)
     workspace.follow(folder / "msg" / changed, text.encode())
     after = workspace.snapshot()
     assert set(seen) == {kept}

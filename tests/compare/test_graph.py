@@ -12,7 +12,7 @@ import pytest
 
 from idlc.cli.main import main
 from idlc.compare.packages import compare
-from idlc.model.from_description import NotBelievedError, model_of_description
+from idlc.model.from_description import DescriptionError, model_of_description
 from idlc.wire.layout import oversized
 from tests.support import generated
 from tests.support.evolution import Evolution, compile_texts
@@ -120,7 +120,7 @@ def test_a_spoiled_description_is_a_model_or_not_believed():
             found = model_of_description(
                 spoiled(description, seed), name, hash_of(model, name), "/node"
             )
-        except NotBelievedError as error:
+        except DescriptionError as error:
             assert_harmless(str(error))
             refused += 1
         else:
@@ -142,7 +142,7 @@ def test_circles_and_depth_do_no_harm():
         "type_description": part("a/msg/A", "a/msg/B"),
         "referenced_type_descriptions": [part("a/msg/B", "a/msg/A")],
     }
-    with pytest.raises(NotBelievedError, match="contains itself"):
+    with pytest.raises(DescriptionError, match="contains itself"):
         model_of_description(circle, "a/msg/A", "", "/node")
     names = [f"a/msg/A{n}" for n in range(5000)]
     chain = [part(one, after, after) for one, after in pairwise(names)]
@@ -150,7 +150,7 @@ def test_circles_and_depth_do_no_harm():
         "type_description": chain[0],
         "referenced_type_descriptions": [*chain[1:], part(names[-1])],
     }
-    with pytest.raises(NotBelievedError, match="another type hash"):
+    with pytest.raises(DescriptionError, match="another type hash"):
         model_of_description(deep, names[0], "", "/node")
 
 

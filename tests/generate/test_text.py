@@ -99,7 +99,7 @@ def test_no_text_changes_what_the_module_does(text, more):
 
 @pytest.mark.parametrize("text", HOSTILE)
 def test_a_literal_is_read_back_as_the_text(text):
-    assert ast.literal_eval(lines.text(text)) == text
+    assert ast.literal_eval(lines.string_literal(text)) == text
 
 
 @given(st.lists(TEXT, min_size=1, max_size=4), st.booleans())

@@ -12,7 +12,7 @@ from idlc.generate.gen import GenOptions, gen
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 
-PACKAGE = Path(target.__file__).parents[2]
+PACKAGE = Path(target.__file__).parents[1]
 MAKERS = [path for path in target._MAKERS if path.is_dir()]
 FOLDERS = [
     folder.relative_to(maker.parent)
@@ -20,6 +20,10 @@ FOLDERS = [
     for folder in (maker, *maker.rglob("*"))
     if folder.is_dir() and any(path.suffix in (".py", ".jinja") for path in folder.iterdir())
 ]
+
+
+def test_the_rooms_that_count_exist():
+    assert all((PACKAGE / room).is_dir() for room in target._ROOMS)
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=str)

@@ -26,7 +26,7 @@ from idlc.recordings.containers.container import Schema, Topic, open_recording
 from idlc.recordings.containers.messages import ALWAYS, Ranges
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
-from idlc.recordings.types import Around, recorded_types
+from idlc.recordings.types import LocalTypes, recorded_types
 from idlc.recordings.versions import versions
 from tests.support import db3_mutations, definition_mutations, mcap_mutations
 from tests.support import recordings as made
@@ -207,7 +207,7 @@ def test_bags(tmp_path, kinds):
 
 def definitions(style):
     """Return sound definitions of types of every shape, with all that they need."""
-    around = Around(Scope(Root.here()), Report())
+    around = LocalTypes(Scope(Root.here()), Report())
     found = []
     for name in made.KINDS:
         text = made.definition(name)
@@ -229,7 +229,7 @@ def typed(around, name, encoding, text, hash_=None):
 @pytest.mark.parametrize("style", ["ros2msg", "ros2idl"])
 def test_definitions(style, tmp_path):
     rng = random.Random(SEED)
-    around = Around(Scope(Root.here()), Report())
+    around = LocalTypes(Scope(Root.here()), Report())
     sound = definitions(style)
     whole = 0
     for number in range(ALL * 3 // 20):

@@ -80,6 +80,6 @@ def test_python_m_leaves_the_working_folder_as_soon_as_it_can(theirs, words):
 
 def test_python_m_in_a_checkout_is_that_of_the_checkout(tmp_path):
     shutil.copytree(ROOT / "idlc", tmp_path / "idlc", ignore=shutil.ignore_patterns("__pycache__"))
-    about = tmp_path / "idlc/__init__.py"
+    about = tmp_path / "idlc/version.py"
     about.write_text(re.sub('__version__ = ".*"', '__version__ = "9.9"', about.read_text()))
     assert run(sys.executable, "-m", "idlc", "--version", cwd=tmp_path) == "idlc 9.9\n"

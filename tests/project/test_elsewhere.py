@@ -90,7 +90,7 @@ class Kernel:
 
 @pytest.fixture
 def kernel(monkeypatch):
-    """A Windows for `idlc.disk.output`."""
+    """A Windows for the writer."""
     if WINDOWS:
         pytest.skip("Windows itself is here, and other tests use it")
     made = Kernel(running={5})

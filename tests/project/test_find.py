@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.generate.requested import wanted
+from idlc.generate.requested import requested_packages
 from idlc.model.ir import TypeName
 from idlc.project.find import find
 from idlc.project.library import Library
@@ -83,7 +83,7 @@ def test_a_very_deep_folder_is_no_problem(monkeypatch):
 
 def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple[str, list[str]]:
     report = Report()
-    given = wanted(paths, (), out, Scope(Root.here(), package), report)
+    given = requested_packages(paths, (), out, Scope(Root.here(), package), report)
     return given[0].package if given else "", [found.code for found in report]
 
 

@@ -19,7 +19,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import recorded, type_name
-from idlc.recordings.types import Around, recorded_types
+from idlc.recordings.types import LocalTypes, recorded_types
 from idlc.recordings.versions import contradictions, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
@@ -128,7 +128,7 @@ def test_the_first_of_two_definitions_counts_and_that_is_told():
 def types_of(*topics):
     report, scope = Report(), Scope(Root.here())
     (version,) = versions(topics)
-    return recorded_types(version, Around(scope, Report()), scope, report), report
+    return recorded_types(version, LocalTypes(scope, Report()), scope, report), report
 
 
 def test_what_rosbags_writes_has_its_hash():

@@ -402,7 +402,7 @@ def test_help_and_type_checkers_see_what_is_there(tmp_path):
     said, problems, status = mypy.api.run(words)
     assert status == 0, said + problems
     said = said.replace("builtins.", "")  # as older versions of mypy say
-    module = "idlc.driver.recordings"
+    module = "idlc.recordings"
     assert f"[{module}.recording.RecordedTopic, int, bytes, bytes]" in said
     assert f'"{module}.load.Loaded"' in said
 

@@ -4,203 +4,214 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 from jinja2 import Environment, nodes
 
+from tests.support.imports import MODULES, graph, imports, room
 from tests.support.paths import DOCS, ROOT
 
-PACKAGE = ROOT / "idlc"
-MODULES = sorted(PACKAGE.rglob("*.py"))
 TEMPLATES = sorted((ROOT / "templates").rglob("*.jinja"))
-RUNTIME = [path for path in MODULES if "runtime" in path.parts]
+RUNTIME = [module for module in MODULES if room(module) == "runtime"]
 
-#: Each stage may import those before it; `runtime` stands apart and imports none.
-STAGES = (
-    "diagnostics syntax model breaking export checks templating emit native site "
-    "scaffold disk recordings driver lsp cli backend"
-).split()
-#: Stages that need fewer of those before them.
-NEEDS_ONLY = {"native": {"native", "model"}}
-#: What emit shares with the runtime, so that there is one rule for the names in Python.
-SHARED_WITH_RUNTIME = {"idlc.runtime.names"}
-#: The outermost modules, which belong to the command line or to programs.
-OUTERMOST = {"__main__": "cli", "__init__": "driver", "build": "cli", "loaded": "disk"}
+#: The compiler by stages: each room, and the rooms that it may import. They do no I/O.
+CORE = {
+    "diagnostics": set[str](),
+    "language": {"diagnostics"},
+    "model": {"diagnostics", "language"},
+    "wire": {"diagnostics", "language", "model"},
+}
+#: What the model shares with the runtime, so that there is one rule for the names in Python.
+SHARED_WITH_RUNTIME = "idlc.runtime.names"
+#: The rooms that people and programs enter by; none below imports them.
+ENTRANCES = {"editor", "build", "backend", "cli", "__main__"}
 
-#: Only these stages may touch files, the environment or the terminal.
-MAY_DO_IO = {"disk", "recordings", "lsp", "cli", "backend"}
+#: The pages that name the tests which hold the house.
+HOUSE_PAGES = ("architecture.md", "contributing/type-support.md", "contributing/tests.md")
+
+MOST_MODULES = 256  # 230, when the rooms have been merged
+MOST_IN_A_FOLDER = 15
+#: The command line has one module for each command.
+CROWDED = {"idlc/cli"}
+
+#: Rooms that a program imports by their name: what is in them is what they offer.
+OFFERED_AT_ONCE = {"runtime", "build"}
+
 IO_MODULES = {"glob", "io", "os", "pathlib", "shutil", "socket", "subprocess", "tempfile"}
 IO_CALLS = {"open", "print", "input"}
-#: What may read files of idlc: grammar, catalogue, templates, runtime, texts of licences.
-READS_ITS_OWN = {
-    "idlc/generate/python/render.py",
-    "idlc/model/catalog.py",
-    "idlc/scaffold/package.py",
-    "idlc/language/grammar.py",
-    "idlc/language/idl.py",
-    "idlc/project/templates.py",
+#: What of the core reads files of idlc: the grammars, the catalogue.
+READS_ITS_OWN = {"idlc.language.grammar", "idlc.language.idl", "idlc.model.catalog"}
+#: What prints besides `cli` -> why.
+PRINTS = {
+    "idlc.build": "a build that pip or colcon runs has no other way to say why it stops",
+    "idlc.build.hooks": "the same",
+    "idlc.recordings.columns": "a table goes to standard output where `-o -` says so",
+    "idlc.recordings.export": "the same",
 }
 
 #: What runtime modules may import besides the standard library and each other, and only inside
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
 RUNTIME_ON_DEMAND = {"numpy", "pyarrow", "rclpy", "rosidl_parser"}
 #: The runtime modules that import numpy at once, and that no other imports at once.
-NUMPY_AT_ONCE = ("idlc/runtime/arrays.py", "idlc/runtime/on_demand/columns/")
-
-MODULE_BUDGET = 600
-FUNCTION_BUDGET = 60
-#: path, or path:function, that is over budget -> why it stays so.
-OVER_BUDGET: dict[str, str] = {}
+NUMPY_AT_ONCE = ("idlc.runtime.arrays", "idlc.runtime.on_demand.columns")
 
 
 def name_of(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def stage_of(path: Path) -> str:
-    first = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    return OUTERMOST.get(first, first)
+def tree_of(module: str) -> ast.Module:
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
 
 
-def imports_of(path: Path) -> Iterator[tuple[str, ast.stmt, bool]]:
-    """Yield each absolute module name, its statement, and whether it runs at import.
-
-    Imports that only type checkers see are left out.
-    """
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    unseen = {id(node) for block in ast.walk(tree) for node in type_checking_part(block)}
-    inner = {
-        id(node)
-        for function in ast.walk(tree)
-        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
-        for node in ast.walk(function)
-    }
-    package = [*path.relative_to(ROOT).parts[:-1]]
-    for node in ast.walk(tree):
-        if id(node) in unseen:
-            continue
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.name, node, id(node) not in inner
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            names = [f"{module}.{alias.name}" for alias in node.names]
-            for name in names if module == "idlc" or node.level else [module]:
-                yield name, node, id(node) not in inner
+# the house
 
 
-def type_checking_part(block: ast.AST) -> Iterator[ast.AST]:
-    test = block.test if isinstance(block, ast.If) else None
-    if isinstance(block, ast.If) and isinstance(test, ast.Name) and test.id == "TYPE_CHECKING":
-        for statement in block.body:
-            yield from ast.walk(statement)
+def test_imports_have_no_cycle():
+    """Imports inside of functions, relative ones and those for type checkers are counted."""
+    TopologicalSorter(graph()).prepare()
 
 
-def test_every_module_belongs_to_a_stage():
-    assert {stage_of(path) for path in MODULES} <= {*STAGES, "runtime"}
+@pytest.mark.parametrize("name", CORE)
+def test_the_core_imports_only_what_is_below(name):
+    for module in MODULES:
+        for each in imports(module) if room(module) == name else ():
+            if each.module.split(".")[0] == "idlc" and each.module != SHARED_WITH_RUNTIME:
+                assert room(each.module) in {name, *CORE[name]}, f"{module}, line {each.line}"
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_imports_point_one_way(path):
-    own = stage_of(path)
-    before = {*STAGES[: STAGES.index(own) + 1], "__version__"} if own != "runtime" else {"runtime"}
-    allowed = NEEDS_ONLY.get(own, before)
-    for name, node, _ in imports_of(path):
-        parts = name.split(".")
-        if parts[0] == "idlc" and not (own == "emit" and name in SHARED_WITH_RUNTIME):
-            assert len(parts) > 1, f"line {node.lineno}: name the module of idlc that is meant"
-            assert parts[1] in allowed, f"line {node.lineno}: {own} imports {name}"
+def test_nothing_imports_an_entrance_from_below():
+    for module, names in graph().items():
+        if room(module) not in ENTRANCES:
+            assert [name for name in names if room(name) in ENTRANCES] == [], module
+
+
+def test_folders_and_the_house_stay_small():
+    assert len(MODULES) <= MOST_MODULES
+    folders = Counter(name_of(path.parent) for path in MODULES.values())
+    crowded = {folder for folder, number in folders.items() if number > MOST_IN_A_FOLDER}
+    assert crowded == CROWDED
+
+
+def only_forwards(tree: ast.Module) -> bool:
+    """Return whether a module holds names of others and nothing of its own."""
+    return all(
+        isinstance(statement, (ast.Import, ast.ImportFrom))
+        or (isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant))
+        or (
+            isinstance(statement, ast.Assign)
+            and isinstance(statement.value, (ast.Name, ast.Attribute, ast.List, ast.Tuple))
+            and all(isinstance(name, ast.Name) for name in statement.targets)
+            and (
+                statement.targets[0].id == "__all__"
+                or isinstance(statement.value, (ast.Name, ast.Attribute))
+            )
+        )
+        for statement in tree.body
+    )
+
+
+def test_nothing_but_a_package_only_forwards():
+    modules = [name for name, path in MODULES.items() if path.name != "__init__.py"]
+    assert [name for name in modules if only_forwards(tree_of(name))] == []
 
 
 @pytest.mark.parametrize(
-    "path", [p for p in MODULES if stage_of(p) not in {*MAY_DO_IO, "runtime"}], ids=name_of
+    "module",
+    [name for name, path in MODULES.items() if path.name == "__init__.py" and name.count(".") == 1],
 )
-def test_the_core_does_no_io(path):
-    allowed = {"pathlib"} if name_of(path) in READS_ITS_OWN else set()
-    for name, node, _ in imports_of(path):
-        top = name.split(".")[0]
-        assert top in allowed or top not in IO_MODULES, f"line {node.lineno}: imports {name}"
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+def test_a_room_says_what_it_offers_without_loading_it(module):
+    assert ast.get_docstring(tree_of(module))
+    if room(module) not in OFFERED_AT_ONCE:
+        assert imports(module) == ()
+
+
+@pytest.mark.parametrize("module", [name for name in MODULES if room(name) in CORE])
+def test_the_core_does_no_io(module):
+    allowed = {"pathlib"} if module in READS_ITS_OWN else set()
+    for each in imports(module):
+        top = each.module.split(".")[0]
+        assert top in allowed or top not in IO_MODULES, f"line {each.line}: imports {top}"
+    for node in ast.walk(tree_of(module)):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id not in IO_CALLS, f"line {node.lineno}: calls {node.func.id}"
 
 
-@pytest.mark.parametrize("path", RUNTIME, ids=name_of)
-def test_the_runtime_stands_alone(path):
-    has_numpy = name_of(path).startswith(NUMPY_AT_ONCE)
-    with_numpy = {one.removesuffix(".py").strip("/").replace("/", ".") for one in NUMPY_AT_ONCE}
-    for name, node, at_import in imports_of(path):
-        top = name.split(".")[0]
-        if isinstance(node, ast.ImportFrom) and node.level:
-            depth = len(path.relative_to(PACKAGE / "runtime").parts)
-            assert node.level <= depth, f"line {node.lineno}: reaches outside the package"
-            borrowed = any(name == one or name.startswith(f"{one}.") for one in with_numpy)
-            assert has_numpy or not (at_import and borrowed), (
-                f"line {node.lineno}: imports numpy at once"
+def prints(node: ast.AST) -> bool:
+    match node:
+        case ast.Call(func=ast.Name(id="print")):
+            return True
+        case ast.Attribute(value=ast.Name(id="sys"), attr="stdout" | "stderr"):
+            return True
+    return False
+
+
+def test_only_the_command_line_prints():
+    printing = {
+        module
+        for module in MODULES
+        if room(module) not in {"cli", "runtime"} and any(map(prints, ast.walk(tree_of(module))))
+    }
+    assert printing == set(PRINTS)
+
+
+@pytest.mark.parametrize("module", RUNTIME)
+def test_the_runtime_stands_alone(module):
+    with_numpy = [module == name or module.startswith(f"{name}.") for name in NUMPY_AT_ONCE]
+    for each in imports(module):
+        top = each.module.split(".")[0]
+        at_once = each.at_once and not each.for_types
+        if each.for_types:
+            continue
+        if each.level:
+            assert room(each.module) == "runtime", f"line {each.line}: reaches outside the package"
+            borrowed = any(
+                each.module == name or each.module.startswith(f"{name}.") for name in NUMPY_AT_ONCE
+            )
+            assert any(with_numpy) or not (at_once and borrowed), (
+                f"line {each.line}: imports numpy at once"
             )
         elif top not in sys.stdlib_module_names:
-            assert top in RUNTIME_ON_DEMAND, f"line {node.lineno}: imports {name}"
-            assert (has_numpy and top == "numpy") or not at_import, (
-                f"line {node.lineno}: imports {name} at once"
+            assert top in RUNTIME_ON_DEMAND, f"line {each.line}: imports {each.module}"
+            assert (any(with_numpy) and top == "numpy") or not at_once, (
+                f"line {each.line}: imports {each.module} at once"
             )
 
 
-def over_budget() -> Iterator[tuple[str, int]]:
-    for path in MODULES:
-        text = path.read_text(encoding="utf-8")
-        if (lines := len(text.splitlines())) > MODULE_BUDGET:
-            yield name_of(path), lines
-        for node in ast.walk(ast.parse(text)):
-            function = isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-            if function and (lines := body_lines(node)) > FUNCTION_BUDGET:
-                yield f"{name_of(path)}:{node.name}", lines
+# templates
 
 
-def body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Return how many lines a function takes without its signature and docstring."""
-    documented = ast.get_docstring(function) is not None
-    statements = function.body[documented:]
-    if not statements:
-        return 0
-    first, last = statements[0], statements[-1]
-    return (last.end_lineno or last.lineno) - first.lineno + 1
-
-
-def test_modules_and_functions_stay_small():
-    breaches = dict(over_budget())
-    unexplained = {name: lines for name, lines in breaches.items() if name not in OVER_BUDGET}
-    assert not unexplained, "over budget (split by idea, or say why not in OVER_BUDGET)"
-    assert set(OVER_BUDGET) <= set(breaches), "entries of OVER_BUDGET that are no longer needed"
-
-
-def template_sins(node: nodes.Node, within_if: bool = False) -> Iterator[str]:
-    """Yield what a template does besides laying out: templates place finished strings."""
+def template_risks(node: nodes.Node) -> Iterator[str]:
+    """Yield each way in which a template could make code of a text: they place finished strings."""
     match node:
         case nodes.Filter():
-            if node.name not in {"indent", "join"}:
+            if node.name not in {"indent", "join"}:  # `safe`, and what could undo an escape
                 yield f"line {node.lineno}: filter {node.name}"
         case nodes.Call():
             if not isinstance(node.node, (nodes.Name, nodes.Getattr)):
                 yield f"line {node.lineno}: computed call"
-        case nodes.If():
-            if within_if or not isinstance(node.test, (nodes.Name, nodes.Getattr)):
-                yield f"line {node.lineno}: a condition that is not one flag"
-        case nodes.BinExpr() | nodes.UnaryExpr() | nodes.Compare() | nodes.Concat():
-            yield f"line {node.lineno}: computes"
-        case nodes.Assign() | nodes.AssignBlock() | nodes.CondExpr() | nodes.Test():
-            yield f"line {node.lineno}: {type(node).__name__}"
+        case nodes.Getattr():
+            if node.attr.startswith("_"):
+                yield f"line {node.lineno}: attribute {node.attr}"
+        case nodes.BinExpr() | nodes.Concat():
+            yield f"line {node.lineno}: makes a text of others"
+        case nodes.EvalContextModifier() | nodes.MarkSafe() | nodes.MarkSafeIfAutoescape():
+            yield f"line {node.lineno}: turns escaping on or off"
     for child in node.iter_child_nodes():
-        yield from template_sins(child, within_if or isinstance(node, nodes.If))
+        yield from template_risks(child)
 
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=name_of)
-def test_templates_only_lay_out(path):
+def test_templates_place_finished_text(path):
     text = path.read_text(encoding="utf-8")
-    assert list(template_sins(Environment(autoescape=True).parse(text))) == []
-    assert len(text.splitlines()) <= 80
+    assert list(template_risks(Environment(autoescape=True).parse(text))) == []
+
+
+# documents
 
 
 def project_files(folder: Path = ROOT) -> Iterator[Path]:
@@ -228,15 +239,39 @@ def test_the_security_policy_names_real_tests():
 
 
 def test_this_document_names_real_tests():
-    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    text = "".join((DOCS / page).read_text(encoding="utf-8") for page in HOUSE_PAGES)
     named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)
-    assert len(named) >= 8
+    assert len(named) >= 60
     for path, function in named:
         source = ROOT / path
         assert source.exists(), path
         assert f"def {function}" in source.read_text(encoding="utf-8"), f"{path}::{function}"
     assert text.count("\n1. ") == 1
     assert "\n13. " not in text, "more invariants than anyone remembers"
+
+
+def test_this_document_names_real_modules():
+    """A name in a row of the table is of a room in that row, any other is whole."""
+    for line in (DOCS / HOUSE_PAGES[0]).read_text(encoding="utf-8").splitlines():
+        rooms = [ROOT / path for path in re.findall(r"`(idlc/[\w/]+)/`", line)]
+        for path in re.findall(r"`([a-z][\w/]*\.(?:py|lark)|[a-z]+/)`", line):
+            folders = [*rooms, ROOT] if line.startswith("|") else [ROOT / "idlc", ROOT]
+            assert any((folder / path).exists() for folder in folders), path
+
+
+def test_every_folder_of_tests_is_explained():
+    text = (DOCS / "contributing/tests.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"(?m)^\| `(tests/\w+)/` \|.*\| (.*) \|$", text))
+    folders = {name_of(path.parent) for path in (ROOT / "tests").glob("*/__init__.py")}
+    assert rows.keys() == folders
+    for folder, files in rows.items():
+        for name in re.findall(r"`(\w+\.py)`", files):
+            assert (ROOT / folder / name).exists(), f"{folder}/{name}"
+    rooms = {path.parent.name for path in (ROOT / "idlc").glob("*/__init__.py")}
+    assert {f"tests/{name}" for name in rooms} <= rows.keys()
+
+
+# starting up
 
 
 def imported_by(*words: str, cwd: Path, given: str = "runpy") -> set[str]:

@@ -1,14 +1,26 @@
-"""Nothing is kept that nobody uses."""
+"""Nothing is kept that nobody uses: use in tests, benchmarks and examples does not count."""
 
 import ast
 import re
 from collections.abc import Iterator
 
+from tests.support.imports import MODULES
 from tests.support.paths import ROOT
 
 #: What is called by its name from outside: by click, pytest, Python, and PEP 517's frontends.
 CALLED = re.compile(r"__\w+__|pytest_\w+|command|(get_requires_for_)?build_\w+")
-SEARCHED = ("idlc", "tests", "benchmarks", "examples")
+#: What only programs use, as docs/ says: `Ragged.stacked`.
+PUBLIC = {"stacked"}
+#: Classes of others that call nothing by its name: what a class adds to them is its own.
+RECORDS = {
+    "NamedTuple",
+    "Struct",
+    "msgspec.Struct",
+    "Protocol",
+    "Generic",
+    "Exception",
+    "ValueError",
+}
 WORD = re.compile(r"\w+")
 
 
@@ -16,11 +28,9 @@ def used() -> Iterator[str]:
     """Yield the names that code, templates and settings refer to."""
     for path in (*(ROOT / "templates").rglob("*.jinja"), ROOT / "pyproject.toml"):
         yield from WORD.findall(path.read_text(encoding="utf-8"))
-    for folder in SEARCHED:
-        for path in (ROOT / folder).rglob("*.py"):
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            for node in ast.walk(tree):
-                yield from names(node)
+    for path in MODULES.values():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            yield from names(node)
 
 
 def names(node: ast.AST) -> Iterator[str]:
@@ -37,26 +47,39 @@ def names(node: ast.AST) -> Iterator[str]:
             yield from WORD.findall(text) if " " not in text else ()
 
 
-def defined(tree: ast.Module) -> Iterator[str]:
-    """Yield the names that a module defines, and the methods of its classes."""
+def base_name(base: ast.expr) -> str:
+    """Return the name of a base class as it is written, without what it is a generic of."""
+    return ast.unparse(base).partition("[")[0]
+
+
+def defined(tree: ast.Module, own: set[str]) -> Iterator[str]:
+    """Yield the names that a module defines, and the methods of its classes.
+
+    What a class of somebody else asks for, it calls; `own` are the classes that are not.
+    """
     for node in tree.body:
         match node:
             case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
                 yield name
             case ast.ClassDef(name=name, bases=bases, body=body):
                 yield name
-                if not bases:  # what a base asks for, it calls
-                    yield from (one.name for one in body if isinstance(one, ast.FunctionDef))
+                if {*map(base_name, bases)} <= own:
+                    yield from (item.name for item in body if isinstance(item, ast.FunctionDef))
             case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
                 yield name
 
 
 def test_every_name_is_used():
-    known = set(used())
+    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+    nodes = [node for tree in trees.values() for node in ast.walk(tree)]
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
+    own = RECORDS | {node.name for node in classes}
+    own -= {node.name for node in classes if not {*map(base_name, node.bases)} <= own}
+    known = {*used(), *PUBLIC}
     unused = [
-        f"{path.relative_to(ROOT)}: {name}"
-        for path in sorted((ROOT / "idlc").rglob("*.py"))
-        for name in defined(ast.parse(path.read_text(encoding="utf-8")))
+        f"{module}: {name}"
+        for module, tree in trees.items()
+        for name in defined(tree, own)
         if name not in known and not CALLED.fullmatch(name)
     ]
     assert unused == []

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from release import agreement, archives, forms, prepare
-from release.project import FailedError, Project
+from maintenance.release import agreement, archives, forms, prepare
+from maintenance.release.project import FailedError, Project
 from tests.support.files import write
 from tests.support.paths import DOCS, ROOT
 from tests.support.programs import clean_environment, ended, run
@@ -64,7 +64,7 @@ def tools(tmp_path_factory):
     run(sys.executable, "-m", "venv", folder / "env", cwd=folder)
     python = folder / "env/bin/python"
     for name in ("build", "release"):
-        lock = ROOT / "requirements" / f"{name}.txt"
+        lock = ROOT / "maintenance/requirements" / f"{name}.txt"
         words = ("--quiet", "--disable-pip-version-check", "--require-hashes", "--no-deps")
         run(python, "-m", "pip", "install", *words, "--requirement", lock, cwd=folder)
     return python
@@ -73,7 +73,7 @@ def tools(tmp_path_factory):
 @pytest.mark.long
 def test_the_rehearsal_passes_on_what_is_published(published, tools, tmp_path):
     tag = f"v{HERE.version}"
-    words = ("-m", "release", "check", "--tag", tag, "--keep", tmp_path / "dist")
+    words = ("-m", "maintenance.release", "check", "--tag", tag, "--keep", tmp_path / "dist")
     status, said = ended(tools, *words, cwd=published.root, environment=clean_environment())
     assert status == 0, said
     assert "still to do" not in said
@@ -124,7 +124,7 @@ def test_the_next_release_is_named_in_the_same_places(published, tmp_path):
     [
         ("CHANGELOG.md", None, "0.10.1", "2031-01-02", "add `## 0.10.1 (not released yet)`"),
         ("CITATION.cff", "version: ", HERE.version, "2031-01-02", "CITATION.cff names no version"),
-        ("idlc/__init__.py", "__version__", HERE.version, "2031-01-02", "names no version"),
+        ("idlc/version.py", "__version__", HERE.version, "2031-01-02", "names no version"),
         ("CHANGELOG.md", None, "1.0", "2031-01-02", "not like 1.2.3"),
         ("CHANGELOG.md", None, HERE.version, "tomorrow", "not like 2026-12-31"),
     ],

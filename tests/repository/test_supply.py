@@ -1,4 +1,4 @@
-"""What idlc is built from: bounded in pyproject.toml, and fixed to the byte in requirements/."""
+"""What idlc is built from: bounded in pyproject.toml, and fixed to the byte by locks."""
 
 import re
 import sys
@@ -55,7 +55,7 @@ def wanted(texts: list[str]) -> list[Requirement]:
 
 def locked(name: str) -> list[tuple[Requirement, str]]:
     """Return each requirement of a lock file, with what else its entry says."""
-    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    text = (ROOT / "maintenance/requirements" / f"{name}.txt").read_text(encoding="utf-8")
     lines = re.sub(r"(?m)^#.*\n", "", text).replace("\\\n", "").splitlines()
     parts = [re.split(r"\s(?=--)", line, maxsplit=1) for line in lines]
     return [(Requirement(words[0]), words[1] if words[1:] else "") for words in parts]
@@ -85,7 +85,7 @@ def test_each_entry_is_one_version_with_hashes_from_anywhere(name):
         assert specifier.operator == "==", requirement
         assert requirement.url is None
         assert re.fullmatch(r"(--hash=sha256:[0-9a-f]{64}\s*)+", rest), requirement
-    text = (ROOT / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    text = (ROOT / "maintenance/requirements" / f"{name}.txt").read_text(encoding="utf-8")
     assert "://" not in text
     assert "--index-url" not in text
 

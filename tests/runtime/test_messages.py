@@ -200,13 +200,13 @@ def test_equality_looks_at_every_element():
 def memory(request, monkeypatch):
     """Compare memory as where ctypes is loaded, where it is not, and as on Windows."""
     objects = sys.modules["robot_msgs._idlc.objects"]
-    monkeypatch.setattr(objects, "_found", None)
+    monkeypatch.setattr(objects, "_memcmp_function", None)
     if request.param == "no ctypes":
         monkeypatch.delitem(sys.modules, "ctypes")
     elif request.param == "no memcmp":
         monkeypatch.setattr(ctypes.PyDLL, "__getitem__", not_there)
     yield
-    assert (objects._found is not None) == (request.param == "ctypes")
+    assert (objects._memcmp_function is not None) == (request.param == "ctypes")
 
 
 def not_there(library, name):

@@ -27,8 +27,8 @@ def heart(*, lifecycle: bool = False) -> Plan:
 
 
 def entered(texts, files=FILES, **options) -> new_node.Entry:
-    entry = new_node.enter_node(heart(**options), texts, files, Templates())
-    return new_node.enter_launch(heart(**options), texts, entry, Templates())
+    entry = new_node.node_entry(heart(**options), texts, files, Templates())
+    return new_node.with_launch_entry(heart(**options), texts, entry, Templates())
 
 
 def test_a_package_gets_what_its_nodes_share_once():

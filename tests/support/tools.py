@@ -65,10 +65,9 @@ def run(*words, **options):
     return done.stdout
 
 
-def assemble(machine, text, folder):
+def assemble(machine, source, folder):
     """Return the object file of an assembler text, the code in it and its symbols' values."""
-    source, made, code = folder / "code.s", folder / "code.o", folder / "code"
-    source.write_text(text)
+    made, code = folder / "code.o", folder / "code"
     run(tool("as", machine), source, "-o", made)
     run(tool("objcopy", machine), "-O", "binary", "-j", ".text", made, code)
     lines = run(tool("nm", machine), made).splitlines()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from website.build import build
+from maintenance.website.build import build
 
 
 @pytest.fixture(scope="session")

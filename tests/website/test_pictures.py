@@ -5,10 +5,10 @@ import re
 import pytest
 from matplotlib import image
 
+from maintenance.website.pictures import SCENES, picture
+from maintenance.website.plot import plotted, program
 from tests.support import refresh
 from tests.support.paths import DOCS
-from website.pictures import SCENES, picture
-from website.plot import plotted, program
 
 FOLDER = DOCS / "pictures"
 

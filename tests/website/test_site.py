@@ -9,10 +9,10 @@ from urllib.parse import unquote
 import pytest
 
 from idlc.diagnostics.codes import CODES
+from maintenance.website import sources
+from maintenance.website.build import build
+from maintenance.website.dialect import translated
 from tests.support.paths import DOCS, ROOT
-from website import sources
-from website.build import build
-from website.dialect import translated
 
 #: Elements that load what they name.
 LOADS = {"script", "link", "img", "iframe", "source", "video", "object", "embed"}

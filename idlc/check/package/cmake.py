@@ -24,7 +24,7 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}")
 
 
 class Call(NamedTuple):
-    """A command, its words and where each of them is."""
+    """A command, its words and the range of each."""
 
     name: str
     words: tuple[str, ...]
@@ -33,15 +33,15 @@ class Call(NamedTuple):
 
 
 def calls(source: Source) -> Iterator[Call]:
-    """Yield the commands of a CMakeLists.txt without those that are within others."""
+    """Yield the commands of a CMakeLists.txt, except nested ones."""
     code = re.sub(r"#[^\r\n]*", lambda comment: " " * len(comment[0]), source.text)
-    for found in _COMMAND.finditer(code):
+    for command in _COMMAND.finditer(code):
         places = [
-            Span(source, found.start(2) + word.start(), found.start(2) + word.end())
-            for word in re.finditer(r"[^\s;]+", found[2])
+            Span(source, command.start(2) + word.start(), command.start(2) + word.end())
+            for word in re.finditer(r"[^\s;]+", command[2])
         ]
         words = tuple(place.text.strip('"') for place in places)
-        yield Call(found[1].lower(), words, tuple(places), Span(source, *found.span()))
+        yield Call(command[1].lower(), words, tuple(places), Span(source, *command.span()))
 
 
 def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
@@ -49,15 +49,21 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
     if facts.cmake is None or not (facts.generates and model.own):
         return
     commands = list(calls(facts.cmake))
-    generating = [one for one in commands if one.name == GENERATE]
+    generating = [command for command in commands if command.name == GENERATE]
     if len(generating) != 1:
         return
     (call,) = generating
-    lists = {one.words[0]: one for one in commands if one.name == "set" and one.words}
-    others = {one.words[1] for one in commands if one.name == "list" and len(one.words) > 1}
+    lists = {
+        command.words[0]: command for command in commands if command.name == "set" and command.words
+    }
+    others = {
+        command.words[1]
+        for command in commands
+        if command.name == "list" and len(command.words) > 1
+    }
     first, end = _dependencies(call)
     words = call.words[first:end]
-    named = [one[1] for word in words if (one := _VARIABLE.fullmatch(word))]
+    named = [variable[1] for word in words if (variable := _VARIABLE.fullmatch(word))]
     seen = {word for word in words if word.isidentifier()}
     for name in named:
         if name not in lists or name in others:
@@ -78,7 +84,7 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 
 def _dependencies(call: Call) -> tuple[int, int]:
-    """Return between which of its words a call names what it depends on."""
+    """Return the range of a call's words that are its dependencies."""
     count = len(call.words)
     first = call.words.index(_KEYWORD) + 1 if _KEYWORD in call.words else count
     return first, next((at for at in range(first, count) if call.words[at] in _OPTIONS), count)
@@ -89,9 +95,9 @@ def _where(named: list[str]) -> str:
 
 
 def listing(target: Call, package: str, *, listed: bool) -> Edit:
-    """Return the edit that adds a package to a list, laid out as its last word is.
+    """Return the edit that adds a package to a list, in the layout of its last word.
 
-    A command that has no such list yet gets the keyword, too, unless it is `set()`.
+    A command without such a list gets the keyword as well, unless it is `set()`.
     """
     last = target.places[-1]
     text = last.source.text
@@ -105,8 +111,10 @@ def listing(target: Call, package: str, *, listed: bool) -> Edit:
 
 def _finding(commands: list[Call], package: str) -> tuple[Edit, ...]:
     """Return the edit that finds a package, unless a loop or a command does so."""
-    finding = [one for one in commands if one.name == "find_package" and one.words]
-    if not finding or any(one.words[0] == package or "$" in one.words[0] for one in finding):
+    finding = [command for command in commands if command.name == "find_package" and command.words]
+    if not finding or any(
+        command.words[0] == package or "$" in command.words[0] for command in finding
+    ):
         return ()
     last = finding[-1].span
     text = last.source.text

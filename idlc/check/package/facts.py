@@ -1,4 +1,4 @@
-"""Reading what surrounds the interfaces of a package."""
+"""Reading the facts about the package of interfaces."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
 
-def facts(given: Inputs, known: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
-    """Return what surrounds a package's interfaces; `None` without a package.xml.
+def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
+    """Return the facts about a package; `None` without a package.xml.
 
-    `known` tells the names of ROS packages; it is asked only for a package with Python code.
+    `ros_packages` returns the names of ROS packages; it is called only with Python code.
     """
     root = scope.root
-    path = root.manifest(next(iter(given.folders), given.home))
+    path = root.manifest(next(iter(package.folders), package.home))
     source = root.read_source(path, root.shown(path), Report()) if path else None
-    if path is None or source is None or not (said := statements(source)):
+    if path is None or source is None or not (declared := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))
@@ -47,10 +47,10 @@ def facts(given: Inputs, known: Callable[[], Iterable[str]], scope: Scope) -> Fa
     cmake = _optional(folder / "CMakeLists.txt", root)
     modules = dict(_modules(folder, files, generated, root))
     return Facts(
-        name=given.package,
+        name=package.package,
         manifest=source,
-        statements=said,
-        inputs=given.digests if locks else {},
+        statements=declared,
+        inputs=package.digests if locks else {},
         modules=modules,
         setup_py=_optional(folder / "setup.py", root),
         setup_cfg=_optional(folder / "setup.cfg", root),
@@ -58,18 +58,19 @@ def facts(given: Inputs, known: Callable[[], Iterable[str]], scope: Scope) -> Fa
         cmake=cmake,
         generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=_whole(given, files, scope.exclude),
-        marker=(folder / "resource" / given.package).is_file(),
+        whole=_whole(package, files, scope.exclude),
+        marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
-            GeneratedOutput(root.shown(at), one.package, one.inputs) for at, one in locks.items()
+            GeneratedOutput(root.shown(at), record.package, record.inputs)
+            for at, record in locks.items()
         ),
         files={
-            one.file.key: place.relative_to(folder).as_posix()
-            for one in given.files
-            if (place := root.absolute(one.file.path)).is_relative_to(folder)
+            entry.file.key: place.relative_to(folder).as_posix()
+            for entry in package.files
+            if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
         folders=_by_name(folder, files),
-        known=_LIBRARIES.union(known()) if modules else _LIBRARIES,
+        known=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )
 
 
@@ -79,7 +80,7 @@ def folders(folder: Path) -> dict[str, bool]:
 
 
 def home_of(folder: Path, package: str, root: Root) -> Path:
-    """Return the folder from which setup.py takes a package, or where idlc compiled it before."""
+    """Return the folder from which setup.py takes a package, or an earlier `idlc gen`'s."""
     homes = (folder / package, folder / "src" / package)
     for home in homes:
         if (home / lock.FILE).is_file():
@@ -90,53 +91,57 @@ def home_of(folder: Path, package: str, root: Root) -> Path:
         from idlc.check.package.python_packages import layout
         from idlc.check.package.setup_py import Setup
 
-        there = {"src": False} if (folder / "src").is_dir() else {}
-        view = layout(Setup(setup), cfg, pyproject, there)
+        sources = {"src": False} if (folder / "src").is_dir() else {}
+        view = layout(Setup(setup), cfg, pyproject, sources)
         if view is not None:
             return folder / view.folder(package)
     return homes[not homes[0].is_dir() and homes[1].is_dir()]
 
 
 def _by_name(folder: Path, files: Iterable[Path]) -> dict[str, bool]:
-    found: dict[str, bool] = {}
+    is_package: dict[str, bool] = {}
     for file in files:
         parts = file.relative_to(folder).parts[:-1]
         for end in range(1, len(parts) + 1):
-            found.setdefault(".".join(parts[:end]), False)
+            is_package.setdefault(".".join(parts[:end]), False)
         if file.name == "__init__.py" and parts:
-            found[".".join(parts)] = True
-    return found
+            is_package[".".join(parts)] = True
+    return is_package
 
 
 def _locks(files: Iterable[Path]) -> dict[Path, lock.Lock]:
-    """Return the records of generated code that can be read, by their files."""
-    found = [file for file in files if file.name == lock.FILE]
-    loaded = ((file, load_lock(file.parent, "", Report())) for file in found)
+    """Return the readable lock files by path."""
+    lock_files = [file for file in files if file.name == lock.FILE]
+    loaded = ((file, load_lock(file.parent, "", Report())) for file in lock_files)
     return {file: lock for file, lock in loaded if lock}
 
 
-def _whole(given: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
-    """Return whether a package has no interface files but those given."""
-    there = {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)}
-    return bool(given.files) and there <= {one.file.path.resolve() for one in given.files}
+def _whole(package: Inputs, files: Iterable[Path], exclude: Exclusions) -> bool:
+    """Return whether a package has no other interface files."""
+    existing = {file.resolve() for file in files if file.suffix in KINDS and not exclude.has(file)}
+    return bool(package.files) and existing <= {
+        entry.file.path.resolve() for entry in package.files
+    }
 
 
 def _generates(cmake: Source) -> bool:
     """Return whether a CMakeLists.txt generates interfaces other than for tests of its own."""
-    return any(one.name == GENERATE and "SKIP_INSTALL" not in one.words for one in calls(cmake))
+    return any(
+        command.name == GENERATE and "SKIP_INSTALL" not in command.words for command in calls(cmake)
+    )
 
 
 def _files(folder: Path) -> Iterator[Path]:
     """Yield every file below a package's folder that may be a source, other packages' excluded."""
     waiting = [folder]
     while waiting:
-        here = waiting.pop()
+        current = waiting.pop()
         try:
-            entries = sorted(here.iterdir())
+            entries = sorted(current.iterdir())
         except OSError:
             continue
-        if here != folder and any(
-            one.name in CLOSING or one.name == "package.xml" for one in entries
+        if current != folder and any(
+            entry.name in CLOSING or entry.name == "package.xml" for entry in entries
         ):
             continue
         for entry in entries:
@@ -153,7 +158,7 @@ def _modules(
 ) -> Iterator[tuple[str, Source]]:
     """Yield a package's own Python files by their dotted names, without tests and the like.
 
-    Nodes may lie in the folder that classes are generated into.
+    Nodes may be in the folder of generated classes.
     """
     for file in files:
         parts = file.relative_to(folder).parts
@@ -163,5 +168,5 @@ def _modules(
 
 
 def _optional(path: Path, root: Root) -> Source | None:
-    """Return a file's text, `None` if it is not there or no text, which others complain about."""
+    """Return a file's text, `None` if it is missing or no text, which others report."""
     return root.read_source(path, root.shown(path), Report()) if root.is_file(path) else None

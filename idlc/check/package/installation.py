@@ -1,4 +1,4 @@
-"""Rules on setup.py and its neighbours: what colcon builds can be found and run afterwards."""
+"""Rules on setup.py and its neighbours: ROS 2 finds and runs the package that colcon built."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from idlc.check.package.setup_py import DataFiles, Setup
 
 _INDEX = "share/ament_index/resource_index"
-#: What keeps interfaces and their classes from being installed.
+#: Problems that keep interfaces and their classes from being installed.
 CODES = (
     codes.INTERFACES_NOT_INSTALLED,
     codes.NO_LIBRARY_INSTALLED,
@@ -33,13 +33,13 @@ CODES = (
 
 @lru_cache(maxsize=16)
 def _read(source: Source) -> Setup:
-    from idlc.check.package.setup_py import Setup  # what has no setup.py needs no ast
+    from idlc.check.package.setup_py import Setup  # packages without a setup.py need no ast
 
     return Setup(source)
 
 
 def _built_by_setup(facts: Facts) -> Setup | None:
-    """Return what setup.py says, if it builds the package."""
+    """Return the parsed setup.py, if it builds the package."""
     is_python = facts.setup_py is not None and facts.build_type == "ament_python"
     return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
 
@@ -51,11 +51,11 @@ def wiring(
     folders: Mapping[str, bool],
     others: tuple[Source | None, Source | None] | None = None,
 ) -> Report:
-    """Return what keeps a setup.py from installing interfaces and their classes.
+    """Return the problems that keep a setup.py from installing interfaces and their classes.
 
-    `keys` are the interfaces as `kind/Name.kind` with their files, `folders` those of the package
+    `keys` are the interfaces as `kind/Name.kind` with their files, `folders` the package's folders
     by dotted name, and whether each has an `__init__.py`. `others` are setup.cfg and
-    pyproject.toml; without these, only what setup() is given is judged.
+    pyproject.toml; without these, only the arguments of setup() are judged.
     """
     from idlc.check.package.python_packages import layout
     from idlc.check.package.setup_edits import unusable_entry
@@ -77,10 +77,13 @@ def _layout(facts: Facts, setup: Setup) -> Layout | None:
 
 
 def installed(facts: Facts, model: Model, report: Report) -> None:
-    """setup.py installs interfaces, their classes, and what C++ tools load."""
+    """setup.py installs interfaces, their classes, and the libraries for C++ tools."""
     setup = _built_by_setup(facts)
     if setup is not None and model.own:
-        names = sorted(f"{one.name.kind}/{one.name.name}.{one.name.kind}" for one in model.own)
+        names = sorted(
+            f"{interface.name.kind}/{interface.name.name}.{interface.name.kind}"
+            for interface in model.own
+        )
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
         report.extend(wiring(setup.source, facts.name, keys, facts.folders, others))
@@ -100,26 +103,26 @@ def _missing_interfaces(
     index = _lacks(entries, f"{_INDEX}/rosidl_interfaces", ())
     if not missing and not index:
         return
-    what = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
-    what += ["the index entry of the interfaces"] if index else []
+    subjects = [f"the {enumerated([f'.{kind}' for kind in missing])} files"] if missing else []
+    subjects += ["the index entry of the interfaces"] if index else []
     patterns = sorted({_pattern(key, file) for key, file in keys.items()})
     lines = [
-        f"('{share}/{kind}', glob('{one}'))"
+        f"('{share}/{kind}', glob('{pattern}'))"
         for kind in missing
-        for one in patterns
-        if one.endswith(f".{kind}")
+        for pattern in patterns
+        if pattern.endswith(f".{kind}")
     ]
     if index:
         lines.append(f"('{_INDEX}/rosidl_interfaces', glob('resource/rosidl_interfaces/*'))")
     problem = codes.INTERFACES_NOT_INSTALLED.at(
         setup.place("data_files"),
-        f"{enumerated(what)} {'are' if missing else 'is'} not among the `data_files`",
+        f"{enumerated(subjects)} {'are' if missing else 'is'} not among the `data_files`",
     )
     yield _with_data_files(problem, setup, lines, uses_glob=True)
 
 
 def _pattern(key: str, file: str) -> str:
-    """Return the pattern for all interface files of a kind in the folder of one."""
+    """Return the pattern for all interface files of one kind and folder."""
     folder, kind = file.rpartition("/")[0], key.split("/")[0]
     if not re.fullmatch(r"[\w./ -]+", folder):  # it becomes part of a program
         folder = kind
@@ -127,17 +130,19 @@ def _pattern(key: str, file: str) -> str:
 
 
 def _lacks(entries: Sequence[DataFiles], folder: str, keys: Iterable[str], kind: str = "") -> bool:
-    """Return whether entries are known not to install files into a folder of the prefix."""
-    there = [one for one in entries if one.folder is None or one.folder.rstrip("/") == folder]
-    patterns = [pattern for one in there for pattern in _files(one)]
-    wanted = [key.rpartition("/")[2] for key in keys if key.startswith(f"{kind}/")] or [""]
+    """Return whether entries certainly do not install files into a folder of the prefix."""
+    matching = [
+        entry for entry in entries if entry.folder is None or entry.folder.rstrip("/") == folder
+    ]
+    patterns = [pattern for entry in matching for pattern in _files(entry)]
+    needed = [key.rpartition("/")[2] for key in keys if key.startswith(f"{kind}/")] or [""]
     names = [pattern.rpartition("/")[2] for pattern in patterns]
-    # a file is looked for by name only, where patterns for all of its kind are usual
-    return not all(any(not one or fnmatchcase(one, name) for name in names) for one in wanted)
+    # only the file's name is compared, because patterns for all files of a kind are usual
+    return not all(any(not file or fnmatchcase(file, name) for name in names) for file in needed)
 
 
 def _files(entry: DataFiles) -> tuple[str, ...]:
-    return ("*",) if entry.files is None else entry.files  # what cannot be seen may be anything
+    return ("*",) if entry.files is None else entry.files  # computed files may be any
 
 
 def _with_data_files(
@@ -164,21 +169,23 @@ def _missing_packages(
     setup: Setup, view: Layout, package: str, keys: Iterable[str], folders: Mapping[str, bool]
 ) -> Iterator[Diagnostic]:
     """Yield the problem with generated packages that setuptools leaves out."""
-    if view.installed is None or any(one.startswith(f"{package}.") for one in view.roots):
+    if view.installed is None or any(root.startswith(f"{package}.") for root in view.roots):
         return
     support = f"{package}._idlc"
-    wanted = [package, *(f"{package}.{kind}" for kind in _kinds(keys)), support]
-    wanted += sorted(name for name in view.packages(folders) if name.startswith(f"{support}."))
-    missing = [one for one in wanted if not view.installed.covers(one, view.folder(one))]
+    needed = [package, *(f"{package}.{kind}" for kind in _kinds(keys)), support]
+    needed += sorted(name for name in view.packages(folders) if name.startswith(f"{support}."))
+    missing = [name for name in needed if not view.installed.covers(name, view.folder(name))]
     if not missing:
         yield from _absent_folders(setup, view, package, keys, folders)
         return
     listed = enumerated([f"`{name}`" for name in missing])
-    what = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
+    reason = f"{listed} {'is' if len(missing) == 1 else 'are'} not among the `packages`"
     if view.installed.is_nothing:
-        what = "nothing names the `packages`, and setuptools does not choose among several folders"
+        reason = (
+            "nothing names the `packages`, and setuptools does not choose among several folders"
+        )
     problem = codes.CLASSES_NOT_INSTALLED.at(
-        view.installed.place, f"{what}: the classes of the interfaces are not installed"
+        view.installed.place, f"{reason}: the classes of the interfaces are not installed"
     )
     yield _with_packages(problem, setup, view, package, folders)
 
@@ -193,14 +200,14 @@ def _absent_folders(
         return
     support = f"{package}._idlc"
     kinds = _kinds(keys)
-    made = {f"{package}.{kind}" for kind in kinds} | ({package} if kinds else set())
-    there = view.packages(folders)
+    generated = {f"{package}.{kind}" for kind in kinds} | ({package} if kinds else set())
+    existing = view.packages(folders)
     for item in setup.items(setup.arguments.get("packages")):
         name = setup.text(item.node) if item.is_element else None
-        if not name or name in made or name.replace("/", ".") in there:
+        if not name or name in generated or name.replace("/", ".") in existing:
             continue
-        if kinds and support not in there and f"{name}.".startswith(f"{support}."):
-            continue  # the build makes it
+        if kinds and support not in existing and f"{name}.".startswith(f"{support}."):
+            continue  # the build creates it
         problem = codes.CLASSES_NOT_INSTALLED.at(
             span_of(setup.source, item.node),
             f"`packages` names `{name}`, and there is no folder `{view.folder(name)}`",
@@ -211,7 +218,7 @@ def _absent_folders(
 def _with_packages(
     problem: Diagnostic, setup: Setup, view: Layout, package: str, folders: Mapping[str, bool]
 ) -> Diagnostic:
-    """Return a problem with the edits after which `packages` is worked out by setuptools."""
+    """Return a problem with the edits that let setuptools find the `packages`."""
     from idlc.check.package.setup_edits import appended, argument, imported, quote_of
     from idlc.check.package.setup_py import range_of
 
@@ -226,16 +233,16 @@ def _with_packages(
     target = setup.value(setup.arguments.get("packages"))
     items = setup.items(setup.arguments.get("packages"))
     names = [setup.text(item.node) for item in items if item.is_element]
-    there = view.packages(folders)
-    tops = {name for name, has_init in there.items() if has_init and "." not in name}
-    known = len(names) == len(items) and all(
+    existing = view.packages(folders)
+    tops = {name for name, has_init in existing.items() if has_init and "." not in name}
+    is_own = len(names) == len(items) and all(
         name and name.partition(".")[0] == package for name in names
     )
     edits: tuple[Edit, ...] = ()
     if "packages" not in setup.arguments:
         edits = argument(setup, f"packages={call}")
     elif view.roots.keys() <= {""} and target is not None:
-        if (known or listed is None) and tops <= {package, "test"}:
+        if (is_own or listed is None) and tops <= {package, "test"}:
             start, end = range_of(setup.source, target)
             text = call.replace("'", quote_of(setup.source, target))
             edits = (Edit(Span(setup.source, start, end), text),)
@@ -252,7 +259,7 @@ def _with_packages(
 
 
 def _elsewhere(place: Span, view: Layout, root: str) -> str:
-    """Return how setup.cfg or pyproject.toml names the packages that setuptools is to find."""
+    """Return the hint for packages that setup.cfg or pyproject.toml lists."""
     if view.installed and view.installed.finders:
         return "make its `where`, `include` and `exclude` match these packages"
     if place.source.path.endswith(".toml"):
@@ -267,7 +274,7 @@ def _kinds(keys: Iterable[str]) -> list[str]:
 
 
 def resource_marker(facts: Facts, _: Model, report: Report) -> None:
-    """The package's marker is there and installed, without which `ros2 run` does not find it."""
+    """The package's marker, which `ros2 run` needs to find it, exists and is installed."""
     setup = _built_by_setup(facts)
     if setup is None:
         return
@@ -288,7 +295,7 @@ def resource_marker(facts: Facts, _: Model, report: Report) -> None:
 
 
 def entry_points(facts: Facts, _: Model, report: Report) -> None:
-    """Each console script names a function that is there."""
+    """Each console script names an existing function."""
     if facts.setup_py is None:
         return
     from idlc.check.package.setup_py import span_of
@@ -304,17 +311,17 @@ def entry_points(facts: Facts, _: Model, report: Report) -> None:
 
 
 def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | None:
-    """Return what is wrong with an entry point, and a hint.
+    """Return the problem of an entry point, and a hint.
 
-    `elsewhere` is whether modules may lie where they are not looked for.
+    `elsewhere`: modules may be in folders that were not searched.
     """
     from idlc.check.package.setup_py import defines
 
     script, equals, target = text.partition("=")
     module, colon, function = (part.strip() for part in target.partition(":"))
     if not equals or not colon or not function:
-        what = f"`{text}` is not an entry point"
-        return what, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
+        message = f"`{text}` is not an entry point"
+        return message, f"write `{script.strip() or 'NAME'} = {facts.name}.MODULE:main`"
     if elsewhere:
         return None
     if module.partition(".")[0] not in {name.partition(".")[0] for name in facts.modules}:
@@ -331,14 +338,14 @@ def _problem(text: str, facts: Facts, *, elsewhere: bool) -> tuple[str, str] | N
 
 
 def names(facts: Facts, _: Model, report: Report) -> None:
-    """setup.py and setup.cfg call the package what package.xml calls it."""
+    """setup.py and setup.cfg have the same package name as package.xml."""
     setup = _read(facts.setup_py) if facts.setup_py else None
-    found = setup.text(setup.arguments.get("name")) if setup else None
-    if setup and found is not None and found.replace("-", "_") != facts.name:
+    name = setup.text(setup.arguments.get("name")) if setup else None
+    if setup and name is not None and name.replace("-", "_") != facts.name:
         report.add(
             codes.NAME_MISMATCH.at(
                 setup.place("name"),
-                f"setup.py calls the package `{found}`, package.xml `{facts.name}`",
+                f"setup.py calls the package `{name}`, package.xml `{facts.name}`",
                 hint="give both the same name",
             )
         )
@@ -360,7 +367,7 @@ def names(facts: Facts, _: Model, report: Report) -> None:
 
 
 def current_output(facts: Facts, _: Model, report: Report) -> None:
-    """Code that idlc generated here is made of the interfaces as they are now."""
+    """Generated code in the package matches the current interfaces."""
     for output in facts.outputs:
         if output.package != facts.name or not facts.whole:
             continue

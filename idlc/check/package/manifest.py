@@ -1,4 +1,4 @@
-"""Rules on package.xml: what the interfaces and nodes of a package need is declared in it."""
+"""Rules on package.xml: it declares the dependencies of a package's interfaces and nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from idlc.model.link import Model
 from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
-#: What rosidl adds by itself.
+#: Packages that rosidl adds by itself.
 _IMPLICIT = frozenset({"service_msgs", "action_msgs", "unique_identifier_msgs"})
 _GROUP = "rosidl_interface_packages"
 #: The packages that generate interfaces, and those that generated code needs, usual first.
@@ -30,45 +30,45 @@ def declared_dependencies(facts: Facts, model: Model, report: Report) -> None:
     seen = _may_use(facts)
     for package, span in used_packages(model).items():
         if package not in seen:
-            found = codes.MISSING_DEPENDENCY.at(
+            diagnostic = codes.MISSING_DEPENDENCY.at(
                 span,
                 f"`{facts.manifest.path}` does not declare `{package}`",
                 hint=f"add `<depend>{package}</depend>`",
             )
-            report.add(_or_meant(found, facts, model, package))
+            report.add(_or_misspelt(diagnostic, facts, model, package))
 
 
 def used_packages(model: Model) -> dict[str, Span]:
-    """Return the known packages whose messages are used, and where each is used first."""
-    known = _known(model)
-    found: dict[str, Span] = {}
+    """Return the packages whose messages are used, with the range of each one's first use."""
+    packages = _packages_with_interfaces(model)
+    spans: dict[str, Span] = {}
     for message in sections(model):
         for field, target in message.holders:
-            if field.type_span is not None and target.package in known:
-                found.setdefault(target.package, field.type_span)
-    return found
+            if field.type_span is not None and target.package in packages:
+                spans.setdefault(target.package, field.type_span)
+    return spans
 
 
-def _known(model: Model) -> set[str]:
-    """Return the packages of which interfaces are known."""
+def _packages_with_interfaces(model: Model) -> set[str]:
+    """Return the packages with interfaces."""
     return {name.package for name in model.interfaces} | {*catalog.packages(model.distro)}
 
 
-def _or_meant(found: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
+def _or_misspelt(diagnostic: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
     """Return a problem with the edit that declares a package, or with the misspelt declaration."""
-    known = _known(model) | facts.known
+    existing = _packages_with_interfaces(model) | facts.known
     for name, statement in facts.declared(*_NEEDED).items():
-        if name not in known and closest_package(name, [package]):
+        if name not in existing and closest_package(name, [package]):
             line = f"<{statement.tag}>{package}</{statement.tag}>"
             hint = f"write `{line}` in place of `{name}`, which is not known here"
             label = Label(statement.span, "misspelt?")
-            return msgspec.structs.replace(found, hint=hint, labels=(label,))
-    return _with_lines(found, facts, [f"<depend>{package}</depend>"])
+            return msgspec.structs.replace(diagnostic, hint=hint, labels=(label,))
+    return _with_lines(diagnostic, facts, [f"<depend>{package}</depend>"])
 
 
 def _may_use(facts: Facts) -> set[str]:
-    """Return the packages whose messages a package may use: its own, and those that it declares."""
-    # what CMake does not install is there for the package's own tests
+    """Return the packages whose messages a package may use: itself and its dependencies."""
+    # interfaces that CMake does not install are for the package's own tests
     declared = facts.declared(*_NEEDED, *(() if facts.generates else ("test_depend",)))
     return {facts.name, *declared}
 
@@ -81,9 +81,9 @@ def dependency(facts: Facts, package: str) -> Edit | None:
 
 
 def declaration(facts: Facts, package: str) -> Span | None:
-    """Return where a package is declared, `None` if it is not."""
-    found = facts.declared(*_NEEDED, "test_depend").get(package)
-    return found.span if found else None
+    """Return the range of a package's declaration, `None` without one."""
+    statement = facts.declared(*_NEEDED, "test_depend").get(package)
+    return statement.span if statement else None
 
 
 def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
@@ -103,7 +103,7 @@ def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 
 def _has_gaps(model: Model) -> bool:
-    """Return whether some field is of a type that is not known, and may be of any package."""
+    """Return whether some field has an unknown type, which may be of any package."""
     elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
     return any(
         element.target not in model.interfaces
@@ -119,12 +119,12 @@ def interface_group(facts: Facts, model: Model, report: Report) -> None:
         return
     if _GROUP not in facts.declared("member_of_group"):
         line = f"<member_of_group>{_GROUP}</member_of_group>"
-        found = codes.NOT_IN_INTERFACE_GROUP.at(
+        diagnostic = codes.NOT_IN_INTERFACE_GROUP.at(
             facts.place,
             "CMake stops at a package with interfaces that is in no interface group",
             hint=f"add `{line}`",
         )
-        report.add(_with_lines(found, facts, [line]))
+        report.add(_with_lines(diagnostic, facts, [line]))
 
 
 def generators(facts: Facts, model: Model, report: Report) -> None:
@@ -142,10 +142,10 @@ def generators(facts: Facts, model: Model, report: Report) -> None:
     if missing:
         needed = " and ".join(f"`{package}`" for package, _ in missing)
         lines = " and ".join(f"`{line}`" for _, line in missing)
-        found = codes.NO_INTERFACE_GENERATORS.at(
+        diagnostic = codes.NO_INTERFACE_GENERATORS.at(
             facts.place, f"a package with interfaces needs {needed}", hint=f"add {lines}"
         )
-        report.add(_with_lines(found, facts, [line for _, line in missing]))
+        report.add(_with_lines(diagnostic, facts, [line for _, line in missing]))
 
 
 def declared_imports(facts: Facts, model: Model, report: Report) -> None:
@@ -163,29 +163,29 @@ def declared_imports(facts: Facts, model: Model, report: Report) -> None:
                 declared.add(package)
                 tag = "depend" if package in used else "exec_depend"
                 line = f"<{tag}>{package}</{tag}>"
-                found = codes.UNDECLARED_IMPORT.at(
+                diagnostic = codes.UNDECLARED_IMPORT.at(
                     span_of(source, node),
                     f"`{facts.manifest.path}` does not declare `{package}`",
                     hint=f"add `{line}`",
                 )
-                report.add(_with_lines(found, facts, [line]))
+                report.add(_with_lines(diagnostic, facts, [line]))
 
 
-def _with_lines(found: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
-    """Return a problem with the edits that add lines to package.xml, each after its like."""
+def _with_lines(diagnostic: Diagnostic, facts: Facts, lines: Sequence[str]) -> Diagnostic:
+    """Return a problem with the edits that add lines to package.xml, each after similar ones."""
     edits = tuple(edit for line in lines if (edit := _addition(facts, line)))
-    return msgspec.structs.replace(found, edits=edits)
+    return msgspec.structs.replace(diagnostic, edits=edits)
 
 
 def _addition(facts: Facts, line: str) -> Edit | None:
-    """Return the edit that adds a line, where the schema's order has it."""
+    """Return the edit that adds a line, at its place in the schema's order."""
     text = facts.manifest.text
     rank = RANK[line[1 : line.index(">")]]
-    ranked = [one for one in facts.statements if one.tag in RANK]
-    before = [one for one in ranked if RANK[one.tag] <= rank]
-    same = [one for one in before if RANK[one.tag] == rank]
-    after = next((one for one in ranked if RANK[one.tag] > rank), None)
-    first = not same and after and not any(one.tag in DEPENDENCIES for one in before)
+    ranked = [statement for statement in facts.statements if statement.tag in RANK]
+    before = [statement for statement in ranked if RANK[statement.tag] <= rank]
+    same = [statement for statement in before if RANK[statement.tag] == rank]
+    after = next((statement for statement in ranked if RANK[statement.tag] > rank), None)
+    first = not same and after and not any(statement.tag in DEPENDENCIES for statement in before)
     place = after if first or not before else (same or before)[-1]
     if place is None:
         return None

@@ -1,6 +1,6 @@
-"""Which Python packages setuptools installs, and from which folders, as far as files show.
+"""The Python packages that setuptools installs, and their folders, as far as files show.
 
-setup.py says so, or setup.cfg, or pyproject.toml; where none does, setuptools looks itself.
+setup.py lists them, or setup.cfg, or pyproject.toml; otherwise setuptools searches itself.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _MOST = 100_000
 _MOST_ROOTS = 20
 #: Dots in a line of pyproject.toml: reading a key takes time by the square of its parts.
 _MOST_DOTS = 200
-#: What may have other code choose the packages.
+#: Arguments with which other code may choose the packages.
 _HOOKS = frozenset({"distclass", "pbr", "py_modules", "setup_requires"})
-#: Folders that setuptools does not take for packages where it looks itself.
+#: Folders that setuptools ignores in its own search.
 _NOT_FOUND = frozenset(
     "ci bin debian doc docs documentation manpages news newsfragments changelog test tests "
     "unit_test unit_tests example examples scripts tools util utils python build benchmark "
@@ -45,15 +45,15 @@ class Finder(NamedTuple):
     exclude: tuple[str, ...] = ()
 
     def finds(self, name: str) -> bool:
-        """Return whether a package of this name is found if its folder is there."""
+        """Return whether a package of this name is found if its folder exists."""
         is_included = any(fnmatchcase(name, pattern) for pattern in self.include or ("*",))
         return is_included and not any(fnmatchcase(name, pattern) for pattern in self.exclude)
 
 
 class Installed(NamedTuple):
-    """The packages that are named and looked for, and the place that says so.
+    """The listed packages and searches, and the range that lists them.
 
-    `is_nothing` is whether no place does: setuptools would find several, and installs none.
+    `is_nothing`: nothing lists them; setuptools would find several, and installs none.
     """
 
     place: Span
@@ -65,22 +65,20 @@ class Installed(NamedTuple):
         """Return whether a package in a folder is installed."""
         path = name.replace(".", "/")
         return name in self.names or any(
-            normpath(f"{one.where}/{path}") == folder and one.finds(name) for one in self.finders
+            normpath(f"{finder.where}/{path}") == folder and finder.finds(name)
+            for finder in self.finders
         )
 
 
-class Said(NamedTuple):
-    """What one file says: packages and `package_dir`, each `None` if it says nothing on it.
-
-    A file that cannot be understood wholly has neither: then nothing is `Said` of it.
-    """
+class PackagingConfig(NamedTuple):
+    """The packages and `package_dir` in one file, each `None` if the file has no such setting."""
 
     packages: Installed | None = None
     roots: Mapping[str, str] | None = None
 
 
 class Layout(NamedTuple):
-    """Where setuptools takes packages from, and what it installs, `None` if that is not known."""
+    """The folders of packages, and the packages that setuptools installs, `None` if unknown."""
 
     roots: Mapping[str, str]
     installed: Installed | None
@@ -95,43 +93,43 @@ class Layout(NamedTuple):
         raise AssertionError
 
     def packages(self, folders: Mapping[str, bool]) -> dict[str, bool]:
-        """Return folders by the names of the packages that they are for setuptools."""
+        """Return folders by the names that their packages have in setuptools."""
         if not self.roots:
             return dict(folders)
-        found = {} if "" in self.roots else dict(folders)
+        packages = {} if "" in self.roots else dict(folders)
         for package, root in self.roots.items():
             at = normpath(root).replace("/", ".")
             for name, has_init in folders.items():
                 if f"{name}.".startswith(f"{at}."):
                     inner = name[len(at) + 1 :]
-                    found[".".join(filter(None, (package, inner)))] = has_init
-        found.pop("", None)
-        return found
+                    packages[".".join(filter(None, (package, inner)))] = has_init
+        packages.pop("", None)
+        return packages
 
 
 def layout(
     setup: Setup, cfg: Source | None, pyproject: Source | None, folders: Mapping[str, bool]
 ) -> Layout | None:
-    """Return how setuptools sees a package; `None` if it cannot be seen where packages lie.
+    """Return setuptools' view of a package; `None` if the folders of packages are unknown.
 
-    `folders` are those that there are, by dotted name.
+    `folders` are the existing ones, by dotted name.
     """
     files = (_of_setup(setup), _of_cfg(cfg), _of_toml(pyproject))
-    said = [one for one in files if one]
-    if len(said) < len(files) or setup.call is None:
+    configs = [config for config in files if config]
+    if len(configs) < len(files) or setup.call is None:
         return None
-    roots = next((one.roots for one in said if one.roots is not None), None)
+    roots = next((config.roots for config in configs if config.roots is not None), None)
     if not all(map(_is_within, (roots or {}).values())) or len(roots or ()) > _MOST_ROOTS:
         return None
-    given = [one.packages for one in said if one.packages]
+    installed = [config.packages for config in configs if config.packages]
     if "packages" in setup.arguments:  # older setuptools do not read pyproject.toml
-        return Layout(roots or {}, None if said[2].packages else said[0].packages)
+        return Layout(roots or {}, None if configs[2].packages else configs[0].packages)
     if not setup.whole or _HOOKS & setup.arguments.keys():
         return Layout(roots or {}, None)
-    if given:
-        wheres = [one.where for one in given[0].finders if _is_within(one.where)]
+    if installed:
+        wheres = [finder.where for finder in installed[0].finders if _is_within(finder.where)]
         roots = roots or ({"": wheres[0]} if wheres and normpath(wheres[0]) != "." else {})
-        return Layout(roots, given[0] if len(given) == 1 else None)
+        return Layout(roots, installed[0] if len(installed) == 1 else None)
     place = setup.place("packages")
     if "src" in folders:
         return Layout(roots or {"": "src"}, Installed(place, (), (Finder("src"),)))
@@ -147,7 +145,7 @@ def _is_within(root: str) -> bool:
     return re.fullmatch(r"(?!/)[\w./ -]*", root) is not None and ".." not in root.split("/")
 
 
-def _of_setup(setup: Setup) -> Said | None:
+def _of_setup(setup: Setup) -> PackagingConfig | None:
     roots = None
     if "package_dir" in setup.arguments:
         pairs = setup.pairs(setup.arguments["package_dir"])
@@ -155,7 +153,7 @@ def _of_setup(setup: Setup) -> Said | None:
         if pairs is None or roots is None:
             return None
     if "packages" not in setup.arguments:
-        return Said(roots=roots)
+        return PackagingConfig(roots=roots)
     names, finders = [], []
     for part in setup.items(setup.arguments["packages"]):
         text = setup.text(part.node) if part.is_element else None
@@ -165,24 +163,24 @@ def _of_setup(setup: Setup) -> Said | None:
         elif finder:
             finders.append(finder)
         else:
-            return Said(roots=roots)
+            return PackagingConfig(roots=roots)
     place = setup.place("packages")
-    return Said(Installed(place, tuple(names), tuple(finders)), roots)
+    return PackagingConfig(Installed(place, tuple(names), tuple(finders)), roots)
 
 
 def _finder(setup: Setup, node: ast.expr) -> Finder | None:
-    """Return what a call of find_packages looks for; `None` if that cannot be seen."""
+    """Return the search of a find_packages call; `None` if its arguments are computed."""
     import ast
 
     call = setup.value(node)
     if not isinstance(call, ast.Call) or name_of_call(call) not in _FINDERS:
         return None
-    given = dict(zip(("where", "exclude", "include"), call.args, strict=False))
-    given |= {one.arg: one.value for one in call.keywords if one.arg}
-    where = setup.text(given["where"]) if "where" in given else "."
+    arguments = dict(zip(("where", "exclude", "include"), call.args, strict=False))
+    arguments |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg}
+    where = setup.text(arguments["where"]) if "where" in arguments else "."
     chosen = []
     for name in ("include", "exclude"):
-        items = setup.items(given.get(name))
+        items = setup.items(arguments.get(name))
         texts = [setup.text(item.node) for item in items]
         if None in texts or not all(item.is_element for item in items):
             return None
@@ -190,7 +188,7 @@ def _finder(setup: Setup, node: ast.expr) -> Finder | None:
     return None if where is None else Finder(where, *chosen)
 
 
-def _of_cfg(source: Source | None) -> Said | None:
+def _of_cfg(source: Source | None) -> PackagingConfig | None:
     if source and len(source.text) > _MOST:
         return None
     options = dict(_options(source)) if source else {}
@@ -198,24 +196,24 @@ def _of_cfg(source: Source | None) -> Said | None:
     lines = options.get(("options", "package_dir"), ([], None))[0]
     pairs = [line.partition("=") for line in lines]
     roots = {key.strip(): root.strip() for key, equals, root in pairs if equals}
-    found = None
+    installed = None
     if place and packages in (["find:"], ["find_namespace:"]):
-        wanted = (
+        lists = (
             options.get(("options.packages.find", key), ([], None))[0]
             for key in ("where", "include", "exclude")
         )
-        where, include, exclude = wanted
+        where, include, exclude = lists
         if len(where) > 1:
             return None
         finder = Finder("".join(where) or ".", tuple(include), tuple(exclude))
-        found = Installed(place, (), (finder,))
+        installed = Installed(place, (), (finder,))
     elif place:
-        found = Installed(place, tuple(packages))
-    return Said(found, roots or None)
+        installed = Installed(place, tuple(packages))
+    return PackagingConfig(installed, roots or None)
 
 
 def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str], Span]]]:
-    """Yield the options of a setup.cfg by section and name: a value's parts, and its place."""
+    """Yield the options of a setup.cfg by section and name: a value's parts, and its range."""
     section = ""
     key = None
     values: list[str] = []
@@ -234,15 +232,15 @@ def _options(source: Source) -> Iterator[tuple[tuple[str, str], tuple[list[str],
             key = None
         if header := _HEADER.match(text):
             section = header[1].strip()
-        elif found := re.match(r"([\w.-]+)[ \t]*[=:]", text):
-            key, at = found[1].replace("-", "_").lower(), start
-            values = [text[found.end() :].strip()]
+        elif option := re.match(r"([\w.-]+)[ \t]*[=:]", text):
+            key, at = option[1].replace("-", "_").lower(), start
+            values = [text[option.end() :].strip()]
 
 
-def _of_toml(source: Source | None) -> Said | None:
+def _of_toml(source: Source | None) -> PackagingConfig | None:
     if source is None or "setuptools" not in source.text:
-        return Said()
-    if len(source.text) > _MOST or any(one.count(".") > _MOST_DOTS for one in source.lines):
+        return PackagingConfig()
+    if len(source.text) > _MOST or any(line.count(".") > _MOST_DOTS for line in source.lines):
         return None
     if sys.version_info >= (3, 11):
         import tomllib
@@ -261,21 +259,21 @@ def _of_toml(source: Source | None) -> Said | None:
     if roots is None or len(where) != 1:
         return None
     if packages is None:
-        return Said(None, roots or None)
+        return PackagingConfig(None, roots or None)
     at = re.search(r"\bpackages\b", source.text)
     place = Span(source, *(at.span() if at else (0, 0)))
     finders = (Finder(where[0], include, exclude),) if isinstance(packages, dict) else ()
-    return Said(Installed(place, names, finders), roots or None)
+    return PackagingConfig(Installed(place, names, finders), roots or None)
 
 
-def _texts(given: Mapping[str, Any]) -> dict[str, str] | None:
+def _texts(table: Mapping[str, Any]) -> dict[str, str] | None:
     """Return the texts of a table, `None` if something in it is none."""
-    found = {key: value for key, value in given.items() if isinstance(value, str)}
-    return found if len(found) == len(given) else None
+    texts = {key: value for key, value in table.items() if isinstance(value, str)}
+    return texts if len(texts) == len(table) else None
 
 
-def _all_texts(given: Iterable[Any]) -> tuple[str, ...]:
-    found = tuple(given)
-    if isinstance(given, str) or not all(isinstance(one, str) for one in found):
+def _all_texts(values: Iterable[Any]) -> tuple[str, ...]:
+    texts = tuple(values)
+    if isinstance(values, str) or not all(isinstance(text, str) for text in texts):
         raise TypeError
-    return found
+    return texts

@@ -1,6 +1,6 @@
 """Edits of a setup.py: elements for a list, an argument for setup(), an import.
 
-Everything added looks like what stands beside it: quotes, indentation, line ends.
+Everything added follows the style of its neighbours: quotes, indentation, line ends.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ def insertion(source: Source, at: int, text: str) -> Edit:
 
 def line_end(source: Source) -> str:
     """Return the line end of a file."""
-    found = re.search(r"\r\n?|\n", source.text)
-    return found[0] if found else "\n"
+    match = re.search(r"\r\n?|\n", source.text)
+    return match[0] if match else "\n"
 
 
 def indent_of(source: Source, at: int) -> str:
     """Return the whitespace before the first word of a line."""
     start = max(source.text.rfind("\n", 0, at), source.text.rfind("\r", 0, at)) + 1
-    found = re.compile(r"[ \t]*").match(source.text, start)
-    return found[0] if found else ""
+    match = re.compile(r"[ \t]*").match(source.text, start)
+    return match[0] if match else ""
 
 
 def quote_of(source: Source, node: ast.AST) -> str:
     """Return the quote of the first literal in an expression."""
     start, end = range_of(source, node)
-    found = re.search("['\"]", source.text[start:end])
-    return found[0] if found else "'"
+    match = re.search("['\"]", source.text[start:end])
+    return match[0] if match else "'"
 
 
 def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[Edit, ...]:
@@ -82,7 +82,7 @@ def _begins_line(source: Source, at: int) -> bool:
 
 
 def _behind(text: str) -> tuple[int, bool]:
-    """Return how much of what stands behind an element belongs to it, and whether a comma does."""
+    """Return the length of the text behind an element that belongs to it; does a comma follow."""
     lines = re.findall(r"[^\r\n]*(?:\r\n?|\n)|[^\r\n]+", f"({text}")
     starts = [length - 1 for length in accumulate(map(len, lines), initial=0)]
     length = 0
@@ -99,7 +99,7 @@ def _behind(text: str) -> tuple[int, bool]:
 
 
 def argument(setup: Setup, text: str) -> tuple[Edit, ...]:
-    """Return the edit that gives setup() one argument more, laid out like its first one."""
+    """Return the edit that adds an argument to setup(), in the layout of its first one."""
     call, source = setup.call, setup.source
     if call is None or call.args or not call.keywords:
         return ()
@@ -110,7 +110,7 @@ def argument(setup: Setup, text: str) -> tuple[Edit, ...]:
 
 
 def imported(setup: Setup, module: str, name: str) -> tuple[str, tuple[Edit, ...]]:
-    """Return how a file calls a function of a module, and the edit that imports it if need be."""
+    """Return the name of a module's function in a file, and the edit that imports it if needed."""
     imports = [node for node in setup.nodes if isinstance(node, (ast.Import, ast.ImportFrom))]
     for node in imports:
         for alias in node.names:
@@ -150,10 +150,12 @@ def wrapped(old: str, new: str) -> str:
         wide = {at for at, line in lines if len(line) > WIDTH and line not in before}
         tree = parsed(new) if wide else None
         nodes = ast.walk(tree) if tree else ()
-        text = next((one for node in nodes if (one := _spread(new, node, wide, refused))), None)
+        text = next(
+            (spread for node in nodes if (spread := _spread(new, node, wide, refused))), None
+        )
         if tree is None or text is None:
             break
-        # parentheses around items are not in the tree, nor is what may follow a generator
+        # the tree has neither parentheses around items nor text that may follow a generator
         if _same(tree, parsed(text)):
             new = text
         else:
@@ -169,7 +171,7 @@ def _same(before: ast.Module, after: ast.Module | None) -> bool:
 
 
 def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str | None:
-    """Return the text with one item of a node to a line, if it is on a line that is too wide."""
+    """Return the text with each item of a node on its own line, if the node's line is too wide."""
     if not isinstance(node, (ast.List, ast.Tuple, ast.Dict, ast.Call)):
         return None
     if node.lineno not in wide or node.lineno != node.end_lineno:
@@ -186,14 +188,14 @@ def _spread(text: str, node: ast.AST, wide: set[int], refused: set[str]) -> str 
         pairs = zip(node.keys, node.values, strict=True)
         items = [(f"{code(key)}: " if key else "**") + code(value) for key, value in pairs]
     elif isinstance(node, ast.Call):
-        given: list[ast.expr | ast.keyword] = [*node.args, *node.keywords]
-        items = [code(one) for one in sorted(given, key=lambda one: one.col_offset)]
+        arguments: list[ast.expr | ast.keyword] = [*node.args, *node.keywords]
+        items = [code(passed) for passed in sorted(arguments, key=lambda passed: passed.col_offset)]
     else:
-        items = [code(one) for one in node.elts]
+        items = [code(element) for element in node.elts]
     margin, line = indent_of(source, start), line_end(source)
     body = "".join(f"{margin}{STEP}{item},{line}" for item in items)
-    found = f"{text[: start + 1]}{line}{body}{margin}{text[end - 1 :]}"
-    return found if items and found not in refused else None
+    spread = f"{text[: start + 1]}{line}{body}{margin}{text[end - 1 :]}"
+    return spread if items and spread not in refused else None
 
 
 COMPILE = "compile_interfaces"
@@ -210,8 +212,8 @@ else:
 
 
 def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
-    """Yield the problem with a setup.py that enters a package without installing libraries."""
-    index = [one for one in setup.data_files or () if "/packages" in (one.folder or "")]
+    """Yield the problem of a setup.py that registers a package without installing libraries."""
+    index = [entry for entry in setup.data_files or () if "/packages" in (entry.folder or "")]
     if not index or installs(setup):
         return
     edits = edits_for(setup)
@@ -226,26 +228,26 @@ def unusable_entry(setup: Setup, package: str) -> Iterator[Diagnostic]:
 
 
 def installs(setup: Setup) -> bool:
-    """Return whether a setup.py uses what compiling the interfaces returns."""
-    dropped = {id(one.value) for one in setup.nodes if _is_plain(one)}
-    return any(_is_compile(one) and id(one) not in dropped for one in setup.nodes)
+    """Return whether a setup.py uses the result of compiling the interfaces."""
+    dropped = {id(node.value) for node in setup.nodes if _is_plain(node)}
+    return any(_is_compile(node) and id(node) not in dropped for node in setup.nodes)
 
 
 def edits_for(setup: Setup) -> tuple[Edit, ...]:
     """Return the edits after which a setup.py installs libraries; none if it is too unusual."""
-    names = {one.id for one in setup.nodes if isinstance(one, ast.Name)}
+    names = {node.id for node in setup.nodes if isinstance(node, ast.Name)}
     if setup.call is None or RESULT in names or installs(setup):
         return ()
-    taken = {one.arg for one in setup.call.keywords} & {"distclass", None}
-    given = () if taken else argument(setup, f"**{RESULT}")
-    compiling = _compiling(setup) if given else ()
-    return (*compiling, *given) if compiling else ()
+    taken = {keyword.arg for keyword in setup.call.keywords} & {"distclass", None}
+    passing = () if taken else argument(setup, f"**{RESULT}")
+    compiling = _compiling(setup) if passing else ()
+    return (*compiling, *passing) if compiling else ()
 
 
 def _compiling(setup: Setup) -> tuple[Edit, ...]:
-    """Return the edits that keep what compiling returns, or that compile in the first place."""
+    """Return the edits that keep the result of compiling, or that compile in the first place."""
     source = setup.source
-    plain = [one for one in setup.nodes if _is_plain(one)]
+    plain = [node for node in setup.nodes if _is_plain(node)]
     if not plain:
         name = setup.arguments.get("name")
         first = setup.first_use("packages", "data_files")
@@ -259,10 +261,10 @@ def _compiling(setup: Setup) -> tuple[Edit, ...]:
         blank = not at or re.search(r"(\r\n?|\n)[ \t]*(\r\n?|\n)\Z", source.text[:at])
         block = _BLOCK.format(name=ast.unparse(name))
         return (insertion(source, at, ("" if blank else "\n") + indent(block, margin)),)
-    found = [one for one in setup.nodes if isinstance(one, ast.Try) and plain[0] in one.orelse]
-    if len(plain) != 1 or len(found) != 1 or len(found[0].handlers) != 1:
+    blocks = [node for node in setup.nodes if isinstance(node, ast.Try) and plain[0] in node.orelse]
+    if len(plain) != 1 or len(blocks) != 1 or len(blocks[0].handlers) != 1:
         return ()
-    (otherwise,) = found[0].handlers
+    (otherwise,) = blocks[0].handlers
     if len(otherwise.body) != 1 or not isinstance(otherwise.body[0], ast.Pass):
         return ()
     nothing = Edit(Span(source, *range_of(source, otherwise.body[0])), f"{RESULT} = {{}}")
@@ -274,5 +276,5 @@ def _is_compile(node: ast.AST) -> bool:
 
 
 def _is_plain(node: ast.AST) -> TypeGuard[ast.Expr]:
-    """Return whether a statement only calls the function, and drops what it returns."""
+    """Return whether a statement only calls the function, and drops its result."""
     return isinstance(node, ast.Expr) and _is_compile(node.value)

@@ -1,4 +1,4 @@
-"""What a setup.py gives to setup(), as far as its syntax shows; nothing is imported or run.
+"""The arguments of setup() in a setup.py, as far as its syntax shows; nothing is imported or run.
 
 A value is known only if all of it is: literals, names that are assigned once, sums, f-strings
 and plain `%s` and `{}`. Lists may grow by `append`, `extend` and `+=`. Nothing else is guessed.
@@ -28,8 +28,8 @@ def parsed(text: str) -> ast.Module | None:
 
 @lru_cache(maxsize=16)
 def _lines(text: str) -> tuple[list[int], list[bytes]]:
-    """Return where the lines of Python begin, and these lines; ast counts bytes."""
-    starts = [0, *(found.end() for found in re.finditer(r"\r\n?|\n", text))]
+    """Return the offsets of Python's lines, and these lines as bytes, which ast counts."""
+    starts = [0, *(line_end.end() for line_end in re.finditer(r"\r\n?|\n", text))]
     ends = [*starts[1:], len(text)]
     lines = [
         text[start:end].encode("utf-8", "replace") for start, end in zip(starts, ends, strict=True)
@@ -38,7 +38,7 @@ def _lines(text: str) -> tuple[list[int], list[bytes]]:
 
 
 def range_of(source: Source, node: ast.AST) -> tuple[int, int]:
-    """Return where a node begins and ends, in characters."""
+    """Return the range of a node, in characters."""
     starts, lines = _lines(source.text)
 
     def offset(line: int, column: int) -> int:
@@ -55,19 +55,19 @@ def range_of(source: Source, node: ast.AST) -> tuple[int, int]:
 
 
 def start_of(source: Source, node: ast.AST) -> int:
-    """Return where a node begins."""
+    """Return the start of a node, in characters."""
     return range_of(source, node)[0]
 
 
 def span_of(source: Source, node: ast.AST) -> Span:
-    """Return where a node begins, to the end of it or of its line."""
+    """Return the range of a node, to the end of its first line at most."""
     start, end = range_of(source, node)
     first = re.match(r"[^\r\n]*", source.text[start:end])
     return Span(source, start, start + max(first.end() if first else 0, 1))
 
 
 def imported_modules(source: Source) -> Iterator[tuple[str, ast.AST]]:
-    """Yield the module of each absolute import, with its place."""
+    """Yield the module of each absolute import, with its node."""
     tree = parsed(source.text)
     for node in ast.walk(tree) if tree else ():
         if isinstance(node, ast.Import):
@@ -78,7 +78,7 @@ def imported_modules(source: Source) -> Iterator[tuple[str, ast.AST]]:
 
 
 def defines(source: Source, name: str) -> bool:
-    """Return whether a file gives a meaning to a name at its top level."""
+    """Return whether a file may define a name at its top level."""
     tree = parsed(source.text)
     if tree is None:
         return True
@@ -90,7 +90,7 @@ def defines(source: Source, name: str) -> bool:
         elif isinstance(node, (ast.If, ast.Try, ast.With)):
             return True
         else:
-            names = [one.id for one in ast.walk(node) if isinstance(one, ast.Name)]
+            names = [part.id for part in ast.walk(node) if isinstance(part, ast.Name)]
         if name in names or "*" in names:
             return True
     return False
@@ -98,7 +98,7 @@ def defines(source: Source, name: str) -> bool:
 
 #: No text or list of a setup.py is longer than this; sums of names could double at each line.
 _MOST = 2000
-#: How deep sums and names are followed.
+#: Sums and names are followed to this depth.
 _DEPTH = 50
 _GROWING = frozenset({"append", "extend", "insert"})
 
@@ -111,9 +111,9 @@ class Item(NamedTuple):
 
 
 class DataFiles(NamedTuple):
-    """An entry of data_files: its folder in the prefix, and the files or patterns of them.
+    """An entry of data_files: its folder in the prefix, and its files or patterns.
 
-    What cannot be seen is `None`.
+    Computed values are `None`.
     """
 
     node: ast.expr
@@ -124,7 +124,7 @@ class DataFiles(NamedTuple):
 class Setup:
     """The call of setup() in a file and the values of its arguments.
 
-    `arguments` are empty without exactly one such call; `whole` is whether there are no others.
+    `arguments` are empty without exactly one such call; `whole`: there are no unseen arguments.
     """
 
     def __init__(self, source: Source) -> None:
@@ -149,7 +149,7 @@ class Setup:
         return any(name_of_call(value) == "compile_interfaces" for value in values)
 
     def _spread(self, node: ast.expr) -> None:
-        """Take the arguments of a dictionary that is written out."""
+        """Add the arguments in a dictionary literal."""
         items = self.pairs(node)
         if items is None:
             self.whole = False
@@ -161,7 +161,7 @@ class Setup:
 
     @cached_property
     def _bound(self) -> dict[str, list[ast.expr | None]]:
-        """The values that each name is given; `None` for one that is not an assignment."""
+        """The values that are assigned to each name; `None` for any other definition."""
         bound: dict[str, list[ast.expr | None]] = {}
         plain: dict[int, ast.expr] = {}
         added: set[int] = set()
@@ -180,7 +180,7 @@ class Setup:
 
     @cached_property
     def _grown(self) -> dict[str, list[Item]]:
-        """What is added to the lists of names after their assignment."""
+        """The items that are added to a name's list after its assignment."""
         grown: dict[str, list[Item]] = {}
         for node in self.nodes:
             if isinstance(node, ast.Call) and (name := _grows(node)):
@@ -219,7 +219,7 @@ class Setup:
         return isinstance(parent, (*kinds, ast.List, ast.Tuple, ast.Dict, ast.For))
 
     def value(self, node: ast.expr | None) -> ast.expr | None:
-        """Return the expression that a name stands for if it is assigned once; others as is."""
+        """Return the value of a name that is assigned once; any other expression unchanged."""
         for _ in range(_DEPTH):
             if not isinstance(node, ast.Name):
                 return node
@@ -228,35 +228,35 @@ class Setup:
         return None
 
     def text(self, node: ast.expr | None, depth: int = 0) -> str | None:
-        """Return the text that an expression is, `None` if that cannot be seen."""
+        """Return the text of an expression, `None` if it is computed."""
         if depth > _DEPTH:
             return None
-        found: str | None = None
+        text: str | None = None
         if isinstance(node, ast.Name):
             if node.id not in self._texts:
                 self._texts[node.id] = None  # for one that is defined by itself
-                known = node.id not in self._grown and self.value(node)
-                self._texts[node.id] = self.text(known, depth + 1) if known else None
+                value = node.id not in self._grown and self.value(node)
+                self._texts[node.id] = self.text(value, depth + 1) if value else None
             return self._texts[node.id]
         if isinstance(node, ast.Constant):
-            found = node.value if isinstance(node.value, str) else None
+            text = node.value if isinstance(node.value, str) else None
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
-            found = self._joined("", (node.left, node.right), depth)
+            text = self._joined("", (node.left, node.right), depth)
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
             values = node.right.elts if isinstance(node.right, ast.Tuple) else [node.right]
-            found = self._filled("%s", node.left, values, depth)
+            text = self._filled("%s", node.left, values, depth)
         elif isinstance(node, ast.JoinedStr):
-            found = self._joined("", node.values, depth)
+            text = self._joined("", node.values, depth)
         elif isinstance(node, ast.FormattedValue):
             plain = node.conversion == -1 and node.format_spec is None
-            found = self.text(node.value, depth + 1) if plain else None
+            text = self.text(node.value, depth + 1) if plain else None
         elif isinstance(node, ast.Call) and not node.keywords:
             function = node.func
             if name_of_call(node) == "join" and _is_of_paths(function):
-                found = self._joined("/", node.args, depth)
+                text = self._joined("/", node.args, depth)
             elif isinstance(function, ast.Attribute) and function.attr == "format":
-                found = self._filled("{}", function.value, node.args, depth)
-        return found if found is not None and len(found) <= _MOST else None
+                text = self._filled("{}", function.value, node.args, depth)
+        return text if text is not None and len(text) <= _MOST else None
 
     def _joined(self, between: str, nodes: Iterable[ast.expr], depth: int) -> str | None:
         texts = [self.text(node, depth + 1) for node in nodes]
@@ -265,7 +265,7 @@ class Setup:
     def _filled(
         self, mark: str, node: ast.expr, values: Iterable[ast.expr], depth: int
     ) -> str | None:
-        """Return a text with values at its marks, `%s` or `{}`, if it has no other ones."""
+        """Return a text with values at its marks, `%s` or `{}`, if it has no other marks."""
         parts = (self.text(node, depth + 1) or mark[0]).split(mark)
         texts = [self.text(value, depth + 1) for value in values]
         if None in texts or len(texts) != len(parts) - 1 or mark[0] in "".join(parts):
@@ -274,7 +274,7 @@ class Setup:
         return parts[0] + "".join((text or "") + part for text, part in pairs)
 
     def items(self, node: ast.expr | None, depth: int = 0) -> list[Item]:
-        """Return the parts of a list; those that cannot be taken apart are no elements."""
+        """Return the parts of a list; parts that cannot be taken apart are no elements."""
         if node is None:
             return []
         if isinstance(node, ast.Name) and depth <= _DEPTH:
@@ -282,45 +282,45 @@ class Setup:
                 self._lists[node.id] = [Item(node, False)]
                 self._lists[node.id] = self._named_items(node, depth + 1)
             return self._lists[node.id]
-        found: list[Item] = []
+        items: list[Item] = []
         if isinstance(node, (ast.List, ast.Tuple)) and depth <= _DEPTH:
             for element in node.elts:
                 if isinstance(element, ast.Starred):
-                    found += self.items(element.value, depth + 1)
+                    items += self.items(element.value, depth + 1)
                 else:
-                    found.append(Item(element, True))
-                if len(found) > _MOST:
+                    items.append(Item(element, True))
+                if len(items) > _MOST:
                     break
         elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add) and depth <= _DEPTH:
-            found = self.items(node.left, depth + 1) + self.items(node.right, depth + 1)
+            items = self.items(node.left, depth + 1) + self.items(node.right, depth + 1)
         else:
-            found = [Item(node, False)]
-        return found if len(found) <= _MOST else [Item(node, False)]
+            items = [Item(node, False)]
+        return items if len(items) <= _MOST else [Item(node, False)]
 
     def _named_items(self, node: ast.Name, depth: int) -> list[Item]:
         value = self.value(node)
         if value is None or node.id in self._shared:
             return [Item(node, False)]
-        found = list(self.items(value, depth))
+        items = list(self.items(value, depth))
         for item in self._grown.get(node.id, ()):
-            found += [item] if item.is_element else self.items(item.node, depth)
-            if len(found) > _MOST:
+            items += [item] if item.is_element else self.items(item.node, depth)
+            if len(items) > _MOST:
                 break
-        return found if len(found) <= _MOST else [Item(node, False)]
+        return items if len(items) <= _MOST else [Item(node, False)]
 
     def pairs(self, node: ast.expr | None) -> dict[str, ast.expr] | None:
-        """Return the values of a dictionary by key, `None` unless all of it can be seen."""
+        """Return the values of a dictionary by key, `None` if any of it is computed."""
         shared = isinstance(node, ast.Name) and node.id in self._shared
         value = self.value(node)
         if isinstance(value, ast.Call) and name_of_call(value) == "dict" and not value.args:
-            found = {one.arg: one.value for one in value.keywords}
+            values = {keyword.arg: keyword.value for keyword in value.keywords}
         elif isinstance(value, ast.Dict):
             keys = [self.text(key) for key in value.keys]
-            found = dict(zip(keys, value.values, strict=True))
+            values = dict(zip(keys, value.values, strict=True))
         else:
             return None
-        named = {key: one for key, one in found.items() if key is not None}
-        return None if shared or len(named) < len(found) else named
+        named = {key: item for key, item in values.items() if key is not None}
+        return None if shared or len(named) < len(values) else named
 
     def list_of(self, argument: str) -> ast.List | None:
         """Return the list to which an argument's elements can be added."""
@@ -333,7 +333,7 @@ class Setup:
         return value if isinstance(value, ast.List) else None
 
     def place(self, argument: str) -> Span:
-        """Return where an argument of setup() is, or the call."""
+        """Return the range of an argument of setup(), or of the call."""
         node: ast.AST | None = self.arguments.get(argument, self.call)
         listed = self.list_of(argument)
         if listed is not None and listed.elts:
@@ -341,36 +341,36 @@ class Setup:
         return span_of(self.source, node) if node else Span(self.source, 0, 0)
 
     def first_use(self, *arguments: str) -> ast.stmt | None:
-        """Return the statement of the block with setup() that begins to work out arguments.
+        """Return the first statement that computes arguments, in the block with setup().
 
-        It stands after the value of `name`; `None` where setup() is not a statement of its own.
+        It follows the value of `name`; `None` if setup() is not a statement of its own.
         """
         statement = self._parents.get(id(self.call))
         block = getattr(self._parents.get(id(statement)), "body", [])
         if not isinstance(statement, ast.Expr) or statement not in block:
             return None
-        names = {node.id for one in arguments for node in self._names_in(one)}
+        names = {node.id for argument in arguments for node in self._names_in(argument)}
         own = {node.id for node in self._names_in("name")}
-        for one in reversed(block[: block.index(statement)]):
-            stored = {node.id for node in ast.walk(one) if isinstance(node, ast.Name)}
-            bound = any(isinstance(one, kind) for kind in (ast.Assign, ast.AnnAssign))
+        for earlier in reversed(block[: block.index(statement)]):
+            stored = {node.id for node in ast.walk(earlier) if isinstance(node, ast.Name)}
+            bound = any(isinstance(earlier, kind) for kind in (ast.Assign, ast.AnnAssign))
             if bound and stored & own and not stored & (names - own):
                 break
             if stored & (names - own):
-                statement = one
+                statement = earlier
         return statement
 
     def _names_in(self, argument: str) -> Iterator[ast.Name]:
         node = self.arguments.get(argument)
-        for one in ast.walk(node) if node else ():
-            if isinstance(one, ast.Name) and one.id in self._bound:
-                yield one
+        for part in ast.walk(node) if node else ():
+            if isinstance(part, ast.Name) and part.id in self._bound:
+                yield part
 
     @cached_property
     def data_files(self) -> tuple[DataFiles, ...] | None:
-        """The entries of data_files; `None` if it cannot be seen which there are."""
+        """The entries of data_files; `None` if they are computed."""
         if "data_files" not in self.arguments:
-            # setup.cfg or pyproject.toml may say what setup() does not
+            # setup.cfg or pyproject.toml may have them instead of setup()
             return () if self.whole and "packages" in self.arguments else None
         items = self.items(self.arguments["data_files"])
         if not all(item.is_element for item in items):
@@ -385,8 +385,8 @@ class Setup:
         return DataFiles(node, "" if self.text(node) is not None else None, None)
 
     def _files(self, node: ast.expr) -> tuple[str, ...] | None:
-        """Return the files and patterns in a list of data_files; `None` if some cannot be seen."""
-        found: list[str] = []
+        """Return the files and patterns in a list of data_files; `None` if some are computed."""
+        files: list[str] = []
         for item in self.items(node):
             call = self.value(item.node)
             if not item.is_element and isinstance(call, ast.Call) and call.args:
@@ -402,12 +402,12 @@ class Setup:
                 inner = None if text is None else (text,)
             if inner is None:
                 return None
-            found += inner
-        return tuple(found)
+            files += inner
+        return tuple(files)
 
     @property
     def scripts(self) -> Iterator[tuple[str, ast.expr]]:
-        """The console scripts that can be seen, with their expressions."""
+        """The console scripts that are not computed, with their expressions."""
         groups = self.pairs(self.arguments.get("entry_points")) or {}
         for item in self.items(groups.get("console_scripts")):
             text = self.text(item.node) if item.is_element else None
@@ -416,7 +416,7 @@ class Setup:
 
 
 def name_of_call(node: ast.AST | None) -> str:
-    """Return the last part of the name of a called function; empty for what is not a call."""
+    """Return the last part of the name of a called function; empty for any other node."""
     function = node.func if isinstance(node, ast.Call) else None
     return function.id if isinstance(function, ast.Name) else getattr(function, "attr", "")
 
@@ -426,7 +426,7 @@ def _is_setup(node: ast.Call) -> bool:
 
 
 def _is_of_paths(function: ast.expr) -> bool:
-    """Return whether a `join` is that of os.path, and not that of a text."""
+    """Return whether a `join` is os.path's, and not the method of a text."""
     of = getattr(function, "value", None)
     return isinstance(function, ast.Name) or "path" in (
         getattr(of, "id", ""),
@@ -447,7 +447,7 @@ def _grows(node: ast.Call) -> str:
 
 
 def _names_bound(node: ast.AST) -> Iterator[str]:
-    """Yield the names that a definition, an import or a parameter gives a meaning."""
+    """Yield the names that a definition, an import or a parameter binds."""
     if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
         yield node.name
     elif isinstance(node, ast.alias):

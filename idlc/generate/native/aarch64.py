@@ -6,82 +6,7 @@ from struct import pack, pack_into, unpack_from
 
 from idlc.generate.native.elf import Machine
 
-TEXT = """
-resolve:  // (handle, identifier) -> the handle that the table at handle->data has for it, or NULL
-  hint #34  // bti c
-  ldr x2, [x0, #8]  // entry
-1: ldr x3, [x2]
-  cbz x3, 4f
-  mov x4, x1
-2: ldrb w5, [x3], #1
-  ldrb w6, [x4], #1
-  cmp w5, w6
-  b.ne 3f
-  cbnz w5, 2b
-  ldr x0, [x2, #8]
-  str x1, [x0]  // who asked may compare pointers
-  ret
-3: add x2, x2, #16
-  b 1b
-4: mov x0, #0
-  ret
-
-.balign 16
-same:  // (handle, identifier, the handle's own identifier) -> the handle, or NULL
-  mov x4, x1
-1: ldrb w5, [x2], #1
-  ldrb w6, [x4], #1
-  cmp w5, w6
-  b.ne 2f
-  cbnz w5, 1b
-  str x1, [x0]
-  ret
-2: mov x0, #0
-  ret
-
-.balign 16
-knows:  // (handle, identifier) -> the handle, or NULL
-  hint #34
-  adrp x2, identifier
-  add x2, x2, :lo12:identifier
-  b function
-
-.balign 16
-get:  // () -> what this copy of the function stands for
-  hint #34
-  adrp x0, target
-  add x0, x0, :lo12:target
-  ret
-
-.balign 16
-refuse:  // () -> false, or 0
-  hint #34
-  mov x0, #0
-  ret
-
-.balign 16
-unbounded:  // (char *bounds) -> size
-  hint #34
-  strb wzr, [x0]
-  mov x0, #0
-  ret
-
-.balign 16
-throw:  // (): goes on in a function that throws, and so needs no table for unwinding
-  hint #34
-  adrp x0, message
-  add x0, x0, :lo12:message
-  adrp x16, function
-  ldr x16, [x16, :lo12:function]
-  br x16
-
-.balign 16
-nothing:  // ()
-  hint #34
-  ret
-.balign 16
-"""
-
+#: Assembled from tests/generate/native/code_aarch64.s.
 CODE = bytes.fromhex(
     # resolve
     "5f2403d5020440f9430040f9830100b4e40301aa6514403886144038bf00066b"
@@ -123,14 +48,14 @@ HOLES = {
 }  # fmt: skip
 
 
-def _fill(code: bytearray, at: int, here: int, target: int) -> None:
+def _fill(code: bytearray, at: int, address: int, target: int) -> None:
     """Fill the instruction at `at`, as its kind wants it."""
     (word,) = unpack_from("<I", code, at)
     if word & 0x9F000000 == 0x90000000:  # adrp: by how many pages
-        pages = (target >> 12) - (here >> 12)
+        pages = (target >> 12) - (address >> 12)
         word |= (pages & 3) << 29 | (pages >> 2 & 0x7FFFF) << 5
     elif word & 0xFC000000 == 0x14000000:  # b: by how many instructions
-        word |= target - here >> 2 & 0x3FFFFFF
+        word |= target - address >> 2 & 0x3FFFFFF
     elif word & 0xFFC00000 == 0xF9400000:  # ldr: which word of the page
         word |= (target & 0xFFF) >> 3 << 10
     else:  # add: which byte of the page
@@ -145,7 +70,6 @@ MACHINE = Machine(
     page=0x10000,
     # NT_GNU_PROPERTY_TYPE_0: GNU_PROPERTY_AARCH64_FEATURE_1_AND is BTI
     properties=pack("<3I4s4I", 4, 16, 5, b"GNU", 0xC0000000, 4, 1, 0),
-    text=TEXT,
     code=CODE,
     entries=ENTRIES,
     holes=HOLES,

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 
 class Machine(NamedTuple):
-    """A processor. `code` is what an assembler makes of `text`; a test compares.
+    """A processor and its machine code.
 
     A function of it ends where the next one begins. `holes` are the places in `code` that depend
-    on where something else is, with the name that it has in `text`; `fill(code, at, here, target)`
-    fills the one at `at`, which will be at the address `here`.
+    on where something else is, with its name in the assembler text;
+    `fill(code, at, address, target)` fills the one at `at`, which will be at `address`.
     """
 
     number: int
@@ -27,7 +27,6 @@ class Machine(NamedTuple):
     absolute: int
     page: int
     properties: bytes
-    text: str
     code: bytes
     entries: Mapping[str, int]
     holes: Mapping[int, str]
@@ -54,17 +53,17 @@ class Section:
         self.pointers: list[tuple[int, Place]] = []
 
     def put(self, data: bytes, align: int = 1) -> Place:
-        """Add bytes; return where they are."""
+        """Add bytes; return their location."""
         self.data += bytes(-len(self.data) % align)
         place = Place(self, len(self.data))
         self.data += data
         return place
 
     def words(self, *values: int | Place | None) -> Place:
-        """Add words of 8 bytes: numbers, addresses, NULL; return where they are.
+        """Add words of 8 bytes: numbers, addresses, NULL; return their location.
 
-        C structures are rows of words. What is smaller lies in the low bytes of its word, and what
-        is too large wraps, as in C.
+        C structures are rows of words. Smaller values are in the low bytes of a word, and larger
+        ones wrap, as in C.
         """
         numbers = [value & _WORD if isinstance(value, int) else 0 for value in values]
         place = self.put(pack(f"<{len(values)}Q", *numbers), 8)
@@ -75,7 +74,7 @@ class Section:
 
 
 class Place(NamedTuple):
-    """Where something is in a section."""
+    """A location in a section."""
 
     section: Section
     offset: int
@@ -104,7 +103,7 @@ class Image:
         self._functions: dict[tuple[object, ...], Place] = {}
 
     def string(self, text: str) -> Place:
-        """Return where `text` is, as C has it; equal ones are stored once."""
+        """Return the location of `text` as a C string; equal ones are stored once."""
         if text not in self._strings:
             self._strings[text] = self.constants.put(text.encode() + b"\0")
         return self._strings[text]
@@ -135,7 +134,7 @@ READ, WRITE, EXECUTE = 4, 2, 1
 
 
 class Kind(NamedTuple):
-    """What a section's header says of its kind: type, flags, whom it refers to, size of entries."""
+    """The kind of a section in its header: type, flags, linked section, size of entries."""
 
     type: int
     flags: int = 2  # SHF_ALLOC
@@ -161,11 +160,11 @@ KINDS = {
         ".data": Kind(1, flags=3),
     },
 }
-#: What the loader is told, besides the libraries that are needed: SONAME, HASH, STRTAB, SYMTAB,
+#: The dynamic tags of the loader, besides the needed libraries: SONAME, HASH, STRTAB, SYMTAB,
 #: STRSZ, SYMENT, RELA, RELASZ, RELAENT, RELACOUNT, FLAGS, FLAGS_1, NULL.
 TAGS = (14, 4, 5, 6, 10, 11, 7, 8, 9, 0x6FFFFFF9, 30, 0x6FFFFFFB, 0)
 NOW, NODELETE = 1, 8  # rclcpp closes the library before it uses its handles for the last time
-#: Besides what is loaded, segments that say where something is, or what holds.
+#: Besides loaded segments, those that locate something or declare a property.
 SEGMENTS = len(KINDS) + 6
 
 
@@ -247,19 +246,19 @@ class _File:
         return at
 
     def _constant_size(self) -> int:
-        """Return the size of what is read-only after loading."""
+        """Return the size of the sections that are read-only after loading."""
         size = len(self.sections[".dynamic"].data) + len(self.image.tables.data)
         return size + -size % 8
 
     def _relocate(self) -> None:
-        """Put addresses where they are missing, and note those that the loader changes."""
+        """Fill in addresses, and add a relocation for each that the loader changes."""
         machine, table, at = self.image.machine, self.sections[".rela.dyn"].data, 0
         for section in self.pointed:
             for where, place in section.pointers:
-                there = place.address
-                pack_into("<Q", section.data, where, there)
-                here = section.address + where
-                pack_into("<2Qq", table, at, here, machine.relative, there)
+                target = place.address
+                pack_into("<Q", section.data, where, target)
+                address = section.address + where
+                pack_into("<2Qq", table, at, address, machine.relative, target)
                 at += RELOCATION
         for index, name in enumerate(sorted(self.image.imports), 1):
             info = index << 32 | machine.absolute
@@ -323,7 +322,7 @@ class _File:
 
 
 def _strings(names: list[str]) -> tuple[list[int], bytes]:
-    """Return where each name begins in a table of them, and the table."""
+    """Return the offset of each name in a string table, and the table."""
     starts, text = [], b"\0"
     for name in names:
         starts.append(len(text))

@@ -1,4 +1,4 @@
-"""Where the structures of a distribution of ROS 2 differ from those of others."""
+"""The layouts of C structures, which differ between distributions of ROS 2."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from idlc.model import ir
 
 STRING, WSTRING, MESSAGE = 16, 17, 18
-#: How introspection calls each primitive.
+#: The type ids of primitives in introspection.
 TYPE_IDS = {
     "float32": 1, "float64": 2, "bool": 6, "byte": 7, "char": 8, "uint8": 8, "int8": 9,
     "uint16": 10, "int16": 11, "uint32": 12, "int32": 13, "uint64": 14, "int64": 15,
@@ -16,7 +16,7 @@ TYPE_IDS = {
 
 
 class Layout(NamedTuple):
-    """Sizes and offsets in bytes. Whoever has the headers can measure each of them."""
+    """Sizes and offsets in bytes, each of which can be measured with the headers."""
 
     members: int = 40  #: the offset of `members_` in MessageMembers
     member: int = 112  #: the size of a MessageMember
@@ -28,15 +28,15 @@ class Layout(NamedTuple):
     message_sequence: int = 24
 
     def of_cpp(self) -> Layout:
-        """Return it with messages of C++, where fields are of libstdc++'s types.
+        """Return the layout for C++ messages, with fields of libstdc++'s types.
 
-        What follows a `uint8[]` lies elsewhere in Lyrical: its own class for those has had another
-        size in each version.
+        Offsets after a `uint8[]` are others in Lyrical: its own class for it has had another size
+        in each version.
         """
         return self._replace(string=32, bool_sequence=40, primitive_sequence=24, string_sequence=24)
 
 
-#: Sequences in C, but those of messages, say here whether their data are a buffer of Lyrical's.
+#: Sequences in C, other than of messages, have a flag here: their data are a buffer of Lyrical.
 _LYRICAL = Layout(member=120, bool_sequence=32, primitive_sequence=32, string_sequence=32)
 LAYOUTS = {
     "humble": Layout(members=32, is_array=32),
@@ -61,7 +61,7 @@ class Structures:
 
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
-        self._known: dict[ir.TypeName, Structure] = {}
+        self._structures: dict[ir.TypeName, Structure] = {}
 
     def add(self, name: ir.TypeName, fields: Iterable[ir.Field]) -> Structure:
         """Return the structure of a message."""
@@ -72,7 +72,7 @@ class Structures:
             offsets.append(start)
             end, most = start + size, max(most, align)
         structure = Structure(tuple(offsets), end + -end % most, most)
-        self._known[name] = structure
+        self._structures[name] = structure
         return structure
 
     def _field(self, type_: ir.FieldType) -> tuple[int, int]:
@@ -86,7 +86,7 @@ class Structures:
             case ir.String():
                 size, align, sequence = layout.string, 8, layout.string_sequence
             case ir.Ref():
-                _, size, align = self._known[element.target]
+                _, size, align = self._structures[element.target]
                 sequence = layout.message_sequence
             case ir.Unknown():
                 raise ValueError("an unknown type has no layout")

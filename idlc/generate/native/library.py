@@ -1,6 +1,6 @@
 """The type support of a package's messages, in two libraries as C++ tools look for them.
 
-A handle answers who asks for another identifier with another handle, or with NULL:
+When asked for another identifier, a handle returns another handle, or NULL:
 
     rosidl_typesupport_cpp                what rclcpp, rosbag2 and the like load
     ├─ rosidl_typesupport_fastrtps_c      what Fast DDS asks for: a name, no bound, no codec
@@ -41,7 +41,7 @@ def hash_bytes(text: str) -> bytes:
 
 
 class Descriptions:
-    """The functions of each type that return these three, made once."""
+    """The functions that return hash, description and sources of each type, made once."""
 
     def __init__(self, model: Model, image: Image) -> None:
         self._model = model
@@ -49,12 +49,12 @@ class Descriptions:
         self._individuals: dict[str, Words] = {}
         self._about: dict[str, tuple[Place, Place, Place]] = {}
 
-    def about(self, name: str) -> tuple[Place, Place, Place]:
+    def functions(self, name: str) -> tuple[Place, Place, Place]:
         """Return functions that return a type's hash, description and sources."""
         if name not in self._about:
-            told = (self._hash(name), *self._description(name))
+            places = (self._hash(name), *self._description(name))
             hash_, description, sources = (
-                self._image.function("get", target=place) for place in told
+                self._image.function("get", target=place) for place in places
             )
             self._about[name] = (hash_, description, sources)
         return self._about[name]
@@ -65,16 +65,16 @@ class Descriptions:
     def _description(self, name: str) -> tuple[Place, Place]:
         full = self._model.describer.description(name)
         referenced = full["referenced_type_descriptions"]
-        own, *others = (self._individual(one) for one in (full["type_description"], *referenced))
+        own, *others = map(self._individual, (full["type_description"], *referenced))
         description = self._image.tables.words(*own, *self._sequence(others))
-        names = (name, *(one["type_name"] for one in referenced))
-        sources = [self._source(one) for one in names]
+        names = (name, *(individual["type_name"] for individual in referenced))
+        sources = [self._source(type_name) for type_name in names]
         return description, self._image.tables.words(*self._sequence(sources))
 
-    def _individual(self, one: IndividualDict) -> Words:
-        name = one["type_name"]
+    def _individual(self, individual: IndividualDict) -> Words:
+        name = individual["type_name"]
         if name not in self._individuals:
-            fields = [self._field(field) for field in one["fields"]]
+            fields = [self._field(field) for field in individual["fields"]]
             self._individuals[name] = (*self._string(name), *self._sequence(fields))
         return self._individuals[name]
 
@@ -98,7 +98,7 @@ class Descriptions:
         return (*self._string(name), *self._string(encoding), *self._string(text))
 
     def _string(self, text: str) -> Words:
-        """Return a string of C with its size, and with room for what ends it."""
+        """Return a string of C with its size, and its capacity with the terminator."""
         size = len(text.encode())
         return (self._image.string(text), size, size + 1) if text else (None, 0, 0)
 
@@ -125,7 +125,7 @@ def libraries(
 ) -> dict[str, bytes]:
     """Return the content of each library of a package by the name of its file.
 
-    Whoever has one open must not see it change: write it beside, and move it there.
+    A library that is open must not change: write a new file, and move it into place.
     """
     return {
         f"lib{model.package}__{identifier}.so": _library(model, Image(machine), layout, identifier)
@@ -134,8 +134,8 @@ def libraries(
     }
 
 
-def told(layout: Layout) -> bytes:
-    """Return what a library's constants begin with: who made it, and for which layout."""
+def identity_stamp(layout: Layout) -> bytes:
+    """Return the first bytes of a library's constants: its author, and its layout."""
     return AUTHOR + pack(f"<{len(layout)}I", *layout)
 
 
@@ -145,20 +145,20 @@ def symbol(identifier: str, name: ir.TypeName) -> str:
 
 
 def _library(model: Model, image: Image, layout: Layout, identifier: str) -> bytes:
-    image.constants.put(told(layout))
+    image.constants.put(identity_stamp(layout))
     support = _TypeSupport(model, image, layout, cpp=identifier == FIELDS_CPP)
     for interface in model.own:
         for message in derive.messages(interface):
             handle = support.fields[message.name]
             if identifier == OWN:
-                handle = support.own(message.name, handle)
+                handle = support.resolving_handle(message.name, handle)
             name = symbol(identifier, message.name)
             image.exports[name] = image.function("get", target=handle)
     return shared_library(image, f"lib{model.package}__{identifier}.so")
 
 
 class _TypeSupport:
-    """The handles of one library. `fields` has those of FIELDS, or with `cpp` of FIELDS_CPP."""
+    """The handles of one library. `fields` are for FIELDS, or with `cpp` for FIELDS_CPP."""
 
     def __init__(self, model: Model, image: Image, layout: Layout, *, cpp: bool) -> None:
         self.image = image
@@ -171,7 +171,7 @@ class _TypeSupport:
         for message in _reached(model):
             self.fields[message.name] = self._fields(message)
 
-    def own(self, name: ir.TypeName, fields: Place) -> Place:
+    def resolving_handle(self, name: ir.TypeName, fields: Place) -> Place:
         """Return the handle that answers for all others."""
         image = self.image
         answers = {FASTRTPS: self._fastrtps(name), FIELDS: fields}
@@ -182,7 +182,7 @@ class _TypeSupport:
         return self._handle(OWN, table, image.function("resolve"), name)
 
     def _handle(self, identifier: str, data: Place, find: Place, name: ir.TypeName) -> Place:
-        about = self.descriptions.about(str(name))
+        about = self.descriptions.functions(str(name))
         return self.image.data.words(self.image.string(identifier), data, find, *about)
 
     def _single(self, identifier: str, data: Place, name: ir.TypeName) -> Place:
@@ -257,7 +257,7 @@ class _TypeSupport:
 
 
 def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
-    """Return how introspection calls a type, its bound, and which message it is."""
+    """Return a type's id in introspection, its bound, and its name if it is a message."""
     match element:
         case ir.Primitive():
             return TYPE_IDS[element.name], 0, None
@@ -270,14 +270,15 @@ def _element(element: ir.Element) -> tuple[int, int, ir.TypeName | None]:
 
 
 def _reached(model: Model) -> list[ir.Message]:
-    """Return a package's messages and all that they refer to, those first that others hold."""
+    """Return a package's messages and all that they refer to, nested ones first."""
     held: dict[str, int] = {}
     for interface in model.own:
         for message in derive.messages(interface):
             full = model.describer.description(str(message.name))
-            references = (one["type_name"] for one in full["referenced_type_descriptions"])
-            held.update(dict.fromkeys((str(message.name), *references), 0))
+            referenced = full["referenced_type_descriptions"]
+            names = (individual["type_name"] for individual in referenced)
+            held.update(dict.fromkeys((str(message.name), *names), 0))
     for name in held:
         held[name] = len(model.describer.description(name)["referenced_type_descriptions"])
-    names = sorted(held, key=lambda name: (held[name], name))
-    return [model.messages[ir.TypeName.parse(name)] for name in names]
+    ordered = sorted(held, key=lambda name: (held[name], name))
+    return [model.messages[ir.TypeName.parse(name)] for name in ordered]

@@ -6,84 +6,7 @@ from struct import pack, pack_into
 
 from idlc.generate.native.elf import Machine
 
-TEXT = """
-.intel_syntax noprefix
-resolve:  # (handle, identifier) -> the handle that the table at handle->data has for it, or NULL
-  endbr64
-  mov r8, [rdi+8]  # entry
-1: mov rdx, [r8]
-  test rdx, rdx
-  je 4f
-  mov rcx, rsi
-2: mov al, [rdx]
-  cmp al, [rcx]
-  jne 3f
-  inc rdx
-  inc rcx
-  test al, al
-  jne 2b
-  mov rax, [r8+8]
-  mov [rax], rsi  # who asked may compare pointers
-  ret
-3: add r8, 16
-  jmp 1b
-4: xor eax, eax
-  ret
-
-.balign 16
-same:  # (handle, identifier, the handle's own identifier) -> the handle, or NULL
-  mov rcx, rsi
-1: mov al, [rdx]
-  cmp al, [rcx]
-  jne 2f
-  inc rdx
-  inc rcx
-  test al, al
-  jne 1b
-  mov [rdi], rsi
-  mov rax, rdi
-  ret
-2: xor eax, eax
-  ret
-
-.balign 16
-knows:  # (handle, identifier) -> the handle, or NULL
-  endbr64
-  lea rdx, [rip+identifier]
-  jmp function
-
-.balign 16
-get:  # () -> what this copy of the function stands for
-  endbr64
-  lea rax, [rip+target]
-  ret
-
-.balign 16
-refuse:  # () -> false, or 0
-  endbr64
-  xor eax, eax
-  ret
-
-.balign 16
-unbounded:  # (char *bounds) -> size
-  endbr64
-  mov byte ptr [rdi], 0
-  xor eax, eax
-  ret
-
-.balign 16
-throw:  # (): goes on in a function that throws, and so needs no table for unwinding
-  endbr64
-  lea rdi, [rip+message]
-  jmp [rip+function]
-
-.balign 16
-nothing:  # ()
-  endbr64
-  ret
-.balign 16
-"""
-
+#: Assembled from tests/generate/native/code_x86_64.s.
 CODE = bytes.fromhex(
     # resolve
     "f30f1efa4c8b4708498b104885d274214889f18a023a01751248ffc248ffc184"
@@ -122,9 +45,9 @@ HOLES = {
 }  # fmt: skip
 
 
-def _fill(code: bytearray, at: int, here: int, target: int) -> None:
+def _fill(code: bytearray, at: int, address: int, target: int) -> None:
     """Fill the hole at `at` with the distance from the end of it."""
-    pack_into("<i", code, at, target - here - 4)
+    pack_into("<i", code, at, target - address - 4)
 
 
 MACHINE = Machine(
@@ -134,7 +57,6 @@ MACHINE = Machine(
     page=0x1000,
     # NT_GNU_PROPERTY_TYPE_0: GNU_PROPERTY_X86_FEATURE_1_AND is IBT and SHSTK
     properties=pack("<3I4s4I", 4, 16, 5, b"GNU", 0xC0000002, 4, 3, 0),
-    text=TEXT,
     code=CODE,
     entries=ENTRIES,
     holes=HOLES,

@@ -77,7 +77,7 @@ def _operator(field: ir.Field, receiver: str, operator: str) -> str:
 def _compared(field: ir.Field, receiver: str, references: References) -> str | Group:
     """Return whether a field is equal.
 
-    It is a call for what may be an array, what has no type, and what is too long for a line.
+    It is a call for possible arrays, untyped values, and expressions too long for a line.
     """
     plain = _operator(field, receiver, "==")
     element = ir.element_of(field.type)
@@ -115,7 +115,7 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     """A message class.
 
     `receiver`, `options`, `boolean` and `not_implemented` are what its methods call `self`, further
-    keywords and what Python has by these names, which names of the interface may hide. `guard` is
+    keywords and the builtins of these names, which names of the interface may hide. `guard` is
     the head of the `if` for a constructor that was given something unusual.
     """
 
@@ -176,11 +176,10 @@ def message(
 
 
 def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
-    for one in structure.constants:
-        statement = assign(one.name, lines.scalar(one.type, one.value), 4)
-        yield ConstantView(
-            _statement(statement), documentation.attribute(one, documentation.words(one), file)
-        )
+    for constant in structure.constants:
+        statement = assign(constant.name, lines.scalar(constant.type, constant.value), 4)
+        words = documentation.words(constant)
+        yield ConstantView(_statement(statement), documentation.attribute(constant, words, file))
     for field in structure.fields:
         if field.default:
             yield ConstantView(_statement(fields.default_constant(field)))

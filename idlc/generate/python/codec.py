@@ -66,16 +66,16 @@ def _makers(
     for type_ in (own, *_types(steps)):
         if type_ not in makers:
             name = "kind" if type_ == own else references.name(type_)
-            wanted = f"new_{snake_case(type_.name)}".replace("__", "_")
-            makers[type_] = tables.define(wanted, f"maker {name}", call("_idlc.maker", name))
+            stem = f"new_{snake_case(type_.name)}".replace("__", "_")
+            makers[type_] = tables.define(stem, f"maker {name}", call("_idlc.maker", name))
     return makers
 
 
 def _types(steps: tuple[plan.Step, ...]) -> list[ir.TypeName]:
-    found: list[ir.TypeName] = []
+    types: list[ir.TypeName] = []
     for step in steps:
         if isinstance(step, plan.Enter):
-            found.append(step.type)
+            types.append(step.type)
         elif isinstance(step, plan.Items):
-            found += [step.type, *_types(step.body)]
-    return found
+            types += [step.type, *_types(step.body)]
+    return types

@@ -22,7 +22,7 @@ TOO_SHORT = (Line('raise ValueError("too short")'),)
 TOO_MANY = (Line('raise ValueError("too many elements")'),)
 
 
-class Run:
+class UnpackedGroup:
     """Fixed-size values that are read together."""
 
     def __init__(self) -> None:
@@ -41,9 +41,9 @@ class Run:
     def skipped(self, cursor: Cursor) -> Cursor:
         """Return the position after the values, of which the first is at `cursor`."""
         for align, size in self.sizes:
-            if not cursor.known.knows(align):
-                cursor = cursor.where(multiple_of(align))
-            cursor = cursor.skip(cursor.known.padding(align) + size)
+            if not cursor.alignment.knows(align):
+                cursor = cursor.with_alignment(multiple_of(align))
+            cursor = cursor.skip(cursor.alignment.padding(align) + size)
         return cursor
 
     def assignment(self, value: Group) -> Line:
@@ -51,11 +51,11 @@ class Run:
         return Line(value, tuple_of(*self.targets)) if self.targets else Line(value)
 
 
-class Running(Emitter):
-    """Statements that read: those so far, the values to be read together, the position before them.
+class UnpackBuilder(Emitter):
+    """Emits statements that read; `group` is not yet emitted, `position` is before it.
 
-    `source` is what buffers are cut from. `limited` is whether a check needs the buffer's size,
-    `unchecked` whether nothing has noticed yet that a buffer was cut short. With `worded`, the
+    `source` names the variable that buffers are slices of. `limited`: a check needs the buffer's
+    size. `unchecked`: no statement has noticed yet that a buffer was cut short. `worded`: the
     sizes of strings are in `words` and their text in `chars`.
     """
 
@@ -63,63 +63,63 @@ class Running(Emitter):
         super().__init__()
         self.tables = tables
         self.source = source
-        self.here = START
-        self.run = Run()
+        self.position = START
+        self.group = UnpackedGroup()
         self.limited = False
         self.unchecked = False
         self.worded = False
 
     def flush(self, *, last: bool = False) -> None:
-        """Read the run; the position after it is of no interest if it is the `last`."""
-        run, self.run = self.run, Run()
-        if not run.fields:
+        """Emit the group; the position after the `last` one is not needed."""
+        group, self.group = self.group, UnpackedGroup()
+        if not group.fields:
             return
         self.unchecked = False
-        widest = max(align for align, _ in run.sizes)
-        if run.sizes[0][0] == widest:
+        widest = max(align for align, _ in group.sizes)
+        if group.sizes[0][0] == widest:
             self.align(widest)
-        fields = "".join(run.fields)
-        here = self.here.text()
+        fields = "".join(group.fields)
+        offset = self.position.text()
         if self.worded and fields == "I":
-            self.line(f"words[{self.here.text(4)} >> 2]", run.targets[0])
-            self.here = run.skipped(self.here)
-        elif self.here.known.knows(widest):
-            reader = self.tables.reader(fields, self.here.known.residue)
-            self.body.append(run.assignment(call(reader, "data", here)))
-            self.here = run.skipped(self.here)
+            self.line(f"words[{self.position.text(4)} >> 2]", group.targets[0])
+            self.position = group.skipped(self.position)
+        elif self.position.alignment.knows(widest):
+            reader = self.tables.reader(fields, self.position.alignment.residue)
+            self.body.append(group.assignment(call(reader, "data", offset)))
+            self.position = group.skipped(self.position)
         else:
-            table = f"{self.tables.reader(fields, None)}[{here} & 7]"
+            table = f"{self.tables.reader(fields, None)}[{offset} & 7]"
             struct = table if last else "struct"
             if not last:
                 self.line(table, struct)
-            self.body.append(run.assignment(call(f"{struct}.unpack_from", "data", here)))
+            self.body.append(group.assignment(call(f"{struct}.unpack_from", "data", offset)))
             if not last:
-                self.line(f"{here} + struct.size", "at")
-                self.here = run.skipped(self.here).at("at")
-        self.body += run.after
+                self.line(f"{offset} + struct.size", "at")
+                self.position = group.skipped(self.position).at("at")
+        self.body += group.after
 
     def align(self, align: int) -> None:
         """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.here.known.knows(align):
-            self.here = self.here.skip(self.here.known.padding(align))
+        if self.position.alignment.knows(align):
+            self.position = self.position.skip(self.position.alignment.padding(align))
         elif align == 8:
-            self.line(f"({self.here.text(3)} & -8) + 4", "at")
-            self.here = Cursor("at", 0, multiple_of(8))
+            self.line(f"({self.position.text(3)} & -8) + 4", "at")
+            self.position = Cursor("at", 0, multiple_of(8))
         else:
             lead = 4 if self.worded and align == 4 else 0  # what comes after the size
-            self.line(f"{self.here.text(align - 1 + lead)} & -{align}", "at")
-            self.here = Cursor("at", -lead, multiple_of(align))
+            self.line(f"{self.position.text(align - 1 + lead)} & -{align}", "at")
+            self.position = Cursor("at", -lead, multiple_of(align))
 
-    def settle(self, base: str, offset: int = 0) -> None:
-        """Bring the position into a variable, as `base + offset`."""
-        value = self.here.text(-offset)
+    def store_position(self, base: str, offset: int = 0) -> None:
+        """Store the position in the variable `base`, as `base + offset`."""
+        value = self.position.text(-offset)
         if value != base:
             self.line(value, base)
-        self.here = self.here.at(base, offset)
+        self.position = self.position.at(base, offset)
 
     def number(self, target: str) -> None:
         """Read a count or size into a variable, together with the numbers before it."""
-        self.run.add("I", 4, 4, target)
+        self.group.add("I", 4, 4, target)
         self.flush()
 
     def count(self, bound: int | None) -> str:
@@ -131,29 +131,29 @@ class Running(Emitter):
 
     def start(self) -> str:
         """Return the position as an expression that stays true when `end` changes."""
-        if self.here.base == "end":
-            self.settle("at")
-        return self.here.text()
+        if self.position.base == "end":
+            self.store_position("at")
+        return self.position.text()
 
     def buffer(self, count: str, align: int, size: int, source: str) -> str:
         """Return the slice of `count` elements, and move after it.
 
         It is shorter if the buffer is, which whatever is read next notices.
         """
-        if not self.here.known.is_at(align):
-            self.settle("at")
+        if not self.position.alignment.is_at(align):
+            self.store_position("at")
             self.body.append(Block(f"if {count}:", (Line("(at + 3 & -8) + 4", "at"),)))
-            self.here = self.here.where(multiple_of(4))
+            self.position = self.position.with_alignment(multiple_of(4))
         start = self.start()
         self.line(f"{start} + {count}" if size == 1 else f"{start} + {size} * {count}", "end")
         self.unchecked = True
-        self.here = Cursor("end", 0, self.here.known.modulo(size & -size))
+        self.position = Cursor("end", 0, self.position.alignment.modulo(size & -size))
         return f"{source}{slice_of(start)}"
 
     def finish(self) -> None:
-        """Emit the check that nothing after the last buffer makes."""
+        """Emit the check of the last buffer, unless a later statement makes it."""
         if self.unchecked:
-            self.short_if(f"{self.here.text()} > limit")
+            self.short_if(f"{self.position.text()} > limit")
 
     def short_if(self, condition: str) -> None:
         """Emit a check that the buffer is long enough."""
@@ -193,7 +193,7 @@ def decode(
     """Return the statements that read a message; what they use is defined in `tables`.
 
     `own` and `makers` name the functions that make empty objects, `foreign` the classes of other
-    packages; `bulk` is what `is_bulk` says.
+    packages; `bulk` is the result of `is_bulk`.
     """
     decoder = _Decoder(tables, makers, foreign, "view" if bulk else "data")
     decoder.line(f"{own}()", "message")
@@ -209,7 +209,7 @@ def decode(
     return (*first, *decoder.body, Line("return message"))
 
 
-class _Decoder(Running):
+class _Decoder(UnpackBuilder):
     """Emits a message's steps; `makers` name the functions that make empty objects."""
 
     def __init__(
@@ -230,9 +230,9 @@ class _Decoder(Running):
             case plan.Block() if step.is_large:
                 self.block(step)
             case plan.Number() | plan.Dummy() | plan.Block():
-                self.fixed(step, self.run)
+                self.fixed(step, self.group)
             case plan.Enter(place, type_):
-                self.body += self.enter(place, type_)
+                self.body += self.make_nested(place, type_)
             case plan.Text(place, wide):
                 self.line(self.wide_text() if wide else self.text(), place.text)
             case plan.Bytes(place, primitive, bound):
@@ -248,19 +248,19 @@ class _Decoder(Running):
 
     # Values of fixed size.
 
-    def fixed(self, step: plan.Step, run: Run) -> None:
-        """Add a value to a run."""
+    def fixed(self, step: plan.Step, group: UnpackedGroup) -> None:
+        """Add a value to a group."""
         match step:
             case plan.Number(place, letter, size):
-                run.add(letter, size, size, place.text)
+                group.add(letter, size, size, place.text)
             case plan.Block(place):
-                run.add(step.token, step.unit, step.size, place.local)
+                group.add(step.token, step.unit, step.size, place.local)
                 reader = self.tables.block_reader(step)
-                run.after.append(Line(call(reader, place.local), place.text))
+                group.after.append(Line(call(reader, place.local), place.text))
             case _:
-                run.add("x", 1, 1)
+                group.add("x", 1, 1)
 
-    def enter(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
+    def make_nested(self, place: plan.Place, type_: ir.TypeName) -> tuple[Statement, ...]:
         """Return the statements that make a nested object."""
         return (Line(f"{self.makers[type_]}()", place.local), Line(place.local, place.text))
 
@@ -269,20 +269,20 @@ class _Decoder(Running):
     def text(self) -> Node:
         """Read the size of a string; return the expression that reads the string.
 
-        The last byte must be zero; to look at it is to check the bounds.
+        The last byte must be zero; reading it checks the bounds.
         """
         size = "size"
-        if self.worded and not self.run.fields:
+        if self.worded and not self.group.fields:
             self.align(4)
-            self.here = self.here.skip(4)
+            self.position = self.position.skip(4)
             start = self.start()
             size = f"words[{start} >> 2]"
         else:
             self.number(size)
             start = self.start()
-        self.line(f"{self.here.text(-1)} + {size}", "end")
+        self.line(f"{self.position.text(-1)} + {size}", "end")
         self.body.append(Block("if data[end]:", UNENDED))
-        self.here = Cursor("end", 1, multiple_of(1))
+        self.position = Cursor("end", 1, multiple_of(1))
         if self.worded:
             return call("to_str", f"chars{slice_of(start)}")
         return call(self.tables.text(), f"data{slice_of(start)}")
@@ -304,9 +304,9 @@ class _Decoder(Running):
         """Read a large array of fixed size as one buffer."""
         self.flush()
         self.align(step.unit)
-        start, end = self.here.text(), self.here.text(step.size)
+        start, end = self.position.text(), self.position.text(step.size)
         self.short_if(f"{end} > limit")
-        self.here = self.here.skip(step.size)
+        self.position = self.position.skip(step.size)
         reader = self.tables.block_reader(step)
         self.line(call(reader, f"{self.source}{slice_of(start, end)}"), step.place.text)
 
@@ -322,9 +322,9 @@ class _Decoder(Running):
         count = self.begin(step)
         self.align(4)
         reader = self.tables.texts_reader(step)
-        texts = call(reader, "data", self.here.text(), count)
+        texts = call(reader, "data", self.position.text(), count)
         self.line(texts, tuple_of(step.place.text, "end"))
-        self.here = Cursor("end", 0, multiple_of(4 if step.wide else 1))
+        self.position = Cursor("end", 0, multiple_of(4 if step.wide else 1))
 
     def items(self, step: plan.Items) -> None:
         """Read an array or sequence of structures."""
@@ -341,10 +341,10 @@ class _Decoder(Running):
         count = self.begin(step)
         least = plan.smallest(step.body)
         if step.size is None:
-            wanted = count if least == 1 else f"{least} * {count}"
-            self.short_if(f"{self.here.text()} + {wanted} > limit")
+            needed = count if least == 1 else f"{least} * {count}"
+            self.short_if(f"{self.position.text()} + {needed} > limit")
         else:
-            self.short_if(f"{self.here.text(least * step.size)} > limit")
+            self.short_if(f"{self.position.text(least * step.size)} > limit")
         empty = Comprehension(f"{self.makers[step.type]}()", (("_", f"range({count})"),))
         self.line(empty, step.place.local)
         self.line(step.place.local, step.place.text)
@@ -352,7 +352,7 @@ class _Decoder(Running):
         many = plan.is_many(step) and plan.is_text(step.body)
         # not within a loop: it goes over all that follows
         if many and not worded and self.source == "data" and not self.looping:
-            strings = call(self.tables.strings(), "data", self.here.text())
+            strings = call(self.tables.strings(), "data", self.position.text())
             self.line(strings, tuple_of("words", "chars", "to_str"))
             self.worded = True
         self.loop(f"for {step.item} in {step.place.local}:", element)
@@ -365,51 +365,51 @@ class _Decoder(Running):
         self.line(step.place.local, step.place.text)
         if step.size is not None:
             self.align(repeat.align)
-        run = Run()
+        group = UnpackedGroup()
         entered: list[Statement] = []
         for part in step.body:
             if isinstance(part, plan.Enter):
-                entered += self.enter(part.place, part.type)
+                entered += self.make_nested(part.place, part.type)
             else:
-                self.fixed(part, run)
-        reader = self.tables.rows("".join(run.fields))
-        values = self.tables.local(f"{step.item}_values") if run.targets else "_"
+                self.fixed(part, group)
+        reader = self.tables.rows("".join(group.fields))
+        values = self.tables.local(f"{step.item}_values") if group.targets else "_"
         rows = self.buffer(count, repeat.align, repeat.size, self.source)
-        stored = [Line(values, tuple_of(*run.targets))] if run.targets else []
+        stored = [Line(values, tuple_of(*group.targets))] if group.targets else []
         body = (
             Line(f"{self.makers[step.type]}()", step.item),
             Line(call(f"{step.place.local}.append", step.item)),
             *entered,
             *stored,
-            *run.after,
+            *group.after,
         )
         self.body.append(Block(f"for {values} in {reader}({rows}):", body))
 
     def loop(self, head: str, emit: Callable[[], None]) -> None:
-        """Emit a loop; `emit` emits its body, until what is known of the position holds.
+        """Emit a loop; `emit` emits its body, until the known alignment holds for each round.
 
         Between two rounds the position is in `at`, or in `end` if the body ends with a string.
         """
-        entry, first = self.here, self.here.at("at")
+        entry, first = self.position, self.position.at("at")
         unchecked = self.unchecked
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
             with self.within(head):
-                self.here = first
+                self.position = first
                 emit()
-                again = first.where(first.known.meet(self.here.known))
-                if first.base == "at" and self.here.base == "end":
-                    again = again.at("end", self.here.offset)
-                self.settle(again.base, again.offset)
+                again = first.with_alignment(first.alignment.meet(self.position.alignment))
+                if first.base == "at" and self.position.base == "end":
+                    again = again.at("end", self.position.offset)
+                self.store_position(again.base, again.offset)
             loop = self.body.pop()
             if again == first:
                 break
             first = again
             self.tables.reset(mark)
         self.looping = looping
-        self.here = entry
-        self.settle(first.base, first.offset)
+        self.position = entry
+        self.store_position(first.base, first.offset)
         self.body.append(loop)
-        self.here = first
+        self.position = first
         self.unchecked |= unchecked

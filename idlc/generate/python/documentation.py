@@ -13,7 +13,7 @@ from idlc.model import derive, ir, python_names
 from idlc.model.ir import spell
 
 
-class Section(msgspec.Struct, frozen=True):
+class DocstringSection(msgspec.Struct, frozen=True):
     """A list in a docstring, such as that of the attributes."""
 
     title: str
@@ -24,11 +24,11 @@ class Docstring(msgspec.Struct, frozen=True):
     """A class's docstring: `text` of one or more lines, and lists after it."""
 
     text: str
-    sections: tuple[Section, ...] = ()
+    sections: tuple[DocstringSection, ...] = ()
 
     @property
     def is_one_line(self) -> bool:
-        """Whether the closing quotes stand on the line of the opening ones."""
+        """True if the closing quotes are on the line of the opening ones."""
         return not self.sections and "\n" not in self.text
 
 
@@ -44,9 +44,9 @@ def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file:
     place = _place(structure, file)
     lines += ["", f"Defined in {place}"] if place else []
     constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
-    sections = (Section("Attributes", entries), Section("Constants", constants))
-    found = tuple(section for section in sections if section.entries)
-    return Docstring(docstring(lines, one_line=not found), found)
+    sections = (DocstringSection("Attributes", entries), DocstringSection("Constants", constants))
+    filled = tuple(section for section in sections if section.entries)
+    return Docstring(docstring(lines, one_line=not filled), filled)
 
 
 def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
@@ -77,7 +77,7 @@ def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
                 interface.goal.name: f"The goal of the action {interface.name}.",
                 interface.result.name: f"The result of the action {interface.name}.",
                 interface.feedback.name: f"The feedback of the action {interface.name}.",
-                **{one: f"{text}. Added by ROS 2." for one, text in words.items()},
+                **{type_name: f"{text}. Added by ROS 2." for type_name, text in words.items()},
                 **_event(send, f"a call that starts {goal}"),
                 **_event(get, "a call that waits for a result"),
             }
@@ -108,7 +108,7 @@ def _place(structure: ir.Message, file: str) -> str:
     what one more field changes.
     """
     described: list[ir.Field | ir.Constant] = [*structure.fields, *structure.constants]
-    spans = [one.name_span for one in described if one.name_span]
+    spans = [definition.name_span for definition in described if definition.name_span]
     if not spans:
         return ""
     first = min(spans, key=lambda span: span.start)
@@ -122,26 +122,26 @@ def _constant(constant: ir.Constant) -> str:
 
 
 def words(described: ir.Field | ir.Constant) -> str:
-    """Return the unit and comment of a field or constant, to stand after its type or name."""
+    """Return the unit and comment of a field or constant, the suffix of its type or name."""
     unit = f" [{lines.prose(described.unit)}]" if described.unit else ""
-    said = " ".join(lines.prose(line).strip() for line in described.comment).strip()
-    return unit + (f". {said}" if said else "")
+    comment = " ".join(lines.prose(line).strip() for line in described.comment).strip()
+    return unit + (f". {comment}" if comment else "")
 
 
-def entry(name: str, described: ir.Field | ir.Constant, said: str) -> str:
+def entry(name: str, described: ir.Field | ir.Constant, suffix: str) -> str:
     """Return the entry of a field or constant in a list, on as many lines as it takes."""
-    text = f"{name}: {spell(described.type)}{said}"
+    text = f"{name}: {spell(described.type)}{suffix}"
     return "\n".join(lines.wrapped(text, 8, hanging=4))
 
 
-def attribute(described: ir.Field | ir.Constant, said: str, file: str) -> str:
-    """Return the statement that editors show of a field or constant: its words, and its line.
+def attribute(described: ir.Field | ir.Constant, suffix: str, file: str) -> str:
+    """Return the statement that editors show of a field or constant: its definition and comment.
 
-    That is named by what it begins with, not by its number, which other lines would change. The
-    statement is empty for what ROS 2 adds, of which there is no more to say than its annotation.
+    The file is named without a line number, which other lines would change. The statement is empty
+    for fields that ROS 2 adds: their annotation says it all.
     """
     if described.name_span is None:
         return ""
-    lines = wrapped(f"{spell(described.type)} {described.name}{said} ({file})", 6)
+    lines = wrapped(f"{spell(described.type)} {described.name}{suffix} ({file})", 6)
     text = docstring(lines, one_line=True)
     return f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""'

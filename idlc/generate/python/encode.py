@@ -2,9 +2,9 @@
 
 Numbers that follow each other are written by one precompiled Struct; so is a string between
 them, by one Struct for each of its sizes. Positions modulo 8 are followed as far as they are
-known, so that padding is part of the Structs. Where a string or a sequence made them unknown,
+known, so that padding is part of the Structs. After a string or a sequence of unknown size,
 the statement picks the Struct by the position, which is noted in `at` (or, if 4 is enough, its
-remainder in `low`) only where somebody reads it.
+remainder in `low`) only where a later statement reads it.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from idlc.wire.layout import Alignment, multiple_of
 _POSITIONS = re.compile(r"\b(?:at|low)\b")
 
 
-class Frame:
+class PackedGroup:
     """Fixed-size values that follow each other, with at most one text: one Struct."""
 
     def __init__(self, start: Position) -> None:
-        self.start = start.known
+        self.start = start.alignment
         self.fields: list[str] = []
         self.values: list[Node] = []
         self.text_size = ""
@@ -41,21 +41,21 @@ class Frame:
         return f"[low & {self.widest - 1}]" if self.widest <= 4 else "[at & 7]"
 
 
-class Framing(Emitter):
-    """Statements that write: those so far, the frame that grows, and the position after both."""
+class PackBuilder(Emitter):
+    """Emits statements that write; `group` is not yet emitted, `position` is after it."""
 
-    def __init__(self, tables: Tables, here: Position) -> None:
+    def __init__(self, tables: Tables, position: Position) -> None:
         super().__init__()
         self.tables = tables
-        self.here = here
-        self.frame = Frame(here)
+        self.position = position
+        self.group = PackedGroup(position)
 
     def put(self, part: Node, reads: str = "") -> None:
         """Emit a part of the message."""
         self.body.append(Put(part, positions(reads)))
 
     def fixed(self, step: plan.Step) -> None:
-        """Add a value of fixed size to the frame."""
+        """Add a value of fixed size to the group."""
         match step:
             case plan.Number(place, "?"):
                 truths = self.tables.function("truths", "TRUTHS")
@@ -69,69 +69,69 @@ class Framing(Emitter):
                 self.field("x", 1, 1)
 
     def field(self, token: str, align: int, size: int, value: Node | None = None) -> None:
-        """Add a value to the frame."""
-        frame = self.frame
-        frame.fields.append(token)
-        frame.widest = max(frame.widest, align)
+        """Add a value to the group."""
+        group = self.group
+        group.fields.append(token)
+        group.widest = max(group.widest, align)
         if value is not None:
-            frame.values.append(value)
-        self.here.align(align)
-        self.here.advance(size)
+            group.values.append(value)
+        self.position.align(align)
+        self.position.advance(size)
 
     def text(self, place: plan.Place) -> None:
-        """Add a string to the frame; a frame has at most one."""
-        if self.frame.text_size:
+        """Add a string to the group; a group has at most one."""
+        if self.group.text_size:
             self.flush(4)
         size = self.tables.local(f"{place.local}_size")
         self.line(f"{place.text}.encode()", place.local)
         self.line(call("len", place.local), size)
         self.field("I", 4, 4, f"{size} + 1")
-        self.frame.fields.append("*")
-        self.frame.values.append(place.local)
-        self.frame.text_size = size
-        self.here.skip(size, 1)
-        self.here.advance(1)
+        self.group.fields.append("*")
+        self.group.values.append(place.local)
+        self.group.text_size = size
+        self.position.skip(size, 1)
+        self.position.advance(1)
 
     def flush(self, align: int) -> None:
-        """Write the frame; with the padding for a following `align` where that is known."""
-        frame = self.frame
-        if frame.fields:
-            if max(frame.start.modulus, frame.widest) < align:
+        """Emit the group, with the padding for a following `align` where that is known."""
+        group = self.group
+        if group.fields:
+            if max(group.start.modulus, group.widest) < align:
                 align = 1
-            frame.widest = max(frame.widest, align)
-            phase = frame.phase()
-            start = None if phase else frame.start.residue
-            writer = self.tables.writer("".join(frame.fields), bool(frame.text_size), start, align)
-            key = f"[{frame.text_size}]" if frame.text_size else ""
+            group.widest = max(group.widest, align)
+            phase = group.phase()
+            start = None if phase else group.start.residue
+            writer = self.tables.writer("".join(group.fields), bool(group.text_size), start, align)
+            key = f"[{group.text_size}]" if group.text_size else ""
             method = ".pack" if phase and not key else ""
-            self.put(Group(f"{writer}{phase}{key}{method}", tuple(frame.values)), phase)
-            self.here.align(align)
-        self.settle()
+            self.put(Group(f"{writer}{phase}{key}{method}", tuple(group.values)), phase)
+            self.position.align(align)
+        self.note_position()
 
-    def settle(self) -> None:
-        """Note the position in `at` and `low`, and begin a new frame there."""
-        here = self.here
-        for target, value in here.before:
+    def note_position(self) -> None:
+        """Note the position in `at` and `low`, and begin a new group there."""
+        position = self.position
+        for target, value in position.before:
             self.note(target, value)
-        here.before.clear()
-        if not here.constant:
-            self.note("at", here.text)
-            if not here.known.knows(4):
-                self.note("low", here.low)
-            self.here = Position.variable(here.known)
-        self.frame = Frame(self.here)
+        position.before.clear()
+        if not position.constant:
+            self.note("at", position.text)
+            if not position.alignment.knows(4):
+                self.note("low", position.low)
+            self.position = Position.variable(position.alignment)
+        self.group = PackedGroup(self.position)
 
     def pad(self, align: int, unless_empty: str = "") -> None:
         """Emit padding as a part of its own."""
-        here = self.here
-        if here.known.is_at(align):
+        position = self.position
+        if position.alignment.is_at(align):
             return
         phase = "[at & 7]" if align == 8 else "[low & 3]"
-        index = f"[{here.known.residue}]" if here.known.knows(align) else phase
+        index = f"[{position.alignment.residue}]" if position.alignment.knows(align) else phase
         part = f"{self.tables.pad(align)}{index}"
         self.put(f'{part} if {unless_empty} else b""' if unless_empty else part, index)
         if not unless_empty:
-            here.align(align)
+            position.align(align)
 
     def note(self, target: str, value: str) -> None:
         """Note a position; dropped later unless it is read."""
@@ -172,12 +172,12 @@ def encode(steps: tuple[plan.Step, ...], tables: Tables, indent: int) -> list[st
     return statements.function(body, indent, tuple(encoder.again))
 
 
-class _Encoder(Framing):
+class _Encoder(PackBuilder):
     """Emits a message's steps."""
 
-    def __init__(self, tables: Tables, here: Position) -> None:
-        super().__init__(tables, here)
-        #: What is true if another thread changed the length of an array that was not copied.
+    def __init__(self, tables: Tables, position: Position) -> None:
+        super().__init__(tables, position)
+        #: Conditions that hold if another thread changed the length of an uncopied array.
         self.again: list[str] = []
         self.looping = False
 
@@ -215,8 +215,8 @@ class _Encoder(Framing):
         self.flush(step.unit)
         self.pad(step.unit)
         self.put(call(self.tables.buffer_writer(step), step.place.text))
-        self.here.advance(step.size)
-        self.settle()
+        self.position.advance(step.size)
+        self.note_position()
 
     def check(self, condition: str, problem: str) -> None:
         """Emit a check; `validate` finds the field and the words afterwards."""
@@ -237,8 +237,8 @@ class _Encoder(Framing):
         self.field("I", 4, 4, count)
         self.flush(1)
         self.put(local)
-        self.here.skip(f"len({local})", unit)
-        self.settle()
+        self.position.skip(f"len({local})", unit)
+        self.note_position()
 
     def numbers(self, step: plan.Numbers) -> None:
         """Emit a numeric sequence."""
@@ -267,8 +267,8 @@ class _Encoder(Framing):
         self.pad(4)
         self.line(call(self.tables.texts_writer(step), step.place.text), local)
         self.put(local)
-        self.here.skip(f"len({local})", 4 if step.wide else 1)
-        self.settle()
+        self.position.skip(f"len({local})", 4 if step.wide else 1)
+        self.note_position()
 
     def count(self, step: plan.Items, count: str) -> None:
         """Emit the check of a size, or the count."""
@@ -279,7 +279,7 @@ class _Encoder(Framing):
             self.check(f"{count} != {step.size}", "wrong number of elements")
 
     def rows(self, step: plan.Items) -> None:
-        """Emit structures of strings: what goes around each is looked up, all is encoded once."""
+        """Emit structures of strings: sizes and ends are looked up, all is encoded once."""
         local = step.place.local
         rows, block = self.tables.local(f"{local}_rows"), self.tables.local(f"{local}_block")
         sized = self.tables.function("sized", "sizes(order)")
@@ -287,15 +287,15 @@ class _Encoder(Framing):
         places = [part.place for part in step.body if isinstance(part, plan.Text)]
         parts = [
             part
-            for one in places
-            for part in (f"{sized}[len({one.local})]", one.local, f"{ended}[len({one.local})]")
+            for name in (place.local for place in places)
+            for part in (f"{sized}[len({name})]", name, f"{ended}[len({name})]")
         ]
-        lines = [statements.Line(one.text, one.local) for one in places]
+        lines = [statements.Line(place.text, place.local) for place in places]
         lines.append(statements.Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
-        given = tuple_of(*(one.text for one in places))
+        values = tuple_of(*(place.text for place in places))
         each = self.tables.local("each")
-        texts = Comprehension(each, ((step.item, local), (each, given)))
+        texts = Comprehension(each, ((step.item, local), (each, values)))
         unsized = call(self.tables.function("unsized", "unsized"), texts)
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
@@ -307,8 +307,8 @@ class _Encoder(Framing):
         self.pad(4)
         self.line(call(self.tables.function("write_rows", "rows_writer(order)"), rows), block)
         self.put(block)
-        self.here.skip(f"len({block})", 1)
-        self.settle()
+        self.position.skip(f"len({block})", 1)
+        self.note_position()
 
     def items(self, step: plan.Items) -> None:
         """Emit an array or sequence of structures, as many as there are at one moment."""
@@ -332,8 +332,8 @@ class _Encoder(Framing):
         inner = _Encoder(self.tables, Position(Alignment(8, 4)))
         for part in inlined(step):
             inner.fixed(part)
-        writer = self.tables.writer("".join(inner.frame.fields), False, 4, 1)
-        row = Group(writer, tuple(inner.frame.values))
+        writer = self.tables.writer("".join(inner.group.fields), False, 4, 1)
+        row = Group(writer, tuple(inner.group.values))
         block = self.tables.local(f"{local}_block")
         gap = "\\x00" * (repeat.stride - repeat.size)
         blocks = Comprehension(row, ((step.item, local),))
@@ -346,54 +346,54 @@ class _Encoder(Framing):
         size = count if repeat.stride == 1 else f"{repeat.stride} * {count}"
         size += f" - {gap}" if gap else ""
         modulus = power_of_two(repeat.size, repeat.stride)
-        if not unless or (self.here.known.is_at(repeat.align) and not gap):
+        if not unless or (self.position.alignment.is_at(repeat.align) and not gap):
             self.pad(repeat.align)
             self.put(part)
-            self.here.skip(size, modulus)
+            self.position.skip(size, modulus)
         else:
-            self.settle()
-            if self.here.constant:
-                self.note("at", self.here.text)
-            self.note("low", self.here.low)
+            self.note_position()
+            if self.position.constant:
+                self.note("at", self.position.text)
+            self.note("low", self.position.low)
             self.pad(repeat.align, unless)
             self.put(part)
             with self.within(f"if {unless}:"):
                 start = aligned_to_8("at") if repeat.align == 8 else "at"
                 self.note("at", f"{start} + {size}")
                 self.note("low", size)
-            self.here = Position.variable(multiple_of(4).modulo(modulus))
-        self.settle()
+            self.position = Position.variable(multiple_of(4).modulo(modulus))
+        self.note_position()
 
     def loop(self, step: plan.Items) -> None:
         """Emit structures one by one."""
         self.flush(1)
-        entry = self.here
+        entry = self.position
         if entry.constant:
             self.note("at", entry.text)
-        if entry.known.knows(4):
+        if entry.alignment.knows(4):
             self.note("low", entry.low)
-        head = entry.known
+        head = entry.alignment
         looping, self.looping = self.looping, True
         while True:
             mark = self.tables.mark()
             with self.within(f"for {step.item} in {step.place.local}:"):
-                self.here = Position.variable(head)
-                self.frame = Frame(self.here)
+                self.position = Position.variable(head)
+                self.group = PackedGroup(self.position)
                 for part in step.body:
                     self.step(part)
                 self.flush(1)
-                end = self.here
-                if end.known.knows(4) and not head.knows(4):
+                end = self.position
+                if end.alignment.knows(4) and not head.knows(4):
                     self.note("low", end.low)
-            met = head.meet(end.known)
+            met = head.meet(end.alignment)
             if met == head:
                 break
             head = met
             self.tables.reset(mark)
             self.body.pop()
         self.looping = looping
-        self.here = Position.variable(head)
-        self.frame = Frame(self.here)
+        self.position = Position.variable(head)
+        self.group = PackedGroup(self.position)
 
 
 def power_of_two(*sizes: int) -> int:
@@ -404,17 +404,17 @@ def power_of_two(*sizes: int) -> int:
 def inlined(step: plan.Items) -> list[plan.Step]:
     """Return an element's fixed-size steps, with attribute chains instead of variables."""
     paths = {step.item: step.item}
-    found: list[plan.Step] = []
+    steps: list[plan.Step] = []
     for part in step.body:
         match part:
             case plan.Enter(place):
                 paths[place.local] = f"{paths[place.owner]}.{place.slot}"
             case plan.Number(place, letter, size):
                 moved = msgspec.structs.replace(place, owner=paths[place.owner])
-                found.append(plan.Number(moved, letter, size))
+                steps.append(plan.Number(moved, letter, size))
             case plan.Block(place, primitive, count):
                 moved = msgspec.structs.replace(place, owner=paths[place.owner])
-                found.append(plan.Block(moved, primitive, count))
+                steps.append(plan.Block(moved, primitive, count))
             case _:
-                found.append(part)
-    return found
+                steps.append(part)
+    return steps

@@ -1,4 +1,4 @@
-"""How one field looks in its class: annotation, parameter, default and storing."""
+"""The view of a field in its class: annotation, parameter, default and storing."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
 class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     """A field, as text; `store` is a statement on as many lines as it takes.
 
-    `wire_name` and `idl` are what rosidl says of it. The conditions of `doubt` are all true, in
+    `wire_name` and `idl` are its name and type in rosidl. All conditions of `doubt` are true, in
     the constructor, for an argument that is perhaps not of the field's type; a field of numbers
-    has none, because it converts what it is given.
+    has none, because it converts any argument.
     """
 
     name: str
@@ -36,7 +36,7 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Naming(msgspec.Struct, frozen=True):
-    """How a class names what its fields could hide: `self` and what is builtin."""
+    """The names in a class of what its fields could hide: `self` and builtins."""
 
     receiver: str
     options: str
@@ -131,7 +131,7 @@ def view(
 
 
 class _Shape(NamedTuple):
-    """What the fields of a kind have in common: annotations, and how a value gets into the slot.
+    """The code that fields of one kind share: annotations, and the value stored in the slot.
 
     `fresh` is the default of a field whose parameter is None without an argument.
     """
@@ -159,14 +159,14 @@ def _shape(field: ir.Field, references: References, naming: Naming, *, converts:
     if isinstance(field.type, ir.Ref):
         annotation = _element(field.type, references)
         fresh: Node = f"{annotation}()"
-        known = "" if field.type.target in references.implied else annotation
+        expected = "" if field.type.target in references.implied else annotation
     else:
         element = _element(ir.element_of(field.type), references)
         inner = naming.builtins + element if element in BUILTINS else element
-        known = f"{naming.builtins}list"
-        annotation = f"{known}[{inner}]"
+        expected = f"{naming.builtins}list"
+        annotation = f"{expected}[{inner}]"
         fresh = _fresh_list(field, references)
-    doubt = (f"{name} is not None", *([f"{kind} is not {known}"] if known else []))
+    doubt = (f"{name} is not None", *([f"{kind} is not {expected}"] if expected else []))
     if converts and not isinstance(field.type, ir.Ref):
         inside = getattr(ir.element_of(field.type), "name", "")
         read = [f"_idlc.read_{LIST_PRIMITIVES[inside]}"] if inside in LIST_PRIMITIVES else []
@@ -201,9 +201,9 @@ def _store(slot: str, name: str, shape: _Shape) -> list[str]:
     """Return the statement that gives a slot its value, indented as in the constructor."""
     if not shape.fresh:
         return assign(slot, shape.stored, 8)
-    one = f"        {slot} = {flat(shape.fresh)} if {name} is None else {flat(shape.stored)}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"        {slot} = {flat(shape.fresh)} if {name} is None else {flat(shape.stored)}"
+    if len(line) <= WIDTH:
+        return [line]
     return [
         f"        if {name} is None:",
         *assign(slot, shape.fresh, 12),

@@ -30,20 +30,20 @@ def statements(module: str, names: Collection[str], indent: int = 0) -> list[str
     statements = [(name,) for name in names if " as " in name]
     plain = sorted((name for name in names if " as " not in name), key=_order)
     ordered = sorted([*statements, *([tuple(plain)] if plain else [])])
-    return [line for one in ordered for line in lines.import_from(module, one, indent)]
+    return [line for group in ordered for line in lines.import_from(module, group, indent)]
 
 
 class Homes:
     """The module of each structure of a package, without the package and the kind.
 
-    Those of other packages are inside of the Python package `around`, if that is not empty.
+    Those of other packages are inside the Python package `parent`, if that is not empty.
     """
 
     def __init__(
-        self, interface: ir.Interface, modules: python_names.Modules, around: str = ""
+        self, interface: ir.Interface, modules: python_names.Modules, parent: str = ""
     ) -> None:
         self.modules = modules
-        self.around = f"{around}." if around else ""
+        self.parent = f"{parent}." if parent else ""
         self.classes = modules[interface.name]
         self.protocol = python_names.protocol_module(self.classes)
         self.sections = {message.name for message in derive.sections(interface)}
@@ -59,9 +59,9 @@ class Homes:
 class References:
     """The names of all classes that a module mentions.
 
-    `own` are the structures that it defines, `others` those of other packages that their fields
-    name. `direct` are imported with the module; `implied` are others of fields that ROS 2 adds,
-    imported when they are used, so that each part of a protocol needs only what it holds.
+    `own` are the structures that it defines, `others` are in fields and of other packages.
+    `direct` are imported with the module; `implied` are others in fields that ROS 2 adds, imported
+    when they are used, so that each part of a protocol needs only its own types.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class References:
     def _named(
         self, own: set[ir.TypeName], others: set[ir.TypeName]
     ) -> dict[ir.TypeName, python_names.ClassName]:
-        """Return each structure's class; those that the module defines keep their plain name.
+        """Return each structure's class; classes that the module defines keep their plain name.
 
-        Others get another one if something else has it: an exception of Python, for example.
+        Others get another name if theirs is taken: by an exception of Python, for example.
         """
         by_class: dict[str, list[ir.TypeName]] = defaultdict(list)
         for name in own | others:
@@ -115,12 +115,12 @@ class References:
         return sorted({(self._outside(type_), _module(type_)) for type_ in self.implied})
 
     def _outside(self, type_: ir.TypeName) -> str:
-        return f"{self._homes.around}{type_.package}.{type_.kind}"
+        return f"{self._homes.parent}{type_.package}.{type_.kind}"
 
     def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
-        """Return import statements, those of this package and those of others, sorted.
+        """Return import statements from this package, and from others, sorted.
 
-        Those of others are indented by four more columns.
+        Imports from others are indented by four more columns.
         """
         inside: dict[tuple[int, str], set[str]] = defaultdict(set)
         outside: dict[str, set[str]] = defaultdict(set)
@@ -153,14 +153,14 @@ def _module(type_: ir.TypeName) -> str:
 
 
 def _closure(own: set[ir.TypeName], messages: plan.Messages) -> set[ir.TypeName]:
-    found: set[ir.TypeName] = set()
+    closure: set[ir.TypeName] = set()
     waiting = list(own)
     while waiting:
         for name in messages[waiting.pop()].references:
-            if name not in found:
-                found.add(name)
+            if name not in closure:
+                closure.add(name)
                 waiting.append(name)
-    return found
+    return closure
 
 
 TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "Actions"}
@@ -197,12 +197,12 @@ def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str
 
 def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> PackageView:
     """Return the view of one kind's package."""
-    found: dict[str, str] = {}
+    homes: dict[str, str] = {}
     for interface in model.own:
         if interface.name.kind == kind:
-            found |= exported(interface, modules)
+            homes |= exported(interface, modules)
     by_module: dict[str, list[str]] = defaultdict(list)
-    for name, module in found.items():
+    for name, module in homes.items():
         by_module[module].append(name)
     return PackageView(
         path=f"{kind}/__init__.py",
@@ -212,5 +212,5 @@ def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> 
             for module in sorted(by_module, key=natural)
             for line in statements(f".{module}", by_module[module], 4)
         ),
-        names=tuple(NameView(name, found[name]) for name in sorted(found, key=natural)),
+        names=tuple(NameView(name, homes[name]) for name in sorted(homes, key=natural)),
     )

@@ -17,8 +17,10 @@ import msgspec
 
 from idlc.model import ir
 
-#: Columns in generated packages; who writes other files gives another width.
+#: Columns in generated packages; other files get a width of their own.
 WIDTH = 88
+#: Columns of docstrings, whose text depends on where it is broken.
+PROSE_WIDTH = WIDTH
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -35,14 +37,14 @@ class Group(msgspec.Struct, frozen=True):
     def flat(self) -> str:
         """Return the group on one line."""
         # a list, and no call for a str: half of all rendering passes through here
-        inner = ", ".join([one if isinstance(one, str) else one.flat() for one in self.items])
+        inner = ", ".join([item if isinstance(item, str) else item.flat() for item in self.items])
         if len(self.items) == 1 and self.brackets == "()" and not self.before:
             inner += ","
         return f"{self.before}{self.brackets[0]}{inner}{self.brackets[1]}{self.after}"
 
 
 class Comprehension(msgspec.Struct, frozen=True):
-    """A list comprehension: what is made of each element; each `for`'s targets and iterable."""
+    """A list comprehension: its element; the targets and iterable of each `for`."""
 
     element: Node
     loops: tuple[tuple[str, Node], ...]
@@ -79,9 +81,9 @@ def layout_lines(
     width = width or WIDTH
     if isinstance(node, str):
         return [f"{margin}{before}{node}{after}"]
-    one = f"{margin}{before}{node.flat()}{after}"
-    if len(one) <= width:
-        return [one]
+    line = f"{margin}{before}{node.flat()}{after}"
+    if len(line) <= width:
+        return [line]
     if isinstance(node, Comprehension):
         body = [f"{margin}    {node.flat()[1:-1]}"]
         if len(body[0]) > width:
@@ -107,9 +109,9 @@ def _broken(
 def import_from(module: str, names: Sequence[str], indent: int = 0, width: int = 0) -> list[str]:
     """Return the lines of an import statement."""
     margin = " " * indent
-    one = f"{margin}from {module} import {', '.join(names)}"
-    if len(one) <= (width or WIDTH) or " as " in one:
-        return [one]
+    line = f"{margin}from {module} import {', '.join(names)}"
+    if len(line) <= (width or WIDTH) or " as " in line:
+        return [line]
     items = [f"{margin}    {name}," for name in names]
     return [f"{margin}from {module} import (", *items, f"{margin})"]
 
@@ -117,18 +119,18 @@ def import_from(module: str, names: Sequence[str], indent: int = 0, width: int =
 def all_of(conditions: Sequence[str], indent: int) -> list[str]:
     """Return lines that return whether all conditions are true."""
     margin = " " * indent
-    one = f"{margin}return {' and '.join(conditions)}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{margin}return {' and '.join(conditions)}"
+    if len(line) <= WIDTH:
+        return [line]
     return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
 
 
 def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
-    one = f"{margin}{f' {word} '.join(conditions)}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{margin}{f' {word} '.join(conditions)}"
+    if len(line) <= WIDTH:
+        return [line]
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
 
 
@@ -137,18 +139,18 @@ def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
     margin = " " * indent
     if len(rest) < 2:
         return any_of([first, *rest], indent, "if ", ":")
-    one = f"{margin}if {first} or ({' and '.join(rest)}):"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{margin}if {first} or ({' and '.join(rest)}):"
+    if len(line) <= WIDTH:
+        return [line]
     return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
     """Return the lines of `before`, whether any condition is true, and `after`."""
     margin = " " * indent
-    one = f"{margin}{before}{' or '.join(conditions)}{after}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{margin}{before}{' or '.join(conditions)}{after}"
+    if len(line) <= WIDTH:
+        return [line]
     brackets = ("", "") if before.endswith("(") else ("(", ")")
     return [
         f"{margin}{before}{brackets[0]}",
@@ -163,9 +165,9 @@ def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[
     left = flat(target)
     if isinstance(target, Group) and len(target.items) > 1:
         left = left[1:-1]  # as formatters have it
-    one = f"{margin}{left} {operator} {flat(value)}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{margin}{left} {operator} {flat(value)}"
+    if len(line) <= WIDTH:
+        return [line]
     if isinstance(target, Group):
         *targets, last = _broken(target, indent)
         return [*targets, *assign(last.strip(), value, indent, operator)]
@@ -173,10 +175,10 @@ def assign(target: Node, value: Node, indent: int, operator: str = "=") -> list[
         return layout_lines(value, indent, f"{left} {operator} ")
     if len(margin) + 4 + len(value) <= WIDTH:
         return [f"{margin}{left} {operator} (", f"{margin}    {value}", f"{margin})"]
-    return [one]
+    return [line]
 
 
-def text(value: str) -> str:
+def string_literal(value: str) -> str:
     """Return a string literal with the quotes that formatters choose."""
     quote = '"' if value.count('"') <= value.count("'") else "'"
     if value.isascii() and value.isprintable():
@@ -202,7 +204,7 @@ def number(value: ir.Scalar) -> str:
 def scalar(type_: ir.Element, value: ir.Scalar) -> str:
     """Return the literal of a value of a primitive or string type."""
     if isinstance(type_, ir.String):
-        return text(str(value))
+        return string_literal(str(value))
     if isinstance(type_, ir.Primitive) and type_.name == "byte":
         return octet(int(value))
     if isinstance(type_, ir.Primitive) and type_.name.startswith("float"):
@@ -247,7 +249,7 @@ def docstring(lines: list[str], *, one_line: bool) -> str:
 
 def wrapped(words: str, indent: int, hanging: int = 0) -> list[str]:
     """Return words on lines that fit when they are indented, all but the first by `hanging` too."""
-    width = WIDTH - 4 - indent
+    width = PROSE_WIDTH - 4 - indent
     if len(words) <= width:
         return [words]
     return textwrap.wrap(

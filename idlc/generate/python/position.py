@@ -1,4 +1,4 @@
-"""What is known, while emitting, of the position at which the next value will stand."""
+"""The position of the next value, as far as it is known while code is emitted."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Position:
     the last multiple of 4. `before` are assignments that both expressions rely on.
     """
 
-    def __init__(self, known: Alignment, base: str = "", low: str = "") -> None:
-        self.known = known
+    def __init__(self, alignment: Alignment, base: str = "", low: str = "") -> None:
+        self.alignment = alignment
         self._base = base
         self._offset = 0
         self._low = low
@@ -27,13 +27,13 @@ class Position:
         self.before: list[tuple[str, str]] = []
 
     @classmethod
-    def variable(cls, known: Alignment) -> Position:
+    def variable(cls, alignment: Alignment) -> Position:
         """Return a position that is in `at` and, modulo 4, in `low`."""
-        return cls(known, "at", "low")
+        return cls(alignment, "at", "low")
 
     @property
     def constant(self) -> bool:
-        """Whether the position is a number."""
+        """True if the position is a number."""
         return not self._base
 
     @property
@@ -44,40 +44,40 @@ class Position:
     @property
     def low(self) -> str:
         """An expression that is equal to the position modulo 4."""
-        if self.known.knows(4):
-            return str(self.known.residue % 4)
+        if self.alignment.knows(4):
+            return str(self.alignment.residue % 4)
         return _sum(self._low, self._low_offset % 4)
 
     def advance(self, size: int) -> None:
         """Go `size` bytes ahead."""
         self._offset += size
         self._low_offset += size
-        self.known = self.known.after(size)
+        self.alignment = self.alignment.after(size)
 
     def align(self, align: int) -> None:
         """Go to the next multiple of `align`, counted from the end of the header."""
-        if self.known.knows(align):
-            self.advance(self.known.padding(align))
+        if self.alignment.knows(align):
+            self.advance(self.alignment.padding(align))
             return
         self.shorten()
         self._base, self._offset = _align_up(self._base, self._offset, align)
         self._low, self._low_offset = _align_up(self._low, self._low_offset, align)
-        self.known = multiple_of(align)
+        self.alignment = multiple_of(align)
 
     def skip(self, size: str, modulus: int) -> None:
         """Go ahead by an expression, which is a multiple of `modulus`."""
-        if self.known.knows(4):
-            self._low, self._low_offset = "", self.known.residue % 4
+        if self.alignment.knows(4):
+            self._low, self._low_offset = "", self.alignment.residue % 4
         self._base = _plus(self._base, size)
         self._low = _plus(self._low, size)
-        self.known = self.known.modulo(modulus)
+        self.alignment = self.alignment.modulo(modulus)
 
     def shorten(self) -> None:
         """Set a long expression aside as a statement of its own."""
         if len(self.text) > LONG:
             self.before.append(("at", self.text))
             self._base, self._offset = "at", 0
-        if not self.known.knows(4) and len(self.low) > LONG:
+        if not self.alignment.knows(4) and len(self.low) > LONG:
             self.before.append(("low", self.low))
             self._low, self._low_offset = "low", 0
 
@@ -109,7 +109,7 @@ class Cursor(msgspec.Struct, frozen=True):
 
     base: str
     offset: int
-    known: Alignment
+    alignment: Alignment
 
     def text(self, by: int = 0) -> str:
         """Return the position `by` bytes further as an expression."""
@@ -122,15 +122,15 @@ class Cursor(msgspec.Struct, frozen=True):
 
     def skip(self, size: int) -> Cursor:
         """Return the position `size` bytes further."""
-        return Cursor(self.base, self.offset + size, self.known.after(size))
+        return Cursor(self.base, self.offset + size, self.alignment.after(size))
 
     def at(self, base: str, offset: int = 0) -> Cursor:
         """Return the same position, held by another variable."""
-        return Cursor(base, offset, self.known)
+        return Cursor(base, offset, self.alignment)
 
-    def where(self, known: Alignment) -> Cursor:
-        """Return the position with other knowledge of it."""
-        return Cursor(self.base, self.offset, known)
+    def with_alignment(self, alignment: Alignment) -> Cursor:
+        """Return the same position with another known alignment."""
+        return Cursor(self.base, self.offset, alignment)
 
 
 #: The end of the header.

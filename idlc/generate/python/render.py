@@ -19,7 +19,7 @@ from idlc.generate.python import classes, documentation, fields, imports
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.codec import CodecView, codec
 from idlc.generate.python.imports import Homes, References
-from idlc.generate.python.lines import text as literal_text
+from idlc.generate.python.lines import string_literal
 from idlc.model import derive, ir, link, python_names
 from idlc.model.describe import IndividualDict
 from idlc.project.templates import RenderedFile, environment
@@ -47,8 +47,8 @@ def content(model: link.Model) -> TypesDict:
         structures = (*derive.messages(interface), *derive.pseudo_structures(interface))
         for structure in structures:
             full = describer.description(str(structure.name))
-            for one in (full["type_description"], *full["referenced_type_descriptions"]):
-                descriptions[one["type_name"]] = one
+            for description in (full["type_description"], *full["referenced_type_descriptions"]):
+                descriptions[description["type_name"]] = description
     sources = {
         # rosidl reads texts so, and no checkout of git's makes a difference then
         str(interface.name): file_text(interface).replace("\r\n", "\n").replace("\r", "\n")
@@ -63,18 +63,18 @@ def content(model: link.Model) -> TypesDict:
     }
 
 
-def type_data_source(model: link.Model, around: str = "") -> str:
+def type_data_source(model: link.Model, parent: str = "") -> str:
     """Return the text of the module: one line of it for each type."""
-    parts = _parts(content(model), around)
-    lines = "".join(f"    {literal_text(part)}\n" for part in parts)
+    parts = _parts(content(model), parent)
+    lines = "".join(f"    {string_literal(part)}\n" for part in parts)
     return f'"""The types of {model.package}, read by `typeinfo`."""\n\nJSON = (\n{lines})\n'
 
 
-def _parts(tables: TypesDict, around: str) -> Iterator[str]:
+def _parts(tables: TypesDict, parent: str) -> Iterator[str]:
     """Yield pieces that joined are the JSON text."""
     yield f'{{"package":{_json(tables["package"])}'
-    if around:
-        yield f',"around":{_json(f"{around}.")}'
+    if parent:
+        yield f',"around":{_json(f"{parent}.")}'
     for key in ("descriptions", "hashes", "sources"):
         mark = f',"{key}":{{'
         entries: dict[str, Any] = tables[key]
@@ -114,8 +114,8 @@ PRAGMAS = (
 HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
 
 
-class _Part(NamedTuple):
-    """What one module of classes defines of an interface."""
+class _ModulePart(NamedTuple):
+    """The structures of an interface that one module of classes defines."""
 
     interface: ir.Interface
     structures: tuple[ir.Message, ...]
@@ -129,26 +129,27 @@ def module_views(
     interface: ir.Interface,
     messages: plan.Messages,
     names: python_names.Modules,
-    around: str = "",
+    parent: str = "",
     *,
     converts: bool = False,
 ) -> Iterator[ModuleView]:
     """Yield the views of an interface's modules; `names` has the modules of all its package.
 
-    `converts` is whether classes convert values as those of Lyrical do.
+    With `converts`, classes convert values as Lyrical's do.
     """
-    homes = Homes(interface, names, around)
+    homes = Homes(interface, names, parent)
     written = derive.sections(interface)
     added = derive.messages(interface)[len(written) :]
     for structures, module in ((written, homes.classes), (added, homes.protocol)):
         if structures:
             references = References(interface, structures, messages, homes)
-            part = _Part(interface, structures, references, module, structures is added, converts)
+            is_added = structures is added
+            part = _ModulePart(interface, structures, references, module, is_added, converts)
             yield _classes(part, homes)
             yield _codecs(part, messages)
 
 
-def _classes(part: _Part, homes: Homes) -> ModuleView:
+def _classes(part: _ModulePart, homes: Homes) -> ModuleView:
     interface, references = part.interface, part.references
     name = interface.name
     purposes = documentation.purposes(interface)
@@ -165,8 +166,8 @@ def _classes(part: _Part, homes: Homes) -> ModuleView:
         title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
         imports=tuple(_imports(references, part.structures)),
         messages=tuple(
-            classes.message(one, references, purposes, file, converts=part.converts)
-            for one in part.structures
+            classes.message(structure, references, purposes, file, converts=part.converts)
+            for structure in part.structures
         ),
         # a service's own class is its author's; those of an action's services are not
         services=classes.services(interface, purposes) if part.is_added == is_action else (),
@@ -175,14 +176,14 @@ def _classes(part: _Part, homes: Homes) -> ModuleView:
     )
 
 
-def _codecs(part: _Part, messages: plan.Messages) -> ModuleView:
+def _codecs(part: _ModulePart, messages: plan.Messages) -> ModuleView:
     name = part.interface.name
-    codecs = tuple(codec(one, part.references, messages) for one in part.structures)
+    codecs = tuple(codec(structure, part.references, messages) for structure in part.structures)
     return ModuleView(
         template="codec",
         path=f"{name.kind}/{python_names.codec_module(part.module)}.py",
         origin=f"{name}.{name.kind}",
-        pragmas=PRAGMAS if any(one.outside for one in codecs) else (),
+        pragmas=PRAGMAS if any(view.outside for view in codecs) else (),
         title=f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}.",
         codecs=codecs,
     )
@@ -239,28 +240,28 @@ def support_packages() -> list[str]:
 
 
 def module_files(
-    interface: ir.Interface, model: link.Model, modules: python_names.Modules, around: str = ""
+    interface: ir.Interface, model: link.Model, modules: python_names.Modules, parent: str = ""
 ) -> Iterator[RenderedFile]:
     """Yield the modules of one interface."""
     converts = model.distro.converts_values
-    for module in module_views(interface, model.messages, modules, around, converts=converts):
+    for module in module_views(interface, model.messages, modules, parent, converts=converts):
         template = _template(f"message/{module.template}.py.jinja")
         yield RenderedFile(module.path, template.render(module=module))
 
 
-def render_package(model: link.Model, around: str = "") -> tuple[RenderedFile, ...]:
+def render_package(model: link.Model, parent: str = "") -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
-    Other packages are imported from the Python package `around`, if that is not empty.
-    The model must be without errors: no `Unknown` type, nothing that is not found.
+    Other packages are imported from the Python package `parent`, if that is not empty.
+    The model must be without errors: no `Unknown` type, no missing one.
     """
     modules = python_names.modules(interface.name for interface in model.own)
-    files = [file for own in model.own for file in module_files(own, model, modules, around)]
+    files = [file for own in model.own for file in module_files(own, model, modules, parent)]
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = imports.package(model, kind, modules)
         text = _template("message/package_init.py.jinja").render(package=page)
         files.append(RenderedFile(page.path, text))
-    files.append(RenderedFile("_idlc/type_data.py", type_data_source(model, around)))
+    files.append(RenderedFile("_idlc/type_data.py", type_data_source(model, parent)))
     # a package without it would lose to any other of its name, wherever that stands on the path
     files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
     files.append(RenderedFile("py.typed", ""))

@@ -1,4 +1,4 @@
-"""Statements of an emitted function before they are text, and what can be dropped from them.
+"""Statements of an emitted function before they are text, and the removal of unread ones.
 
 The encoder notes the position after every value whose size is not constant; most of these notes
 are never read. `prune` drops them, `text_of` turns the rest into lines.
@@ -63,7 +63,7 @@ class Emitter:
 
     @contextmanager
     def within(self, head: str) -> Iterator[None]:
-        """Make what is emitted meanwhile the body of a compound statement."""
+        """Put the statements emitted meanwhile into the body of a compound statement."""
         outside, self.body = self.body, []
         yield
         outside.append(Block(head, tuple(self.body)))
@@ -131,7 +131,7 @@ def _interferes(statement: Statement, waiting: list[Put]) -> bool:
 
 
 def function(body: tuple[Statement, ...], indent: int, again: tuple[str, ...]) -> list[str]:
-    """Return the lines of a function that returns what `join` makes of its parts.
+    """Return the lines of a function that returns the result of `join` for its parts.
 
     Parts are collected as long as no position that they read changes. If one of the conditions
     of `again` is true in the end, the function begins anew.
@@ -181,9 +181,9 @@ def _joined(again: tuple[str, ...], indent: int) -> list[str]:
 
 
 class Mark(NamedTuple):
-    """What was named at some point."""
+    """A snapshot of the names defined so far."""
 
-    made: dict[Hashable, tuple[str, Node]]
+    definitions: dict[Hashable, tuple[str, Node]]
     names: frozenset[str]
 
 
@@ -192,56 +192,58 @@ class Tables:
 
     def __init__(self, names: python_names.Locals) -> None:
         self._names = names
-        self._made: dict[Hashable, tuple[str, Node]] = {}
+        self._definitions: dict[Hashable, tuple[str, Node]] = {}
 
     @property
     def definitions(self) -> tuple[tuple[str, Node], ...]:
         """Names and expressions, in order of first use."""
-        return tuple(self._made.values())
+        return tuple(self._definitions.values())
 
-    def local(self, wanted: str) -> str:
+    def local(self, name: str) -> str:
         """Return a free local variable."""
-        return self._names.new(wanted)
+        return self._names.new(name)
 
     def mark(self) -> Mark:
-        """Return what `reset` needs."""
-        return Mark(self._made.copy(), self._names.mark())
+        """Return a snapshot for `reset`."""
+        return Mark(self._definitions.copy(), self._names.mark())
 
     def reset(self, mark: Mark) -> None:
         """Forget everything named since `mark`."""
-        self._made = mark.made
+        self._definitions = mark.definitions
         self._names.reset(mark.names)
 
-    def define(self, wanted: str, key: Hashable, expression: Node) -> str:
+    def define(self, name: str, key: Hashable, expression: Node) -> str:
         """Return the name of an expression, making it on first use of `key`."""
-        known = self._made.get(key)
-        if known is None:
-            known = self._made[key] = (self._names.new(wanted), expression)
-        return known[0]
+        definition = self._definitions.get(key)
+        if definition is None:
+            definition = self._definitions[key] = (self._names.new(name), expression)
+        return definition[0]
 
-    def made(self, wanted: str, function: str, *arguments: str, after: str = "") -> str:
-        """Return the name of what a runtime function makes for the byte order."""
+    def ordered_call(self, name: str, function: str, *arguments: str, after: str = "") -> str:
+        """Return the name of a runtime function's result for the byte order."""
         value = Group(f"_idlc.{function}", ("order", *arguments), after)
-        return self.define(wanted, (function, *arguments, after), value)
+        return self.define(name, (function, *arguments, after), value)
 
     def function(self, name: str, expression: str) -> str:
         """Return the name of a runtime function."""
         return self.define(name, expression, f"_idlc.{expression}")
 
     def reader(self, fields: str, start: int | None) -> str:
-        """Return what unpacks a run: a function, or without `start` a table by position."""
+        """Return the reader of a group: a function, or without `start` a table by position."""
         name = f"read_{_content(fields)}"
         if start is None:
-            return self.made(f"{name}_at", "phases", f'"{fields}"')
+            return self.ordered_call(f"{name}_at", "phases", f'"{fields}"')
         arguments = (f'"{fields}"', f"start={start}") if start else (f'"{fields}"',)
-        return self.made(name, "layout", *arguments, after=".unpack_from")
+        return self.ordered_call(name, "layout", *arguments, after=".unpack_from")
 
     def rows(self, fields: str) -> str:
         """Return the function that yields the values of one structure after the other."""
-        return self.made("read_rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack")
+        return self.ordered_call(
+            "read_rows", "layout", f'"{fields}"', "start=4", after=".iter_unpack"
+        )
 
     def writer(self, fields: str, texts: bool, start: int | None, align: int) -> str:
-        """Return what packs a frame: a function, or a table by text size or by position."""
+        """Return the writer of a group: a function, or a table by text size or by position."""
         name = f"write_{_content(fields)}"
         arguments = [f'"{fields}"']
         if start:
@@ -249,10 +251,10 @@ class Tables:
         if align > 1:
             arguments.append(f"align={align}")
         if start is None:
-            return self.made(f"{name}_at", "text_phases" if texts else "phases", *arguments)
+            return self.ordered_call(f"{name}_at", "text_phases" if texts else "phases", *arguments)
         if texts:
-            return self.made(name, "Texts", *arguments)
-        return self.made(name, "layout", *arguments, after=".pack")
+            return self.ordered_call(name, "Texts", *arguments)
+        return self.ordered_call(name, "layout", *arguments, after=".pack")
 
     def pad(self, align: int) -> str:
         """Return the table of padding to `align`, by position."""
@@ -338,7 +340,7 @@ class Tables:
 
 
 def _content(fields: str) -> str:
-    """Return a word for what a layout consists of."""
+    """Return a word for the content of a layout."""
     if fields.startswith("4s"):
         return "head"
     if "*" in fields:

@@ -18,12 +18,12 @@ DEEPEST = 100
 
 
 def files_of(folder: Path) -> tuple[list[Path], list[str]]:
-    """Return the files of a bag in their order, and what there is to say of them."""
+    """Return the files of a bag in their order, and notes about them."""
     try:
-        found = sorted((one for one in folder.iterdir() if one.is_file()), key=_natural)
+        files = sorted((file for file in folder.iterdir() if file.is_file()), key=_natural)
     except OSError as error:
         raise RecordingError(f"`{folder}` cannot be read: {error.strerror}") from None
-    present = {one.name: one for one in found if one.name.endswith(SUFFIXES + COMPRESSED)}
+    present = {file.name: file for file in files if file.name.endswith(SUFFIXES + COMPRESSED)}
     notes = []
     metadata = folder / METADATA
     if metadata.is_file():
@@ -40,7 +40,7 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
             notes += [f"`{name}` is not named in {METADATA} and left out" for name in others]
             present = {name: present[name] for name in named if name in present}
     if not present:
-        inside = sorted(one.parent for one in folder.glob(f"*/{METADATA}"))
+        inside = sorted(path.parent for path in folder.glob(f"*/{METADATA}"))
         hint = (
             f"name a bag in it, such as `{inside[0]}`" if inside else "it has no .mcap or .db3 file"
         )
@@ -53,7 +53,7 @@ def files_of(folder: Path) -> tuple[list[Path], list[str]]:
 
 
 def _names(metadata: Path) -> list[str]:
-    """Return what `relative_file_paths` has; raise RecordingError if that cannot be read."""
+    """Return the names in `relative_file_paths`; raise RecordingError if they cannot be read."""
     import yaml
 
     try:
@@ -63,7 +63,7 @@ def _names(metadata: Path) -> list[str]:
         raise RecordingError(f"`{METADATA}` cannot be read: {error.strerror}") from None
     if len(text) > MOST_OF_METADATA:
         raise RecordingError(f"`{METADATA}` is larger than {MOST_OF_METADATA >> 20} MiB")
-    # the nodes of the file are all that is needed: nothing is made of them, and nothing is merged
+    # only the nodes of the file are needed: no objects are constructed, and nothing is merged
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
         depth = 0
@@ -82,7 +82,8 @@ def _names(metadata: Path) -> list[str]:
         for information in _values(root, "rosbag2_bagfile_information")
         for paths in _values(information, "relative_file_paths")
     ]
-    nodes = [node for one in lists if isinstance(one, yaml.SequenceNode) for node in one.value]
+    sequences = (node for node in lists if isinstance(node, yaml.SequenceNode))
+    nodes = [node for sequence in sequences for node in sequence.value]
     return [str(node.value) for node in nodes if isinstance(node, yaml.ScalarNode)]
 
 

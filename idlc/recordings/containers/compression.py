@@ -9,7 +9,7 @@ from typing import Any
 
 from idlc.recordings.containers.source import RecordingError
 
-#: What hands out new bytes does so for this many at a time.
+#: Decompressors that return new bytes return this many at a time.
 PIECE = 1 << 22
 #: A chunk may not be larger, whatever it says: no writer makes chunks that come near.
 MOST_IN_A_CHUNK = 1 << 29
@@ -18,34 +18,34 @@ MOST_IN_A_CHUNK = 1 << 29
 MOST_GROWTH, ANY_GROWTH = 10_000, MOST_IN_A_CHUNK
 #: How many records there may be for each byte of a file, and in any case.
 MOST_RECORDS, ANY_RECORDS = 2, 1 << 20
-#: Has one decompressor of zstd: making one for each chunk takes a tenth of the time, and threads
-#: cannot share it.
+#: Holds the zstd decompressor of a thread: a new one for each chunk would add a tenth of the
+#: time, and threads cannot share one.
 _THREAD = threading.local()
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
 def check_size(size: int) -> None:
-    """Raise RecordingError if a chunk declares more than there is room for."""
+    """Raise RecordingError if a chunk declares more bytes than a chunk may have."""
     if size > MOST_IN_A_CHUNK:
         raise RecordingError(f"a chunk declares {size:,} bytes, more than {MOST_IN_A_CHUNK:,}")
 
 
 class Room:
-    """How much compressed parts of a file may still hold, so that reading it takes linear time."""
+    """The bytes and records that a file may still decompress to, so that reading stays linear."""
 
     def __init__(self, size: int) -> None:
         self._bytes = ANY_GROWTH + MOST_GROWTH * size
         self._records = ANY_RECORDS + MOST_RECORDS * size
 
-    def take(self, size: int) -> None:
-        """Make room for so many bytes; raise RecordingError if there is none."""
+    def reserve(self, size: int) -> None:
+        """Reserve room for so many bytes; raise RecordingError if there is none."""
         check_size(size)
         self._bytes -= size
         if self._bytes < 0:
             what = f"more than {MOST_GROWTH:,} times as much as the file"
             raise RecordingError(f"what is compressed in it holds {what}")
 
-    def each(self) -> Iterator[None]:
+    def records(self) -> Iterator[None]:
         """Yield for each record for which there is room; raise RecordingError after the last."""
         while self._records > 0:
             self._records -= 1
@@ -54,15 +54,15 @@ class Room:
 
 
 def decompress(data: memoryview, compression: str, target: memoryview) -> None:
-    """Write into `target` what a chunk holds; raise RecordingError if that is not its size."""
-    found = _decompressor(compression)(data, target) if compression else _copy(data, target)
-    if found != len(target):
-        more = "more" if found > len(target) else f"{found:,}"
+    """Decompress a chunk into `target`; raise RecordingError if the content has another size."""
+    size = _decompressor(compression)(data, target) if compression else _copy(data, target)
+    if size != len(target):
+        more = "more" if size > len(target) else f"{size:,}"
         raise RecordingError(f"a chunk declares {len(target):,} bytes and holds {more}")
 
 
-#: Writes what compressed bytes hold into a buffer, and returns how much that is: more by one, if it
-#: is more than there is room for.
+#: Decompresses bytes into a buffer, and returns their number: one more than the buffer's size if
+#: they do not fit.
 Decompressor = Callable[[memoryview, memoryview], int]
 
 
@@ -82,7 +82,7 @@ def _copy(data: memoryview | bytes, target: memoryview) -> int:
 
 
 def _zstd(data: memoryview, target: memoryview) -> int:
-    """A stream writes where it is told to; in one call, each chunk would be new memory."""
+    """Decompress by a stream, which writes into a buffer; one call would allocate each chunk."""
     try:
         import zstandard
     except ImportError:
@@ -100,9 +100,9 @@ def _zstd(data: memoryview, target: memoryview) -> int:
 
 
 def zstd_frame(data: bytes | memoryview, room: Room) -> bytes:
-    """Return what a message holds that is compressed by itself, and says how large it is."""
+    """Decompress a message that is compressed by itself and declares its size."""
     size = _declared(data)
-    room.take(size)
+    room.reserve(size)
     target = bytearray(size)
     decompress(memoryview(data), "zstd", memoryview(target))
     return bytes(target)
@@ -151,11 +151,11 @@ class _Lz4:
     def decompress(self, data: memoryview, max_length: int) -> bytes:
         """Return the next bytes."""
         rest = self._rest or data
-        found: bytes
-        found, read, self.eof = self._piece(self._context, rest, max_length=max_length)
+        piece: bytes
+        piece, read, self.eof = self._piece(self._context, rest, max_length=max_length)
         self._rest = rest[read:]
-        self.needs_input = len(found) < max_length
-        return found
+        self.needs_input = len(piece) < max_length
+        return piece
 
 
 def _by_pieces(decompressor: Any, data: memoryview, target: memoryview) -> int:
@@ -163,10 +163,10 @@ def _by_pieces(decompressor: Any, data: memoryview, target: memoryview) -> int:
     rest, done = data, 0
     while done <= len(target):
         room = min(PIECE, len(target) - done + 1)
-        found = decompressor.decompress(rest, max_length=room)
-        size = min(len(found), len(target) - done)
-        target[done : done + size] = found[:size]
-        done += len(found)
+        piece = decompressor.decompress(rest, max_length=room)
+        size = min(len(piece), len(target) - done)
+        target[done : done + size] = piece[:size]
+        done += len(piece)
         rest = memoryview(b"")
         if decompressor.eof or decompressor.needs_input:
             break

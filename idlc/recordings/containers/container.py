@@ -1,4 +1,4 @@
-"""What is in a recording, whichever kind of file it is and in however many pieces."""
+"""The content of a recording, of any kind of file and in any number of pieces."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ class Schema:
 
     @property
     def is_blank(self) -> bool:
-        """Whether it says nothing, as that of a message without fields does."""
+        """True if it has no text, as the definition of a message without fields."""
         return not self.text.strip()
 
 
 @dataclass(frozen=True)
 class Topic:
-    """What was recorded under one name, of one type.
+    """The messages recorded under one name, of one type.
 
     `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
     the recording has no definition.
@@ -76,7 +76,7 @@ class Topic:
 
 
 class File:
-    """What can be closed, also by leaving a `with` statement."""
+    """A base of files that are closed by `close`, or by leaving a `with` statement."""
 
     def close(self) -> None:
         """Release the file."""
@@ -101,21 +101,21 @@ class McapFile(File):
         with of_file(self.name):
             self.facts = read_facts(self.source, index, check) if read else McapFacts()
         self.notes = [f"{Path(self.name).name}: {note}" for note in self.facts.notes]
-        self.topics: list[tuple[Topic, int]] = [self._topic(one) for one in self.facts.channels]
+        self.topics: list[tuple[Topic, int]] = list(map(self._topic, self.facts.channels))
 
     def _topic(self, number: int) -> tuple[Topic, int]:
         facts = self.facts
         channel = facts.channels[number]
-        found = facts.schemas.get(channel.schema)
-        name = full_name(found.name) if found else ""
-        schema = _schema(name, found.encoding, found.text) if found else None
+        recorded = facts.schemas.get(channel.schema)
+        name = full_name(recorded.name) if recorded else ""
+        schema = _schema(name, recorded.encoding, recorded.text) if recorded else None
         count = facts.counts.get(number, 0)
         digest = channel.metadata.get("topic_type_hash") or None
         return Topic(channel.topic, name, count, digest, channel.encoding, schema), number
 
     @property
     def start(self) -> int | None:
-        """When the first message came."""
+        """The time of the first message."""
         return self.facts.start
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
@@ -123,7 +123,7 @@ class McapFile(File):
         return first_messages(self.source, self.facts, self.facts.channels)
 
     def pieces(self, channels: Collection[int], window: Window) -> list[Chunk]:
-        """Return where messages of some channels may be, with no more indexes than of these."""
+        """Return the chunks that may hold messages of some channels, with the indexes of these."""
         from idlc.recordings.containers.messages import may_have
 
         mine: dict[int, bytes] = {}
@@ -131,42 +131,42 @@ class McapFile(File):
             entries = self._indexes.get(channel, ())
             for number, at in zip(entries[::2], entries[1::2], strict=True):
                 mine[number] = mine.get(number, b"") + INDEX_OFFSET.pack(channel, at)
-        found = [
+        chunks = [
             chunk._replace(indexes=mine.get(number))
             for number, chunk in enumerate(self.facts.chunks)
             if number in mine or chunk.indexes is None
         ]
         if window != (None, None):
-            found = self._checked(found, channels)
-        return [one for one in found if may_have(one, window)]
+            chunks = self._checked(chunks, channels)
+        return [chunk for chunk in chunks if may_have(chunk, window)]
 
     @cached_property
     def _indexes(self) -> dict[int, array[int]]:
-        """Of each channel the numbers of chunks, each followed by where its MessageIndex is."""
-        found: dict[int, array[int]] = defaultdict(lambda: array("Q"))
+        """By channel the numbers of chunks, each followed by the offset of its MessageIndex."""
+        indexes: dict[int, array[int]] = defaultdict(lambda: array("Q"))
         for number, chunk in enumerate(self.facts.chunks):
             for channel, at in INDEX_OFFSET.iter_unpack(chunk.indexes or b""):
-                found[channel].extend((number, at))
-        return found
+                indexes[channel].extend((number, at))
+        return indexes
 
     def _checked(self, chunks: list[Chunk], channels: Collection[int]) -> list[Chunk]:
         """Return chunks of some channels, without their indexes if these may be incomplete.
 
-        Raises RecordingError if they are: otherwise, messages would be missing from a window. In
-        stores that is not looked for, because each index is a request there.
+        Raises RecordingError if the indexes miss messages, which a window would miss, too. In
+        stores that is not checked, because each index is a request there.
         """
         from idlc.recordings.containers.messages import count
 
         loose, counts = self.facts.loose, self.facts.counts
-        whole = [one for one in chunks if one.compression is not None]
+        whole = [chunk for chunk in chunks if chunk.compression is not None]
         if loose is None or not is_local(self.place):
             return chunks
-        if any(one.indexes is None for one in whole):
-            return [one._replace(indexes=None) for one in self.facts.chunks]
+        if any(chunk.indexes is None for chunk in whole):
+            return [chunk._replace(indexes=None) for chunk in self.facts.chunks]
         with of_file(self.name):
-            told = sum(counts.get(one, 0) - loose.get(one, 0) for one in channels)
+            counted = sum(counts.get(number, 0) - loose.get(number, 0) for number in channels)
             name = self.facts.channels[next(iter(channels))].topic
-            check_count(name, told, sum(count(self.source, one) for one in whole))
+            check_count(name, counted, sum(count(self.source, chunk) for chunk in whole))
         return chunks
 
     def messages(
@@ -191,15 +191,15 @@ class Db3File(File):
         self.database = Db3(path)
         self.notes = self.database.notes
         self.topics: list[tuple[Topic, int]] = []
-        for one in self.database.topics() if read else ():
-            name = full_name(one.type)
-            schema = _schema(name, one.schema_encoding, one.text)
-            topic = Topic(one.name, name, one.messages, one.hash or None, one.encoding, schema)
-            self.topics.append((topic, one.id))
+        for row in self.database.topics() if read else ():
+            name = full_name(row.type)
+            schema = _schema(name, row.schema_encoding, row.text)
+            topic = Topic(row.name, name, row.messages, row.hash or None, row.encoding, schema)
+            self.topics.append((topic, row.id))
 
     @property
     def start(self) -> int | None:
-        """When the first message came."""
+        """The time of the first message."""
         return self.database.start()
 
     def first_messages(self) -> Iterator[tuple[int, bytes]]:
@@ -207,7 +207,7 @@ class Db3File(File):
         return self.database.first_messages()
 
     def pieces(self, topics: Collection[int], window: Window) -> list[Rows]:  # noqa: ARG002
-        """Return where messages of some topics may be."""
+        """Return the rows that may hold messages of some topics."""
         return self.database.rows_of_messages()
 
     def messages(
@@ -234,49 +234,49 @@ class Container(File):
 
     @cached_property
     def _places(self) -> dict[tuple[str, str, str], list[tuple[int, Topic, int]]]:
-        """Of each topic, whatever its definition: number of the file, and what that says of it."""
-        found: dict[tuple[str, str, str], list[tuple[int, Topic, int]]] = {}
+        """By topic, with any definition: the number of the file, its topic and the id in it."""
+        places: dict[tuple[str, str, str], list[tuple[int, Topic, int]]] = {}
         for index, file in enumerate(self.files):
             for topic, number in file.topics:
-                found.setdefault(_key(topic), []).append((index, topic, number))
-        return found
+                places.setdefault(_key(topic), []).append((index, topic, number))
+        return places
 
     def ids_of(self, topic: Topic) -> Iterator[tuple[McapFile | Db3File, list[int], int]]:
-        """Yield each file with messages of a topic, what it calls the topic, and their count."""
+        """Yield each file with messages of a topic, its ids of the topic, and their count."""
         mine: dict[int, dict[int, int]] = {}
-        for index, one, number in self._places.get(_key(topic), ()):
-            if one.schema == topic.schema or _is_bare(one):
-                mine.setdefault(index, {})[number] = one.count
+        for index, in_file, number in self._places.get(_key(topic), ()):
+            if in_file.schema == topic.schema or _is_bare(in_file):
+                mine.setdefault(index, {})[number] = in_file.count
         for index, counts in mine.items():
             yield self.files[index], list(counts), sum(counts.values())
 
     def messages(self, topic: Topic, window: Window) -> Iterator[Messages]:
         """Yield the messages of a topic, many at a time, in the order of the recording."""
-        for file, ids, told in self.ids_of(topic):
-            found = 0
-            for some in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
-                found += len(some)
-                yield some
+        for file, ids, counted in self.ids_of(topic):
+            total = 0
+            for batch in file.messages(ids, file.pieces(ids, window), window):  # type: ignore[arg-type]
+                total += len(batch)
+                yield batch
             if window == (None, None):
                 with of_file(file.name):
-                    check_count(topic.name, told, found)
+                    check_count(topic.name, counted, total)
 
     def unread(self) -> list[Unread]:
-        """Return which topics cannot be read, by the first message of each."""
-        found: dict[Unread, None] = {}
+        """Return the topics that cannot be read, judging by the first message of each."""
+        reasons: dict[Unread, None] = {}
         for file in self.files:
-            names = {number: one.name for one, number in file.topics if one.encoding == CDR}
+            names = {number: topic.name for topic, number in file.topics if topic.encoding == CDR}
             with suppress(RecordingError):  # reading the messages says what is wrong
                 for number, start in file.first_messages():
                     why = unread(names[number], start) if number in names else None
                     if why:
-                        found[why] = None
-        return list(found)
+                        reasons[why] = None
+        return list(reasons)
 
     def start(self) -> int:
         """Return when the first message came; 0 if there is none."""
-        found = [file.start for file in self.files]
-        return min((time for time in found if time is not None), default=0)
+        starts = [file.start for file in self.files]
+        return min((time for time in starts if time is not None), default=0)
 
     def close(self) -> None:
         """Close all files."""
@@ -292,9 +292,9 @@ def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Con
     compares checksums.
     """
     if isinstance(path, (list, tuple)):
-        opened = _all_or_none(path, lambda one: open_recording(one, index=index, check=check))
-        files = [file for one in opened for file in one.files]
-        return Container(", ".join(one.name for one in opened), files, ())
+        opened = _all_or_none(path, lambda place: open_recording(place, index=index, check=check))
+        files = [file for container in opened for file in container.files]
+        return Container(", ".join(container.name for container in opened), files, ())
     if not is_local(path):
         return Container(str(path), [McapFile(path, index, check)], ())
     path = Path(path)
@@ -305,27 +305,27 @@ def open_recording(path: Any, *, index: bool = True, check: bool = False) -> Con
 
 
 def open_pieces(place: Any) -> McapFile | Db3File:
-    """Open a file for pieces of it that are known: nothing else is read."""
+    """Open a file to read pieces of it that are known: nothing else is read."""
     if is_local(place) and Path(place).suffix == DB3:
         return Db3File(Path(place), read=False)
     return McapFile(place, read=False)
 
 
 def _all_or_none(places: Iterable[Any], opened: Callable[[Any], Opened]) -> list[Opened]:
-    """Return what is opened at all places; close it all if one of them fails."""
-    found: list[Opened] = []
+    """Return the opened files; close all if one of them fails."""
+    files: list[Opened] = []
     try:
         for place in places:
-            found.append(opened(place))  # noqa: PERF401 # those before are closed
+            files.append(opened(place))  # noqa: PERF401 # files opened before are closed
     except RecordingError:
-        for one in found:
-            one.close()
+        for file in files:
+            file.close()
         raise
-    return found
+    return files
 
 
 def _open_file(path: Path, index: bool, check: bool) -> McapFile | Db3File:
-    """Open one file, by what it begins with."""
+    """Open one file, by its first bytes."""
     hint: str | None = None
     if path.name == bag.METADATA:
         hint = f"name the folder: `{path.parent}`"
@@ -362,35 +362,36 @@ def _is_bare(topic: Topic) -> bool:
 
 
 def _key(topic: Topic) -> tuple[str, str, str]:
-    """Return what is the same of all channels that may belong to a topic."""
+    """Return the properties that all channels of a topic share."""
     return topic.name, topic.type, topic.encoding
 
 
-def check_count(topic: str, told: int, found: int) -> None:
-    """Raise RecordingError if there are other messages than are counted."""
-    if told != found:
+def check_count(topic: str, counted: int, actual: int) -> None:
+    """Raise RecordingError if the number of messages is not the counted one."""
+    if counted != actual:
         hint = "--no-index, or Recording(path, index=False), reads without what the file counts"
-        what = f"{told:,} messages of `{topic}` are counted, and there are {found:,}"
+        what = f"{counted:,} messages of `{topic}` are counted, and there are {actual:,}"
         raise RecordingError(what, hint)
 
 
 def _merged(files: list[McapFile | Db3File]) -> Iterable[Topic]:
     """Yield each topic once: several channels and files may have it."""
-    found: dict[tuple[str, str, str], list[Topic]] = {}
+    by_key: dict[tuple[str, str, str], list[Topic]] = {}
     for file in files:
         for topic, _ in file.topics:
-            found.setdefault(_key(topic), []).append(topic)
-    for same in found.values():
+            by_key.setdefault(_key(topic), []).append(topic)
+    for same in by_key.values():
         by_schema: dict[Schema | None, list[Topic]] = {}
         for topic in same:
             by_schema.setdefault(None if _is_bare(topic) else topic.schema, []).append(topic)
         # without a definition, a channel belongs to each of the others
-        bare = _joined(sorted(by_schema.pop(None, []), key=lambda one: one.schema is None))
+        bare = _joined(sorted(by_schema.pop(None, []), key=lambda topic: topic.schema is None))
         for mine in by_schema.values() or [[]]:
             yield _joined([*mine, *bare])[0]
 
 
 def _joined(same: list[Topic]) -> list[Topic]:
-    """Return what channels have in common, if there is any, the first definition and hash of it."""
-    digest = next((one.hash for one in same if one.hash), None)
-    return [replace(one, count=sum(x.count for x in same), hash=digest) for one in same[:1]]
+    """Return at most one topic for channels: their total, their first definition and hash."""
+    digest = next((topic.hash for topic in same if topic.hash), None)
+    total = sum(topic.count for topic in same)
+    return [replace(topic, count=total, hash=digest) for topic in same[:1]]

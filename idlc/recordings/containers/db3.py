@@ -1,4 +1,4 @@
-"""What is in a .db3 file of rosbag2, which is an SQLite database.
+"""The content of a .db3 file of rosbag2, which is an SQLite database.
 
 Such a file can come from anybody. It is opened for reading only, nothing that it defines besides
 tables is accepted, and values are taken only of the types that a recorder writes.
@@ -19,7 +19,7 @@ from idlc.recordings.containers.source import START, RecordingError, first_bytes
 MAGIC = b"SQLite format 3\0"
 #: Hidden columns of these kinds are computed by the file.
 COMPUTED = {2, 3}
-#: What the header says at byte 18 of a database that is written by way of a log, `-wal`.
+#: Byte 18 of the header of a database that is written by way of a log, `-wal`.
 WRITES_A_LOG = 2
 #: Seconds to wait for a writer that has locked the file.
 PATIENCE = 5.0
@@ -60,7 +60,7 @@ class Db3:
         with self.errors():
             location = f"file:{quote(str(self._path))}?mode=ro{'&immutable=1' * self._lone}"
             self._db = sqlite3.connect(location, PATIENCE, uri=True, check_same_thread=False)
-            # a mapped file that somebody cuts off would end the process
+            # truncating a mapped file would kill the process
             for pragma in (
                 *("trusted_schema=OFF", "query_only=ON", "cell_size_check=ON", "mmap_size=0"),
             ):
@@ -74,7 +74,7 @@ class Db3:
 
     @property
     def notes(self) -> list[str]:
-        """What is unusual about the file."""
+        """Notes about anomalies of the file."""
         if not self._lone:
             return []
         name, log = self._path.name, self._log.name
@@ -92,14 +92,14 @@ class Db3:
 
     @contextmanager
     def errors(self) -> Iterator[None]:
-        """Turn what SQLite finds wrong into an error about the recording."""
+        """Turn errors of SQLite into errors about the recording."""
         try:
             yield
         except (sqlite3.Error, OSError, OverflowError, UnicodeError) as error:
             raise self._error(str(error)) from None
 
     def _error(self, what: str) -> RecordingError:
-        """Return an error that says what can be done about what SQLite found."""
+        """Return an error with a hint for a problem that SQLite reports."""
         repair = f"sqlite3 {shlex.quote(self.name)} .schema"
         if "readonly" in what:  # it would have to write to roll back
             why = "is not whole: its writer stopped in the middle of a transaction"
@@ -115,14 +115,14 @@ class Db3:
     def rows(
         self, query: str, values: tuple[Any, ...] = ()
     ) -> Generator[tuple[Any, ...], None, None]:
-        """Yield what a query finds; the file is locked until it is exhausted or closed."""
-        with self.errors(), closing(self._db.execute(query, values)) as found:
-            yield from found
+        """Yield the rows of a query; the file is locked until it is exhausted or closed."""
+        with self.errors(), closing(self._db.execute(query, values)) as cursor:
+            yield from cursor
             if self._lone:
                 self._check_unchanged()
 
     def _check_unchanged(self) -> None:
-        """Raise RecordingError if somebody wrote to a file that was read without a lock."""
+        """Raise RecordingError if a file that was read without a lock has changed."""
         now, then = self._path.stat(), self._state
         if self._is_in_use() or (now.st_mtime_ns, now.st_size) != (then.st_mtime_ns, then.st_size):
             raise RecordingError(f"`{self.name}` was changed while it was read", "read it again")
@@ -135,7 +135,7 @@ class Db3:
 
     def _tables(self) -> dict[str, set[str]]:
         """Return each table's columns; raise RecordingError if there are others than plain ones."""
-        found: dict[str, set[str]] = {}
+        tables: dict[str, set[str]] = {}
         for kind, name, text in self.rows("SELECT type, name, sql FROM sqlite_master"):
             if kind == "index":
                 continue
@@ -151,14 +151,14 @@ class Db3:
             if "rowid" in {str(column[1]).lower() for column in columns}:
                 # it hides the numbers of rows, which no two have in common
                 raise RecordingError(f"`{self.name}`: a column of `{name}` is called rowid")
-            found[str(name)] = {str(column[1]) for column in columns}
+            tables[str(name)] = {str(column[1]) for column in columns}
         for table, needed in (
             ("topics", {"id", "name", "type"}),
             ("messages", {"topic_id", "data"}),
         ):
-            if not needed <= found.get(table, set()):
+            if not needed <= tables.get(table, set()):
                 raise RecordingError(f"`{self.name}` is no recording: it has no table of {table}")
-        return found
+        return tables
 
     def topics(self) -> list[Db3Topic]:
         """Return the topics, with their definitions where the file has any."""
@@ -172,15 +172,15 @@ class Db3:
             if not isinstance(number, int) or not all(isinstance(text, str) for text in texts):
                 raise RecordingError(f"`{self.name}`: a topic has values of other types")
             name, kind, encoding, digest = texts
-            # the definition of a service goes with its events
-            known = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
-            schema_encoding, text, other = known or ("", "", "")
+            # the definition of a service is that of its events, too
+            recorded = definitions.get(kind) or definitions.get(kind.removesuffix("_Event"))
+            schema_encoding, text, other = recorded or ("", "", "")
             definition = (digest or other, schema_encoding, text, counts.get(number, 0))
             topics.append(Db3Topic(number, name, kind, encoding, *definition))
         return topics
 
     def first_messages(self) -> Iterator[tuple[Any, bytes]]:
-        """Yield topics with how their first messages begin; few pages of large ones are read."""
+        """Yield topics with the start of their first messages; few pages of large ones are read."""
         query = "SELECT topic_id, MIN(rowid) FROM messages NOT INDEXED GROUP BY topic_id"
         for topic, row in list(self.rows(query)):
             for (data,) in self.rows("SELECT data FROM messages WHERE rowid = ?", (row,)):
@@ -188,17 +188,17 @@ class Db3:
                     yield topic, data[:START]
 
     def rows_of_messages(self) -> list[Rows]:
-        """Return the rows that there are, in one piece; none if there are no messages."""
+        """Return all rows in one piece; empty if there are no messages."""
         # one query for both would go over all rows
         query = "SELECT {}(rowid) FROM messages NOT INDEXED"
-        first, last = (next(self.rows(query.format(one)))[0] for one in ("MIN", "MAX"))
+        first, last = (next(self.rows(query.format(aggregate)))[0] for aggregate in ("MIN", "MAX"))
         whole = isinstance(first, int) and isinstance(last, int)
         return [Rows(first, last)] if whole else []
 
     def start(self) -> int | None:
-        """Return when the first message came."""
-        ((found,),) = self.rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
-        return found if isinstance(found, int) else None
+        """Return the time of the first message."""
+        ((time,),) = self.rows("SELECT MIN(timestamp) FROM messages NOT INDEXED")
+        return time if isinstance(time, int) else None
 
     def _definitions(self) -> dict[str, tuple[str, str, str]]:
         """Return encoding, text and hash of each type."""
@@ -208,15 +208,15 @@ class Db3:
         digest = "type_description_hash" if "type_description_hash" in columns else "''"
         # the text may be in any encoding, as comments are
         names = f"topic_type, encoding, CAST(encoded_message_definition AS BLOB), {digest}"
-        found: dict[str, tuple[str, str, str]] = {}
+        definitions: dict[str, tuple[str, str, str]] = {}
         for kind, *texts in self.rows(f"SELECT {names} FROM message_definitions ORDER BY rowid"):  # noqa: S608 # ours
             encoding, text, other = (
-                str(one, "utf-8", "replace") if isinstance(one, bytes) else str(one or "")
-                for one in texts
+                str(value, "utf-8", "replace") if isinstance(value, bytes) else str(value or "")
+                for value in texts
             )
-            if not found.get(kind, ("", "", ""))[1]:
-                found[kind] = ("" if encoding == "unknown" else encoding, text, other)
-        return found
+            if not definitions.get(kind, ("", "", ""))[1]:
+                definitions[kind] = ("" if encoding == "unknown" else encoding, text, other)
+        return definitions
 
     def _counts(self) -> dict[int, int]:
         return dict(

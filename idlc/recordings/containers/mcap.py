@@ -1,7 +1,7 @@
-"""What is in an MCAP file: from its summary, or from a walk over its records where that has none.
+"""The content of an MCAP file: from its summary, or from a walk over its records without one.
 
 The summary is at the end, so a recorder that died wrote none, and other writers leave parts of it
-out. It is believed only if it accounts for all that its own statistics count.
+out. It is used only if it accounts for all that its own statistics count.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Channel(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """Where messages are: a chunk, or records outside of any, whose `compression` is None.
+    """A range with messages: a chunk, or records outside of any, whose `compression` is None.
 
     `indexes` has channels and places of its MessageIndex records, packed; None if it has none.
     They take `index_size` bytes behind it.
@@ -64,7 +64,7 @@ class Chunk(NamedTuple):
 
 
 class Statistics(NamedTuple):
-    """What the writer counted."""
+    """The counts of the writer."""
 
     messages: int
     chunks: int
@@ -80,7 +80,7 @@ class Fields:
         self.at = 0
         self.what = what
 
-    def take(self, size: int) -> memoryview:
+    def read(self, size: int) -> memoryview:
         """Return the next bytes."""
         left = len(self.data) - self.at
         if size > left:
@@ -90,15 +90,15 @@ class Fields:
 
     def number(self, size: int) -> int:
         """Return an unsigned number of so many bytes."""
-        return int.from_bytes(self.take(size), "little")
+        return int.from_bytes(self.read(size), "little")
 
     def name(self) -> str:
-        """Return a short text; bytes that are none stay visible, so that names stay different."""
-        return str(self.take(self.number(4)), "utf-8", "backslashreplace")
+        """Return a short text; invalid bytes stay visible, so that names stay different."""
+        return str(self.read(self.number(4)), "utf-8", "backslashreplace")
 
     def part(self) -> Fields:
-        """Return what a size of four bytes and so many bytes hold."""
-        return Fields(self.take(self.number(4)), self.what)
+        """Return the fields of a part, which its size of four bytes precedes."""
+        return Fields(self.read(self.number(4)), self.what)
 
     def more(self) -> bool:
         """Return whether something is left."""
@@ -106,7 +106,7 @@ class Fields:
 
 
 def read_records(data: memoryview) -> Iterator[tuple[int, int, memoryview]]:
-    """Yield kind, place and content of each record; raise RecordingError if one is cut off."""
+    """Yield kind, offset and content of each record; raise RecordingError if one is cut off."""
     at, end = 0, len(data)
     while at < end:
         if end - at < HEAD.size:
@@ -122,7 +122,7 @@ def read_records(data: memoryview) -> Iterator[tuple[int, int, memoryview]]:
 
 
 def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
-    """Yield kind, place and size, with the head, of each record that is there as a whole."""
+    """Yield kind, offset and size, with the head, of each complete record."""
     while at + HEAD.size <= end:
         op, size = HEAD.unpack(source.view(at, HEAD.size))
         if not op or at + HEAD.size + size > end:
@@ -132,10 +132,10 @@ def heads(source: Source, at: int, end: int) -> Iterator[tuple[int, int, int]]:
 
 
 def read_schema(data: memoryview) -> McapSchema:
-    """Read a Schema record; what is no UTF-8 is replaced, as comments may be in any encoding."""
+    """Read a Schema record; invalid UTF-8 is replaced, as comments may be in any encoding."""
     fields = Fields(data, "a schema")
     number, name, encoding = fields.number(2), fields.name(), fields.name()
-    text = str(fields.take(fields.number(4)), "utf-8", "replace")
+    text = str(fields.read(fields.number(4)), "utf-8", "replace")
     return McapSchema(number, name, encoding, text)
 
 
@@ -159,7 +159,7 @@ def read_chunk_index(data: memoryview) -> Chunk:
     """Read a ChunkIndex record."""
     fields = Fields(data, "the index of a chunk")
     first, last, at, size = (fields.number(8) for _ in range(4))
-    indexes = bytes(fields.take(fields.number(4)))
+    indexes = bytes(fields.read(fields.number(4)))
     if len(indexes) % INDEX_OFFSET.size:
         raise RecordingError("the index of a chunk is broken: its offsets are cut off")
     index_size = fields.number(8)
@@ -170,9 +170,9 @@ def read_statistics(data: memoryview) -> Statistics:
     """Read a Statistics record."""
     fields = Fields(data, "the statistics")
     messages = fields.number(8)
-    fields.take(2 + 4 + 4 + 4)
+    fields.read(2 + 4 + 4 + 4)
     chunks, start = fields.number(4), fields.number(8)
-    fields.take(8)
+    fields.read(8)
     part, counts = fields.part(), {}
     while part.more():
         number = part.number(2)
@@ -181,7 +181,7 @@ def read_statistics(data: memoryview) -> Statistics:
 
 
 class ChunkHead(NamedTuple):
-    """What stands before the records of a chunk: these take `stored` bytes, from `start`."""
+    """The head of a chunk; its records take `stored` bytes, from `start`."""
 
     first: int
     last: int
@@ -193,7 +193,7 @@ class ChunkHead(NamedTuple):
 
 
 def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
-    """Read how a Chunk record begins."""
+    """Read the head of a Chunk record."""
     data = source.view(at + HEAD.size, min(size - HEAD.size, LONGEST_HEAD))
     fields = Fields(data, "a chunk")
     first, last, large, crc = fields.number(8), fields.number(8), fields.number(8), fields.number(4)
@@ -207,13 +207,13 @@ def read_chunk_head(source: Source, at: int, size: int) -> ChunkHead:
 END_OF_TIME = (1 << 64) - 1
 #: Bytes of a Message record before the message itself.
 MESSAGE_HEAD = 22
-#: How a message begins: with its sequence number between them.
+#: The start of a message: its channel and time, with its sequence number between them.
 CHANNEL_AND_TIME = Struct("<HIQ")
 
 
 @dataclass
 class McapFacts:
-    """What a file holds; `start` is when the first message came.
+    """The content of a file; `start` is the time of the first message.
 
     `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
     """
@@ -227,7 +227,7 @@ class McapFacts:
     notes: list[str] = field(default_factory=list)
 
     def add(self, op: int, data: memoryview) -> None:
-        """Take note of a schema or a channel; those of one id must be the same."""
+        """Add a schema or a channel; definitions of one id must be equal."""
         if op == SCHEMA_OP:
             schema = read_schema(data)
             if self.schemas.setdefault(schema.id, schema) != schema:
@@ -239,7 +239,7 @@ class McapFacts:
 
 
 def read_facts(source: Source, index: bool = True, check: bool = False) -> McapFacts:
-    """Return what a file holds; without `index`, whatever its summary says.
+    """Return the content of a file; without `index`, its summary is not used.
 
     `check` compares the summary's checksum.
     """
@@ -259,15 +259,15 @@ def read_facts(source: Source, index: bool = True, check: bool = False) -> McapF
 def first_messages(
     source: Source, facts: McapFacts, channels: Collection[int]
 ) -> Iterator[tuple[int, bytes]]:
-    """Yield channels with how their first messages begin; each chunk is opened at most once."""
-    waiting = {one for one in channels if facts.counts.get(one)}
+    """Yield channels with the start of their first messages; each chunk is opened at most once."""
+    waiting = {channel for channel in channels if facts.counts.get(channel)}
     room = Room(source.size)
     for chunk in facts.chunks:
         named = {channel for channel, _ in INDEX_OFFSET.iter_unpack(chunk.indexes or b"")}
         mine = waiting if chunk.indexes is None else waiting & named
         if not mine:
             continue
-        for data, _ in zip(_contents(source, chunk, room), room.each(), strict=False):
+        for data, _ in zip(_contents(source, chunk, room), room.records(), strict=False):
             number = int.from_bytes(data[:2], "little")
             if number in mine:
                 yield number, bytes(data[MESSAGE_HEAD:])
@@ -278,7 +278,7 @@ def first_messages(
 
 
 def _contents(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
-    """Yield how each message of a chunk, or of a stretch outside of any, begins."""
+    """Yield the start of each message of a chunk, or of a stretch outside of any."""
     most = MESSAGE_HEAD + START
     if chunk.compression is None:
         for op, at, size in heads(source, chunk.at, chunk.at + chunk.size):
@@ -293,18 +293,18 @@ def _contents(source: Source, chunk: Chunk, room: Room) -> Iterator[memoryview]:
 def _content(source: Source, chunk: Chunk, room: Room) -> memoryview:
     """Return the records of a chunk."""
     head = read_chunk_head(source, chunk.at, chunk.size)
-    room.take(head.size)
+    room.reserve(head.size)
     target = memoryview(bytearray(head.size))
     decompress(source.view(head.start, head.stored), head.compression, target)
     return target
 
 
 class ContradictionError(RecordingError):
-    """A summary is not only incomplete but wrong, and what was written with it may be, too."""
+    """A summary is not only incomplete but wrong, and the indexes written with it may be, too."""
 
 
 def _summary(source: Source, check: bool) -> McapFacts:
-    """Return what the summary says; raise RecordingError if it is not to be relied on."""
+    """Return the content by the summary; raise RecordingError if that is not reliable."""
     end = source.size - FOOTER.size - len(MAGIC)
     if end < len(MAGIC) or source.view(source.size - len(MAGIC), len(MAGIC)) != MAGIC:
         raise RecordingError("it was not closed")
@@ -325,20 +325,21 @@ def _summary(source: Source, check: bool) -> McapFacts:
             facts.chunks.append(read_chunk_index(content))
         elif op == STATISTICS_OP:
             statistics = read_statistics(content)
-    _believe(facts, statistics)
+    _check_summary(facts, statistics)
     _add_loose(source, facts, start)
     return facts
 
 
-def _believe(facts: McapFacts, statistics: Statistics | None) -> None:
-    """Raise RecordingError if a summary leaves something out, by its own count."""
+def _check_summary(facts: McapFacts, statistics: Statistics | None) -> None:
+    """Raise RecordingError if a summary is incomplete, by its own count."""
     if statistics is None:
         raise RecordingError("its summary has no statistics")
     if statistics.chunks != len(facts.chunks):
         raise ContradictionError("its summary names other chunks than it counts")
     if not statistics.counts.keys() <= facts.channels.keys():
         raise RecordingError("its summary does not name all channels")
-    if any(one.schema and one.schema not in facts.schemas for one in facts.channels.values()):
+    needed = {channel.schema for channel in facts.channels.values() if channel.schema}
+    if not needed <= facts.schemas.keys():
         raise RecordingError("its summary does not name all schemas")
     if statistics.messages != sum(statistics.counts.values()):
         raise ContradictionError("its summary counts messages in two ways")
@@ -349,7 +350,7 @@ def _believe(facts: McapFacts, statistics: Statistics | None) -> None:
 def _add_loose(source: Source, facts: McapFacts, start: int) -> None:
     """Add the stretches that no chunk covers and that have messages, in a file with a summary.
 
-    Raises RecordingError if the chunks are not where there is room for them.
+    Raises RecordingError if chunks overlap.
     """
     facts.chunks.sort(key=lambda chunk: chunk.at)
     end, gaps = len(MAGIC), []
@@ -399,7 +400,7 @@ class _Walk:
         self.damaged = False
 
     def content(self, at: int, size: int) -> memoryview:
-        """Return what a record holds."""
+        """Return the content of a record."""
         return self.source.view(at + HEAD.size, size - HEAD.size)
 
     def count(self, channel: int, messages: int, first: int) -> None:
@@ -410,7 +411,7 @@ class _Walk:
             self.facts.start = first
 
     def message(self, at: int, size: int) -> None:
-        """Take note of a message outside of any chunk."""
+        """Count a message outside of any chunk."""
         data = self.source.view(at + HEAD.size, min(size - HEAD.size, CHANNEL_AND_TIME.size))
         if len(data) == CHANNEL_AND_TIME.size:
             channel, _, time = CHANNEL_AND_TIME.unpack(data)
@@ -427,19 +428,19 @@ class _Walk:
             self.loose = None
 
     def chunk(self, at: int, size: int) -> None:
-        """Take note of a chunk."""
+        """Begin a chunk."""
         head = read_chunk_head(self.source, at, size)
         self.last = Chunk(at, size, head.first, head.last, head.compression, None)
 
     def index(self, at: int, size: int) -> None:
-        """Take note of the index of one channel in the chunk before it."""
+        """Add the index of one channel in the chunk before it."""
         fields = Fields(self.content(at, size), "the index of a chunk")
         channel, entries = fields.number(2), fields.number(4)
         self.entries[channel] = self.entries.get(channel, 0) + entries // 16
         self.offsets += INDEX_OFFSET.pack(channel, at)
 
     def end_of_chunk(self) -> None:
-        """Take note of what is in the chunk before, and of its indexes if they name all of it."""
+        """Add the chunk before, its messages, and its indexes if they name all of these."""
         if self.last is None:
             return
         counts: dict[int, int] = {}
@@ -449,14 +450,14 @@ class _Walk:
         except RecordingError as error:
             if not self.entries or not self.entries.keys() <= self.facts.channels.keys():
                 raise
-            # reading the topics that it holds says so again; the others are not lost with them
+            # reading the topics in it reports the problem again; other topics stay readable
             if not self.damaged:
                 what = f"the chunk at byte {self.last.at}, and perhaps others, cannot be read"
                 self.facts.notes.append(f"{what}: {error.message}")
             self.damaged = True
             content, counts = memoryview(b""), self.entries
             first, last = self.last.first, self.last.last
-        for (op, _, data), _ in zip(read_records(content), self.room.each(), strict=False):
+        for (op, _, data), _ in zip(read_records(content), self.room.records(), strict=False):
             self.facts.add(op, data)
             if op == MESSAGE_OP and len(data) >= CHANNEL_AND_TIME.size:
                 channel, _, time = CHANNEL_AND_TIME.unpack_from(data)
@@ -470,9 +471,9 @@ class _Walk:
 
 
 def _walk(source: Source, reason: str, index: bool) -> McapFacts:
-    """Return what the whole records of a file say; `reason` is why its summary is not used.
+    """Return the content by the complete records; `reason` says why the summary is not used.
 
-    Without `index`, those of chunks are not used either.
+    Without `index`, the indexes of chunks are not used either.
     """
     walk, ended, end = _Walk(source, index), False, len(MAGIC)
     for op, at, size in heads(source, end, source.size):

@@ -1,4 +1,4 @@
-"""Messages as they are recorded: bytes, and when they came."""
+"""Messages as they are recorded: bytes and times."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from idlc.recordings.containers.source import (
     within,
 )
 
-#: What numpy and Arrow can say of times ends here, in the year 2262.
+#: Times of numpy and Arrow end here, in the year 2262.
 END_OF_TIME = 1 << 63
 
 #: From this mean size on, messages are not copied to be one buffer.
@@ -34,7 +34,7 @@ Raw: TypeAlias = bytes | memoryview
 
 
 class Window(NamedTuple):
-    """From when, and until when, messages are wanted: nanoseconds, the end not included."""
+    """A range of times in nanoseconds; the end is not included."""
 
     start: int | None = None
     end: int | None = None
@@ -45,16 +45,16 @@ class Window(NamedTuple):
         return not before and (self.start is None or last >= self.start)
 
     def narrowed(self, start: int | None, end: int | None) -> Window:
-        """Return what this and another window have in common."""
-        starts = [one for one in (self.start, start) if one is not None]
-        ends = [one for one in (self.end, end) if one is not None]
+        """Return the intersection of this and another window."""
+        starts = [time for time in (self.start, start) if time is not None]
+        ends = [time for time in (self.end, end) if time is not None]
         return Window(max(starts, default=None), min(ends, default=None))
 
     def holds(self, times: Any) -> Any:
-        """Return which of these times are in it, or None if all are."""
+        """Return a mask of the times that are in it, or None if all are."""
         if self.start is None and self.end is None:
             return None
-        # numpy compares numbers of 64 bits, and what is asked for may have more
+        # numpy compares numbers of 64 bits, and limits may have more
         inside = np.full(len(times), self.start is None or self.start < END_OF_TIME)
         if self.start is not None and 0 < self.start < END_OF_TIME:
             inside &= times >= self.start
@@ -94,7 +94,7 @@ class Ranges(Messages):
     stops: Any
 
     def within(self, window: Window) -> Ranges:
-        """Return those of a window."""
+        """Return the messages in a window."""
         inside = window.holds(self.log_times)
         if inside is None or inside.all():
             return self
@@ -111,7 +111,7 @@ class Ranges(Messages):
 
 @dataclass(frozen=True)
 class Separate(Messages):
-    """Messages that are each by themselves: to join large ones would only be another copy."""
+    """Messages in buffers of their own: joining large ones would only copy them."""
 
     raws: list[Raw]
 
@@ -136,8 +136,8 @@ def joined(parts: Sequence[Messages]) -> Messages:
         return parts[0]
     none: Any = np.zeros(0, np.int64)
     log = np.concatenate([none, *(part.log_times for part in parts)])
-    found = [part.publish_times for part in parts if part.publish_times is not None]
-    publish = np.concatenate([none, *found]) if len(found) == len(parts) else None
+    publish_times = [part.publish_times for part in parts if part.publish_times is not None]
+    publish = np.concatenate([none, *publish_times]) if len(publish_times) == len(parts) else None
     ranges = [part for part in parts if isinstance(part, Ranges)]
     if len(ranges) == len(parts) and len({id(part.buffer) for part in ranges}) == 1:
         starts = np.concatenate([part.starts for part in ranges])
@@ -151,7 +151,7 @@ def joined(parts: Sequence[Messages]) -> Messages:
     return Ranges(log, publish, b"".join(raws), stops - sizes, stops)
 
 
-#: What stands before the bytes of a message.
+#: The head of a message's record.
 MESSAGE = np.dtype(
     [
         ("op", "u1"),
@@ -164,14 +164,14 @@ MESSAGE = np.dtype(
 )
 MESSAGE_HEAD = Struct("<BQH")
 LEAST = MESSAGE.itemsize - HEAD.size
-#: Neighbours are opened together up to so many bytes: few calls, and memory stays bounded.
+#: Adjacent chunks are read together up to so many bytes: few calls, and memory stays bounded.
 MCAP_GROUP = 1 << 24
-#: Where chunks are not compressed, what lies between messages is read too if it is smaller.
+#: In uncompressed chunks, gaps between messages are read too if they are smaller.
 NEAR = 1 << 15
 
 
 class Opened(NamedTuple):
-    """A chunk whose records stand in a buffer, from `start` to `stop`."""
+    """A chunk whose records are in a buffer, from `start` to `stop`."""
 
     chunk: Chunk
     start: int
@@ -185,19 +185,19 @@ def mcap_messages(
     window: Window,
     check: bool = False,
 ) -> Iterator[Messages]:
-    """Yield the messages of some channels in chunks, those of neighbours together."""
+    """Yield the messages of some channels in chunks, adjacent chunks together."""
     with of_file(source.name):
         room = Room(source.size)
-        wanted = (chunk for chunk in chunks if may_have(chunk, window))
-        groups = _groups(source, wanted, room)
+        matching = (chunk for chunk in chunks if may_have(chunk, window))
+        groups = _groups(source, matching, room)
         while True:
-            with source.opened():  # not while others work with what was read
+            with source.opened():  # closed while the caller uses the messages
                 group = next(groups, None)
                 if group is None:
                     return
-                made = _read(source, group, channels, room, check).within(window)
-            if len(made):
-                yield unpacked(made, room)
+                ranges = _read(source, group, channels, room, check).within(window)
+            if len(ranges):
+                yield unpacked(ranges, room)
 
 
 def _read(
@@ -207,33 +207,33 @@ def _read(
     room: Room,
     check: bool,
 ) -> Ranges:
-    """Return the messages of some channels in neighbours."""
+    """Return the messages of some channels in adjacent chunks."""
     buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
     opened, offsets, at = [], [], 0
     for chunk, head in group:
-        one = Opened(chunk, at, at := at + head.size)
-        found = _indexed(source, one, channels)
-        _fill(source, one, head, buffer, found, check)
-        if found is None:
-            found = np.array(_walked(buffer, one, channels, room), np.int64)
-        opened.append(one)
-        offsets.append(found)
+        entry = Opened(chunk, at, at := at + head.size)
+        places = _indexed(source, entry, channels)
+        _fill(source, entry, head, buffer, places, check)
+        if places is None:
+            places = np.array(_walked(buffer, entry, channels, room), np.int64)
+        opened.append(entry)
+        offsets.append(places)
     return _messages(buffer, opened, offsets, channels)
 
 
 def may_have(chunk: Chunk, window: Window) -> bool:
-    """Return whether messages of a time may be in a chunk, by what its index says."""
+    """Return whether messages of a window may be in a chunk, by its index."""
     return chunk.compression is None or window.overlaps(chunk.first, chunk.last)
 
 
 def count(source: Source, chunk: Chunk) -> int:
-    """Return how many messages the indexes of a chunk name."""
+    """Return the number of messages that the indexes of a chunk name."""
     places = INDEX_OFFSET.iter_unpack(chunk.indexes or b"")
     return sum(_entries(source, channel, at) // 16 for channel, at in places)
 
 
 def _head(source: Source, chunk: Chunk) -> ChunkHead:
-    """Return what stands before the records of a chunk."""
+    """Return the head of a chunk."""
     if chunk.compression is None:
         return ChunkHead(0, 0, chunk.size, 0, "", chunk.at, chunk.size)
     head = source.view(chunk.at, HEAD.size)
@@ -245,14 +245,14 @@ def _head(source: Source, chunk: Chunk) -> ChunkHead:
 def _groups(
     source: Source, chunks: Iterable[Chunk], room: Room
 ) -> Iterator[list[tuple[Chunk, ChunkHead]]]:
-    """Yield neighbours that are opened together."""
+    """Yield groups of adjacent chunks that are read together."""
     group: list[tuple[Chunk, ChunkHead]] = []
     size = 0
     for whole in chunks:
         for chunk in _divided(source, whole) if whole.compression is None else (whole,):
             head = _head(source, chunk)
             if head.compression:
-                room.take(head.size)
+                room.reserve(head.size)
             elif head.size != head.stored:
                 raise RecordingError("a chunk that is not compressed declares another size")
             if group and size + head.size > MCAP_GROUP:
@@ -276,10 +276,10 @@ def _divided(source: Source, stretch: Chunk) -> Iterator[Chunk]:
 
 
 def _fill(
-    source: Source, one: Opened, head: ChunkHead, buffer: memoryview, offsets: Any, check: bool
+    source: Source, opened: Opened, head: ChunkHead, buffer: memoryview, offsets: Any, check: bool
 ) -> None:
-    """Put the records of a chunk into a buffer, or those at some offsets if that suffices."""
-    target = buffer[one.start : one.stop]
+    """Read the records of a chunk into a buffer, or only those at `offsets` if that suffices."""
+    target = buffer[opened.start : opened.stop]
     check = check and head.crc != 0
     if head.compression:
         decompress(source.view(head.start, head.stored), head.compression, target)
@@ -288,13 +288,13 @@ def _fill(
             if offsets is None or check or not isinstance(source, LocalFile):
                 read(head.start, target)
             else:
-                _read_some(read, head.start, target, offsets - one.start)
+                _read_some(read, head.start, target, offsets - opened.start)
     if check and zlib.crc32(target) != head.crc:
-        raise RecordingError(f"the checksum of the chunk at byte {one.chunk.at} is wrong")
+        raise RecordingError(f"the checksum of the chunk at byte {opened.chunk.at} is wrong")
 
 
 def _read_some(read: Read, start: int, target: memoryview, offsets: Any) -> None:
-    """Read messages of a chunk that begins at `start`, neighbours together."""
+    """Read messages of a chunk that begins at `start`, adjacent ones together."""
     for near in np.split(offsets, np.flatnonzero(np.diff(offsets) > NEAR) + 1):
         if not len(near):
             return
@@ -307,27 +307,27 @@ def _read_some(read: Read, start: int, target: memoryview, offsets: Any) -> None
             read(start + stop, target[stop:end])
 
 
-def _indexed(source: Source, one: Opened, channels: Collection[int]) -> Any:
-    """Return where in the buffer the messages of some channels are; None without an index."""
-    if one.chunk.indexes is None:
+def _indexed(source: Source, opened: Opened, channels: Collection[int]) -> Any:
+    """Return the offsets in the buffer of the messages of some channels; None without an index."""
+    if opened.chunk.indexes is None:
         return None
-    found = [
+    parts = [
         np.frombuffer(source.view(at + HEAD.size + 6, _entries(source, channel, at)), "<u8")[1::2]
-        for channel, at in INDEX_OFFSET.iter_unpack(one.chunk.indexes)
+        for channel, at in INDEX_OFFSET.iter_unpack(opened.chunk.indexes)
         if channel in channels
     ]
-    offsets = np.concatenate([np.zeros(0, "<u8"), *found])
-    last = one.stop - one.start - MESSAGE.itemsize
+    offsets = np.concatenate([np.zeros(0, "<u8"), *parts])
+    last = opened.stop - opened.start - MESSAGE.itemsize
     if len(offsets) and (last < 0 or int(offsets.max()) > last):
         raise RecordingError("an index of messages leaves its chunk")
     offsets = offsets.astype(np.int64)
     if (offsets[1:] <= offsets[:-1]).any():
         offsets.sort()
-    return offsets + one.start
+    return offsets + opened.start
 
 
 def _entries(source: Source, channel: int, at: int) -> int:
-    """Return how many bytes of entries the MessageIndex at a place has, by its head."""
+    """Return the number of bytes of entries in the MessageIndex at `at`, by its head."""
     op, size = HEAD.unpack(source.view(at, HEAD.size))
     if op != mcap.MESSAGE_INDEX_OP:
         raise RecordingError(f"there is no index of messages at byte {at}, where another has one")
@@ -341,36 +341,36 @@ def _entries(source: Source, channel: int, at: int) -> int:
     return entries
 
 
-def _walked(view: memoryview, one: Opened, channels: Collection[int], room: Room) -> list[int]:
-    """Return where messages are, found by a walk from record to record."""
+def _walked(view: memoryview, opened: Opened, channels: Collection[int], room: Room) -> list[int]:
+    """Return the offsets of messages, by a walk from record to record."""
     unpack, ahead = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size
-    found, at, stop = [], one.start, one.stop
-    for _ in room.each():
+    places, at, stop = [], opened.start, opened.stop
+    for _ in room.records():
         if at + ahead > stop:
             break
         op, size, channel = unpack(view, at)
         if op == mcap.MESSAGE_OP and channel in channels:
-            found.append(at)
+            places.append(at)
         at += HEAD.size + size
     if at != stop and not (at < stop and at + HEAD.size + view[at + 1] == stop):
-        raise RecordingError(f"records of the chunk at byte {one.chunk.at} are cut off")
-    return found
+        raise RecordingError(f"records of the chunk at byte {opened.chunk.at} are cut off")
+    return places
 
 
 def _messages(
     buffer: memoryview, opened: list[Opened], offsets: list[Any], channels: Collection[int]
 ) -> Ranges:
-    """Return the messages at some offsets of a buffer, or fail if there are none."""
+    """Return the messages at some offsets of a buffer; raise RecordingError for others."""
     array: Any = np.frombuffer(buffer, np.uint8)
     at = np.concatenate(offsets)
-    counts = [len(one) for one in offsets]
-    ends = np.repeat(np.array([one.stop for one in opened], np.int64), counts)
+    counts = [len(part) for part in offsets]
+    ends = np.repeat(np.array([entry.stop for entry in opened], np.int64), counts)
     if (at + MESSAGE.itemsize > ends).any():
         raise RecordingError("a message is cut off")
     every = max(0, len(array) - MESSAGE.itemsize + 1)
     heads: Any = np.ndarray((every,), MESSAGE, array, strides=(1,))[at]
-    known = np.isin(heads["channel"], np.array(list(channels), np.uint16))
-    if not ((heads["op"] == mcap.MESSAGE_OP) & known).all():
+    of_channels = np.isin(heads["channel"], np.array(list(channels), np.uint16))
+    if not ((heads["op"] == mcap.MESSAGE_OP) & of_channels).all():
         raise RecordingError("an index names a place where there is no message of its channel")
     room = (ends - at - HEAD.size).astype(np.uint64)
     if ((heads["size"] < LEAST) | (heads["size"] > room)).any():
@@ -382,17 +382,17 @@ def _messages(
     return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)
 
 
-def unpacked(found: Ranges, room: Room) -> Messages:
+def unpacked(ranges: Ranges, room: Room) -> Messages:
     """Return messages without the compression that each may have by itself.
 
-    None begins like a zstd frame otherwise.
+    No other message begins like a zstd frame.
     """
-    array = np.frombuffer(found.buffer, np.uint8)
-    candidates = found.starts[found.stops > found.starts]
+    array = np.frombuffer(ranges.buffer, np.uint8)
+    candidates = ranges.starts[ranges.stops > ranges.starts]
     if not (array[candidates] == ZSTD_MAGIC[0]).any():
-        return found
-    raws = [plain(one, room) for one in found.views()]
-    return Separate(found.log_times, found.publish_times, raws)
+        return ranges
+    raws = [plain(raw, room) for raw in ranges.views()]
+    return Separate(ranges.log_times, ranges.publish_times, raws)
 
 
 def plain(data: Raw, room: Room) -> Raw:
@@ -400,7 +400,7 @@ def plain(data: Raw, room: Room) -> Raw:
     return zstd_frame(data, room) if data[:4] == ZSTD_MAGIC else data
 
 
-#: Rows are handed on together until they have so many bytes.
+#: Rows are yielded together until they have so many bytes.
 DB3_GROUP = 1 << 25
 #: SQLite has no other integers.
 SMALLEST, LARGEST = -(1 << 63), (1 << 63) - 1
@@ -425,7 +425,7 @@ def _group(
 ) -> tuple[list[int], list[Raw], int | None]:
     """Return times and contents of the first messages, and the row that is next, if any.
 
-    The file is locked meanwhile, and not when these are used: a recorder can go on writing.
+    The file is locked only meanwhile, so that a recorder can go on writing.
     """
     times: list[int] = []
     raws: list[Raw] = []
@@ -454,9 +454,9 @@ def _rows(
     )
     if start > end:
         return
-    found = database.rows(query, (*piece, *topics, start, end))
-    with closing(found):
-        for row, time, data in found:
+    rows = database.rows(query, (*piece, *topics, start, end))
+    with closing(rows):
+        for row, time, data in rows:
             if not isinstance(time, int) or not isinstance(data, bytes):
                 raise RecordingError("a message has values of other types")
             yield row, time, data if data[:4] != ZSTD_MAGIC else zstd_frame(data, room)

@@ -93,25 +93,25 @@ class Source(Protocol):
         """Return so many bytes; raise RecordingError if the file has fewer."""
 
     def opened(self) -> AbstractContextManager[Read]:
-        """Give what fills a buffer with the bytes that begin at a place.
+        """Give a function that fills a buffer with the bytes from an offset on.
 
-        A local file is opened once for all that is read within this context.
+        A local file is opened once for all reads within this context.
         """
 
     def close(self) -> None:
-        """Release the file; views that somebody holds stay valid."""
+        """Release the file; views stay valid."""
 
 
 class LocalFile:
     """A local file, opened whenever a piece of it is read: a recording may have thousands of files.
 
-    It is not mapped into memory, because whoever cuts off a mapped file ends the process.
+    It is not mapped into memory, because truncating a mapped file kills the process.
     """
 
     def __init__(self, path: Path) -> None:
         self.name = str(path)
         self._path = path.absolute()
-        self._known: os.stat_result | None = None
+        self._identity: os.stat_result | None = None
         self._block = (0, memoryview(b""))
         self._held = threading.local()
         with self._file() as file, self._errors():
@@ -127,7 +127,7 @@ class LocalFile:
 
     @contextmanager
     def _file(self) -> Iterator[FileIO]:
-        """Give the open file; within this context, the same thread opens it no other time."""
+        """Give the open file; within this context, the same thread opens it only once."""
         if file := getattr(self._held, "file", None):
             yield file
             return
@@ -135,7 +135,7 @@ class LocalFile:
             file = FileIO(self._path)
         with file:
             now = os.fstat(file.fileno())
-            self._known = then = self._known or now
+            self._identity = then = self._identity or now
             # some file systems number their files anew
             if not (os.path.samestat(now, then) or now.st_mtime_ns == then.st_mtime_ns):
                 raise RecordingError(f"`{self.name}` was replaced while it was read")
@@ -147,7 +147,7 @@ class LocalFile:
 
     @contextmanager
     def opened(self) -> Iterator[Read]:
-        """Give what fills a buffer, or fails if somebody cut the file off meanwhile."""
+        """Give a function that fills a buffer, or fails if the file was truncated meanwhile."""
         with self._file() as file:
 
             def read(start: int, target: memoryview) -> None:
@@ -164,7 +164,7 @@ class LocalFile:
             yield read
 
     def view(self, start: int, size: int) -> memoryview:
-        """Return bytes that are read now, or were with others before."""
+        """Return bytes from the file, or from the block that was read last."""
         within(self, start, size)
         first, block = self._block
         if not first <= start <= start + size <= first + len(block):
@@ -194,11 +194,11 @@ def source_of(place: Any) -> Source:
     except RecordingError:
         raise
     except Exception as error:  # each kind of store raises its own
-        raise RecordingError(f"`{name}` cannot be read: {_told(error)}") from None
+        raise RecordingError(f"`{name}` cannot be read: {_reason(error)}") from None
 
 
 def _opened(place: Any) -> Any:
-    """Return a file object of a URL, of an fsspec file, or the one that is given."""
+    """Return a file object of a URL, of an fsspec file, or `place` itself."""
     if isinstance(place, str):
         try:
             import fsspec
@@ -209,8 +209,8 @@ def _opened(place: Any) -> Any:
     return place.open() if hasattr(place, "open") else place
 
 
-def _told(error: Exception) -> str:
-    """Return what an error says, or is."""
+def _reason(error: Exception) -> str:
+    """Return the text of an error, or its type."""
     if isinstance(error, FileNotFoundError):
         return "No such file or directory"
     return str(error) or type(error).__name__
@@ -221,7 +221,7 @@ def _name(place: Any) -> str:
 
 
 def first_bytes(path: Path, size: int = 16) -> bytes:
-    """Return how a file begins."""
+    """Return the first bytes of a file."""
     try:
         with path.open("rb") as file:
             return file.read(size)
@@ -244,16 +244,16 @@ class OpenedFile:
         try:
             with self._lock:
                 self._file.seek(start)
-                found = self._file.read(size)
+                data = self._file.read(size)
         except Exception as error:  # each kind of store raises its own
-            raise RecordingError(f"`{self.name}` cannot be read: {_told(error)}") from None
-        if len(found) != size:
-            raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(found)} came")
-        return memoryview(found)
+            raise RecordingError(f"`{self.name}` cannot be read: {_reason(error)}") from None
+        if len(data) != size:
+            raise RecordingError(f"`{self.name}`: {size} bytes asked for, {len(data)} came")
+        return memoryview(data)
 
     @contextmanager
     def opened(self) -> Iterator[Read]:
-        """Give what fills a buffer."""
+        """Give a function that fills a buffer."""
 
         def read(start: int, target: memoryview) -> None:
             target[:] = self.view(start, len(target))

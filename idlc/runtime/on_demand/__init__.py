@@ -1,1 +1,1 @@
-"""What messages can do and most programs never ask for: imported when it is asked for."""
+"""Features of messages that most programs never use: imported on first use."""

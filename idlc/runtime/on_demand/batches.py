@@ -1,4 +1,4 @@
-"""Many messages of one type at once, for who works with recorded data."""
+"""Many messages of one type at once, for programs that process recorded data."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
             put(encode(message, join))
     except Exception as error:
         index = len(result)
-        found = encode_error(messages[index], byteorder, error)
-        if isinstance(found, ValidationError):
-            raise found.at(f"[{index}].{found.path}") from error
-        raise found from error
+        failure = encode_error(messages[index], byteorder, error)
+        if isinstance(failure, ValidationError):
+            raise failure.at(f"[{index}].{failure.path}") from error
+        raise failure from error
     return result
 
 

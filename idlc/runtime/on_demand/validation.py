@@ -1,13 +1,38 @@
-"""Checking values against their fields, in words that say what to do."""
+"""Checks of values against their fields, of whole messages and at each assignment.
+
+A message checks assignments, as rosidl's classes do, if that is asked for by
+`check_fields=True` or by the environment. It then is an instance of a subclass whose fields
+are properties, so that all others pay nothing. It refuses what rosidl refuses, and its
+AssertionError names the field.
+"""
 
 from __future__ import annotations
 
 import math
 from array import array
+from collections import UserList, UserString
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+from functools import cache
 from typing import Any
 
-from ..errors import FieldRangeError, FieldTypeError, ValidationError
-from .typeinfo import PRIMITIVES, FieldInfo, Primitive, fields_of, type_name
+from ..errors import (
+    FieldCheckError,
+    FieldNameError,
+    FieldRangeError,
+    FieldTypeError,
+    ValidationError,
+)
+from ..objects import owner_of
+from .typeinfo import (
+    PRIMITIVES,
+    FieldInfo,
+    Primitive,
+    class_of,
+    fields_of,
+    spelling_hint,
+    type_name,
+)
 
 
 def validate(message: Any, *, wire_only: bool = False) -> None:
@@ -151,16 +176,20 @@ def refused(
     `kind` is the name of their type, or its code in `struct`. `error` is what Python or
     numpy said, and one of its kind is returned: rosidl's classes raise that.
     """
-    primitive = next(one for one in PRIMITIVES.values() if kind in (one.code, one.name))
+    primitive = next(
+        candidate
+        for candidate in PRIMITIVES.values()
+        if kind in (candidate.code, candidate.name)
+    )
     field = FieldInfo(name, primitive, False, False, None, "", size, size is None, None)
-    found = ValidationError(
+    failure = ValidationError(
         name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
     )
     if isinstance(values, (bytes, bytearray)) and size is None:
         problem = (
             f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
         )
-        found = ValidationError(name, "whole numbers of bytes", values, problem)
+        failure = ValidationError(name, "whole numbers of bytes", values, problem)
     elif (
         isinstance(values, (list, tuple))
         or getattr(values, "ndim", 0) == 1
@@ -169,10 +198,212 @@ def refused(
         try:
             _list(values, field, name, wire_only=True)
         except ValidationError as exact:
-            found = exact
+            failure = exact
     raised = ValidationError
     if isinstance(error, OverflowError):
         raised = FieldRangeError
     elif isinstance(error, TypeError) or isinstance(values, (str, dict)):
         raised = FieldTypeError
-    return found.at(found.path, raised)  # type: ignore[no-any-return]
+    return failure.at(failure.path, raised)  # type: ignore[no-any-return]
+
+
+# checks at each assignment
+
+#: rosidl's limits of a float32, which are not quite those of IEEE 754.
+_FLOAT32 = 3.402823466e38
+
+
+def construct(
+    message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
+) -> bool:
+    """Return whether `message` got all its fields here, because it is to check them.
+
+    `options` are the constructor's further keywords, `arguments` its local variables. Raises
+    TypeError for an unknown keyword and for a first field of another type: ROS's tools try
+    `type(field)(value)`, and go over the fields of a dictionary only after a TypeError.
+    """
+    kind = type(message)
+    unknown = [name for name in options if name != "check_fields"]
+    check = bool(options.get("check_fields"))
+    fields = fields_of(type_name(kind))
+    if unknown:
+        names = [field.public for field in fields]
+        hint = spelling_hint(unknown[0], names)
+        problem = (
+            f"{kind.__name__}() got an unexpected keyword argument {unknown[0]!r}{hint}"
+        )
+        error = FieldNameError if check else FieldTypeError
+        raise error("", "absent", options[unknown[0]], problem)
+    if check:
+        _assign(message, fields, arguments)
+    elif fields:
+        _check_first(owner_of(kind), fields[0], arguments[fields[0].public])
+    return check
+
+
+def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
+    if value is None and owner.__init__.__defaults__[0] is None:
+        return  # the default
+    if _converts(owner, field) and not isinstance(value, (str, Mapping)):
+        return
+    try:
+        validate_field(value, field)
+    except ValidationError as error:
+        raise error.at(error.path, FieldTypeError) from None
+
+
+def _assign(
+    message: Any, fields: tuple[FieldInfo, ...], arguments: dict[str, Any]
+) -> None:
+    kind: Any = type(message)
+    owner = owner_of(kind)
+    default = owner(check_fields=False)
+    message.__class__ = checked_class(kind)
+    for field, without in zip(fields, owner.__init__.__defaults__ or (), strict=True):
+        value = arguments[field.public]
+        if value is None and without is None:
+            value = getattr(default, field.slot)
+        elif field.is_sequence and field.is_numeric:
+            value = array(field.primitive.code, value)  # type: ignore[union-attr]
+        setattr(message, field.public, value)
+
+
+def become_checked(message: Any, check: bool) -> None:
+    """Let a message check its fields from now on, or no longer."""
+    kind: Any = type(message)
+    if check and not issubclass(kind, Checked):
+        message.__class__ = checked_class(kind)
+    elif not check and issubclass(kind, Checked):
+        message.__class__ = kind.__base__
+
+
+class Checked:
+    """The base of the classes whose instances check their fields."""
+
+    __slots__ = ()
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        plain: Any = type(self).__base__
+        slots = owner_of(plain).__slots__
+        return _restored, (plain, {slot: getattr(self, slot) for slot in slots})
+
+
+def _restored(kind: type, values: dict[str, Any]) -> Any:
+    message = object.__new__(checked_class(kind))
+    for slot, value in values.items():
+        owner_of(kind).__dict__[slot].__set__(message, value)
+    return message
+
+
+@cache
+def checked_class(kind: Any) -> Any:
+    """Return the subclass whose fields check the values that are assigned."""
+    owner = owner_of(kind)
+    namespace: dict[str, Any] = {
+        name: getattr(kind, name) for name in ("__module__", "__qualname__", "__doc__")
+    }
+    for field in fields_of(type_name(kind)):
+        name = field.public if _converts(owner, field) else field.slot
+        namespace[field.public] = _property(owner.__dict__[name], field)
+    namespace["__slots__"] = ()
+    return type.__new__(type(kind), kind.__name__, (kind, Checked), namespace)
+
+
+def _converts(owner: Any, field: FieldInfo) -> bool:
+    """Return whether a class makes lists of the values of a field."""
+    is_property = isinstance(owner.__dict__[field.public], property)
+    return is_property and not field.is_numeric
+
+
+def _property(slot: Any, field: FieldInfo) -> property:
+    store = slot.__set__
+
+    def setter(message: Any, value: Any) -> None:
+        _check(value, field)
+        if field.is_list and field.is_numeric:
+            value = _numbers(value, field)
+        store(message, value)
+
+    return property(slot.__get__, setter)
+
+
+def _numbers(value: Any, field: FieldInfo) -> Any:
+    """Return checked values as the field holds them: an array as it is, others copied."""
+    assert field.primitive is not None
+    if field.is_sequence:
+        return value if isinstance(value, array) else array(field.primitive.code, value)
+    import numpy as np
+
+    if isinstance(value, np.ndarray):
+        return value
+    return np.array(value, field.primitive.name)
+
+
+def _check(value: Any, field: FieldInfo) -> None:
+    allowed = _refusal(value, field)
+    if allowed:
+        raise FieldCheckError(field.public, allowed, value)
+
+
+def _refusal(value: Any, field: FieldInfo) -> str:
+    """Return what the field allows if it refuses a value, else nothing."""
+    if not field.is_list:
+        return _refusal_of_element(value, field)
+    if field.is_numeric and field.primitive is not None:
+        if field.is_sequence and isinstance(value, array):
+            if value.typecode != field.primitive.code:
+                return f"an array.array of {field.primitive.code!r}"
+            far = field.bound is not None and len(value) > field.bound
+            return f"an array.array of length <= {field.bound}" if far else ""
+        if field.size is not None and type(value).__module__ == "numpy":
+            right = value.dtype.name == field.primitive.name
+            right = right and value.size == field.size
+            return "" if right else f"{field.size} numbers ({field.primitive.name})"
+    if not isinstance(value, (Sequence, AbstractSet, UserList)) or isinstance(
+        value, (str, UserString)
+    ):
+        return "a set or sequence"
+    if field.size is not None and len(value) != field.size:
+        return f"a set or sequence of length {field.size}"
+    if field.bound is not None and len(value) > field.bound:
+        return f"a set or sequence of length <= {field.bound}"
+    refusals = (_refusal_of_element(element, field, listed=True) for element in value)
+    return next(
+        (f"a set or sequence, each value {text}" for text in refusals if text), ""
+    )
+
+
+def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
+    if field.nested:
+        right = isinstance(value, class_of(field.nested))
+        return "" if right else f"a {field.nested}"
+    if field.text:
+        types: Any = str if listed else (str, UserString)
+        if not isinstance(value, types):
+            return "a str"
+        if field.text_bound is not None and len(value) > field.text_bound:
+            return f"a str not longer than {field.text_bound}"
+        return ""
+    assert field.primitive is not None
+    return _refusal_of_primitive(value, field.primitive, listed=listed)
+
+
+def _refusal_of_primitive(value: Any, primitive: Primitive, *, listed: bool) -> str:
+    code = primitive.code
+    if code == "?":
+        return "" if isinstance(value, bool) else primitive.allowed
+    if code == "c":
+        types: Any = bytes if listed else (bytes, bytearray)
+        right = isinstance(value, types) and (listed or len(value) == 1)
+        return "" if right else primitive.allowed
+    if code in "fd":
+        if not isinstance(value, float):
+            return f"a float ({primitive.name})"
+        far = code == "f" and abs(value) > _FLOAT32 and not math.isinf(value)
+        limited = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
+        return limited.allowed if far else ""
+    assert primitive.low is not None
+    assert primitive.high is not None
+    if isinstance(value, int) and primitive.low <= value <= primitive.high:
+        return ""
+    return primitive.allowed

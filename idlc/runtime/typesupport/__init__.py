@@ -72,7 +72,7 @@ def _handle(cls: Any) -> int:
     return c.capsule_pointer(getattr(meta, _SUPPORT))
 
 
-def _give(cls: Any, capsules: dict[str, object]) -> None:
+def _set_capsules(cls: Any, capsules: dict[str, object]) -> None:
     for attribute, capsule in capsules.items():
         setattr(type(cls), attribute, capsule)
 
@@ -103,11 +103,11 @@ def import_message(cls: Any) -> None:
         _base().register(cls)
     built = extension(cls, _name(cls))
     if built:
-        _give(cls, built.message())
+        _set_capsules(cls, built.message())
         return
     handle, *functions = map(c.capsule, _message(cls))
-    _give(cls, dict(zip(_MEMORY, functions, strict=True)))
-    _give(cls, {_SUPPORT: handle})
+    _set_capsules(cls, dict(zip(_MEMORY, functions, strict=True)))
+    _set_capsules(cls, {_SUPPORT: handle})
 
 
 def import_service(cls: Any) -> None:
@@ -117,17 +117,17 @@ def import_service(cls: Any) -> None:
     happened = _handle(cls.Event) if has_hashes() else 0
     built = extension(cls, _name(cls))
     if built:
-        _give(cls, {_SUPPORT: built.service()})
+        _set_capsules(cls, {_SUPPORT: built.service()})
         return
     event = services.event(cls, happened) if happened else services.Event()
     support = services.service(_name(cls), request, response, event, _implementation())
-    _give(cls, {_SUPPORT: c.capsule(support)})
+    _set_capsules(cls, {_SUPPORT: c.capsule(support)})
 
 
 def import_action(cls: Any) -> None:
     """Give `type(cls)`, and those of what it consists of, the capsules that rclpy reads.
 
-    Goals are told by GoalInfo, which rclpy converts without asking for its type support.
+    Goals are identified by GoalInfo, which rclpy converts without asking for its type support.
     """
     parts = cls.Impl
     _handle(import_module("action_msgs.msg").GoalInfo)
@@ -139,7 +139,7 @@ def import_action(cls: Any) -> None:
     messages = (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage))
     built = extension(cls, _name(cls))
     if built:
-        _give(cls, {_SUPPORT: built.action()})
+        _set_capsules(cls, {_SUPPORT: built.action()})
         return
     support = services.action(_name(cls), its_services, messages)
-    _give(cls, {_SUPPORT: c.capsule(support)})
+    _set_capsules(cls, {_SUPPORT: c.capsule(support)})

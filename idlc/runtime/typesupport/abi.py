@@ -1,10 +1,11 @@
-"""How this ROS 2 lays its C structures out: measured with a type of its own, never assumed.
+"""The C structures of this ROS 2: their layout is measured with a type of its own, never assumed.
 
 Versions differ in what a middleware reads from introspection tables and in the size of
 sequences, and nothing in them tells which version they are of. So before the first type
 support of a process, the tables of two messages that are wherever rclpy is are compared
 with all that is known of these messages. What is not exactly as in a known layout is
 refused: a wrong one would end the process, or change what is received.
+By it, messages are laid out as rosidl's C generator lays them out.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ import os
 from ctypes import PYFUNCTYPE, c_void_p
 from functools import cache
 from struct import unpack_from
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import c
+from .descriptions import ARRAY, NESTED, SCALAR, Field, load
 
 _INTROSPECTION = "rosidl_typesupport_introspection_c"
 _ADVICE = (
@@ -69,7 +71,7 @@ _MESSAGES = {
 
 
 class _UnknownError(Exception):
-    """What was found is not what any known version has."""
+    """The tables are not those of any known version."""
 
 
 class _Reader:
@@ -105,9 +107,9 @@ class _Reader:
 
     def demand_text(self, address: int, text: bytes) -> None:
         """Raise _UnknownError unless there is this text, with a zero after it."""
-        found = self.read(address, len(text) + 1)
-        if found != text + b"\0":
-            raise _UnknownError(f"{found!r} where {text!r} should be")
+        content = self.read(address, len(text) + 1)
+        if content != text + b"\0":
+            raise _UnknownError(f"{content!r} where {text!r} should be")
 
 
 def _demand(found: object, expected: object, what: str) -> None:
@@ -123,7 +125,7 @@ def measure(*handles: int) -> Abi:
     layouts has them.
     """
     reader = _Reader()
-    reasons, found = [], []
+    reasons, layouts = [], []
     try:
         for table in _TABLES:
             try:
@@ -133,15 +135,15 @@ def measure(*handles: int) -> Abi:
                         handles, _MESSAGES.items(), strict=True
                     )
                 ]
-                found.append(Abi(*table, *_sequences(offsets)))
+                layouts.append(Abi(*table, *_sequences(offsets)))
             except _UnknownError as reason:
                 reasons.append(f"{'/'.join(map(str, table))}: {reason}")
     finally:
         reader.close()
-    if len(found) != 1:
+    if len(layouts) != 1:
         seen = "; ".join(reasons) or "several layouts fit"
         raise ImportError(f"{_ADVICE} (introspection tables, {seen})")
-    return found[0]
+    return layouts[0]
 
 
 def _offsets(
@@ -207,12 +209,12 @@ def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
 
 def _laid_out(fields: tuple[_Known, ...], sequence: int, strings: int) -> list[int]:
     """Return where fields begin, and where the last one ends."""
-    found, end = [], 0
+    offsets, end = [], 0
     for known in fields:
         end += -end % min(known.size or 8, 8)
-        found.append(end)
+        offsets.append(end)
         end += known.size or (strings if known.type_id == _STRING else sequence)
-    return [*found, end]
+    return [*offsets, end]
 
 
 @cache
@@ -232,3 +234,70 @@ def has_hashes() -> bool:
     """Return whether this ROS 2 knows type hashes, and with them events of services."""
     runtime = c.load_library("librosidl_runtime_c.so")
     return hasattr(runtime, "rosidl_stringify_type_hash")
+
+
+# C structures of messages
+
+#: Type id in descriptions -> (type id in introspection, C type of one element).
+_ELEMENTS: dict[int, tuple[int, Any]] = {
+    2: (9, ctypes.c_int8),
+    3: (8, ctypes.c_uint8),
+    4: (11, ctypes.c_int16),
+    5: (10, ctypes.c_uint16),
+    6: (13, ctypes.c_int32),
+    7: (12, ctypes.c_uint32),
+    8: (15, ctypes.c_int64),
+    9: (14, ctypes.c_uint64),
+    10: (1, ctypes.c_float),
+    11: (2, ctypes.c_double),
+    15: (6, ctypes.c_bool),
+    16: (7, ctypes.c_uint8),
+    17: (16, c.String),
+    18: (17, c.String),
+    21: (16, c.String),
+    22: (17, c.String),
+}
+_MESSAGE = 18
+
+
+@cache
+def structure(name: str) -> type[ctypes.Structure]:
+    """Return the C structure that rosidl's C generator would make for a message."""
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(load().types[name])]
+    return type(name.replace("/", "__"), (ctypes.Structure,), {"_fields_": fields})
+
+
+def introspection_id(field: Field) -> int:
+    """Return how introspection calls the type of a field's elements."""
+    return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
+
+
+def element_type(field: Field) -> Any:
+    """Return the C type of one element of a field."""
+    return (
+        structure(field.nested_type_name)
+        if field.base == NESTED
+        else _ELEMENTS[field.base][1]
+    )
+
+
+def _c_type(field: Field) -> Any:
+    if field.shape == SCALAR:
+        return element_type(field)
+    if field.shape == ARRAY:
+        return element_type(field) * field.capacity
+    return _sequence_type(field)
+
+
+def _sequence_type(field: Field) -> Any:
+    if field.base == NESTED:
+        return c.Sequence
+    size = abi().strings if element_type(field) is c.String else abi().sequence
+    return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
+
+
+def placed_fields(name: str) -> list[tuple[Field, int]]:
+    """Return a message's fields and where each begins in the C structure."""
+    kind = structure(name)
+    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
+    return list(zip(load().types[name], offsets, strict=True))

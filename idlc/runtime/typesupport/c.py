@@ -1,6 +1,6 @@
 """The C side of type support: structures, capsules, and callbacks that C may call.
 
-Everything given to C must live as long as the process, so it is handed to `keep`. An
+Everything given to C must live as long as the process, so it goes through `keep`. An
 exception that leaves a ctypes callback leaves the result *uninitialised*, so callbacks
 whose result is a pointer are built from C callables only (`constant`, `resolver`): no
 bytecode runs in them, hence no signal handler either. All others are made by

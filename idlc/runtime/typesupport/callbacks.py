@@ -1,4 +1,4 @@
-"""Python functions that C calls: what happens to signals, errors and other threads in them.
+"""Python functions that C calls: their signals, errors and other threads.
 
 An exception that leaves a ctypes callback leaves the result uninitialised, and a thread
 that runs Python code may have to let another one run, whatever its C callers hold.
@@ -32,7 +32,7 @@ def deaf(function: Callable[..., Any]) -> Callable[..., Any]:
 
     Signal handlers run on entry of a Python function, before its first `try`, and what
     they raise would be lost with the result. The interpreter does not look for signals
-    where a function resumes inside a `yield from`, so the function is told that it does.
+    where a function resumes inside a `yield from`, so the function is made to look like one.
     (Python 3.10 has no such instruction; it does not look before a leading `try` either.)
     """
     assert isinstance(function, FunctionType)
@@ -71,7 +71,7 @@ def report(what: str, error: BaseException) -> None:
 def taking(name: str, decode: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return a function that gives what `decode` does, and never raises.
 
-    A signal does not cost the message; garbage is told to rclpy as `_nothing_taken` does.
+    A signal does not cost the message; garbage is reported to rclpy by `_nothing_taken`.
     """
 
     def taken(memory: Any) -> Any:
@@ -97,7 +97,7 @@ def taking(name: str, decode: Callable[[Any], Any]) -> Callable[[Any], Any]:
 def _nothing_taken(name: str, why: str) -> Any:
     """Return an object whose `[thread]` is `None`, and no message of that type to rclpy.
 
-    rclpy can only be told that before a message is decoded. Afterwards an InvalidHandle
+    rclpy accepts that only before a message is decoded. Afterwards an InvalidHandle
     does it, which executors expect from entities that die; it is an RMWError as well,
     which is what `deserialize_message` raises. It is raised in the thread when C code is
     left, and no sooner if no call follows; for actions, `None` is enough.

@@ -37,7 +37,7 @@ _MESSAGE_CAPSULES = {
 
 
 class Extension(NamedTuple):
-    """What the extension module holds for one class; `suffix` ends all its names."""
+    """The extension module's part for one class; `suffix` ends all its names."""
 
     module: ModuleType
     suffix: str
@@ -88,7 +88,7 @@ def _hidden(package: str, name: str) -> ModuleType | None:
 
 
 def _type_hash(support: object, structure: Any) -> str:
-    """Return the hash that a capsule's type support tells; its structure's type given."""
+    """Return the type hash from a capsule that holds a type support `structure`."""
     pointer = c.capsule_pointer(support)
     ask = structure.from_address(pointer).about.type_hash
     prototype = ctypes.CFUNCTYPE(ctypes.POINTER(c.TypeHash), ctypes.c_void_p)

@@ -6,6 +6,10 @@ calls the two functions that copy the bytes while it holds the mutex of a writer
 reader, and another thread may wait for that mutex while it holds the interpreter's lock.
 Whoever gave that lock away in there would never get it back. So these functions are
 machine code that allocates nothing but `bytes`, which starts no garbage collection.
+
+Where there can be no machine code, they are Python that lets no other thread run: the
+interpreter may do so after a call and where it jumps, so there is neither. Only Python
+3.11 and older may collect garbage in between.
 """
 
 from __future__ import annotations
@@ -13,18 +17,17 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
-from ctypes import PYFUNCTYPE, c_char_p, c_size_t, c_void_p, py_object
+from ctypes import PYFUNCTYPE, c_bool, c_char, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from struct import pack
 from typing import Any
 
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
-from . import c, callbacks, introspection
-from . import fastrtps_python as python
-from . import machine_code as native
+from . import c, callbacks, introspection, machine_code
 from .descriptions import about
 from .fastcdr import fast_cdr
+from .machine_code import RefusedError
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
@@ -96,7 +99,7 @@ def _offset(owner: object, word: int) -> int:
     first, last = id(owner), id(owner) + type(owner).__basicsize__
     words = c.WORDS[first >> 3 : last >> 3].tolist()
     if words.count(word) != 1:
-        raise native.RefusedError("the layout of this Python's objects is unknown")
+        raise RefusedError("the layout of this Python's objects is unknown")
     return 8 * words.index(word)
 
 
@@ -141,7 +144,7 @@ def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
     ]
     answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
     words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
-    return native.functions(
+    return machine_code.functions(
         "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
     )
 
@@ -160,11 +163,97 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
         if data[1] == native and not data[0]:
             try:
                 return decode(data)
-            except Exception:  # noqa: S110 (told exactly by what follows)
+            except Exception:  # noqa: S110 (the careful decoder reports it)
                 pass
         return decode_any(data)
 
     return callbacks.taking(name, taken)
+
+
+def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
+    """Return the addresses of the functions by name; `answers` is what one of them gives."""
+    return {
+        "serialize": _serializer(),
+        "deserialize": _deserializer(),
+        "serialized_size": _size(),
+        "maximum_size": _unbounded(),
+        "resolve": c.resolver(answers),
+    }
+
+
+def _plain_memory_type(base: type) -> type:
+    """Return a type of memory that knows what the functions here could not find out."""
+    store: Any = base.__dict__["__rmatmul__"]
+
+    def store_plain(memory: Any, message: Any) -> object:
+        done = store(memory, message)
+        memory.body = memory.body[_HEADER:]
+        memory.size = len(memory.body)
+        return done
+
+    return type("Memory", (base,), {"__slots__": ("size",), "__rmatmul__": store_plain})
+
+
+@cache
+def _serializer() -> int:
+    position, end = fast_cdr()
+    everything, words = c.MEMORY, c.WORDS
+
+    def serialize(memory: Any, cdr: int) -> bool:
+        try:
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                everything[start:stop] = memory.body
+                words[here + position] = stop
+                return True
+        except BaseException:  # noqa: S110
+            pass
+        return False
+
+    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+
+
+@cache
+def _deserializer() -> int:
+    position, end = fast_cdr()
+    characters, words = c.CHARACTERS, c.WORDS
+
+    def deserialize(cdr: int, memory: Any) -> bool:
+        try:
+            here = cdr >> 3
+            memory.received = characters[
+                words[here + position] - _HEADER : words[here + end]
+            ]
+            return True
+        except BaseException:
+            return False
+
+    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
+
+
+@cache
+def _size() -> int:
+    def size(memory: Any) -> int:
+        try:
+            return memory.size  # type: ignore[no-any-return]
+        except BaseException:
+            return 0
+
+    return callbacks.callback(PYFUNCTYPE(c_size_t, py_object), size)
+
+
+@cache
+def _unbounded() -> int:
+    def maximum(bounds_info: Any) -> int:
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            bounds_info[0] = b"\0"
+        except BaseException:  # noqa: S110
+            pass
+        return 0
+
+    return callbacks.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
 
 
 class _Callbacks(ctypes.Structure):
@@ -211,9 +300,9 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     memory = _memory_type(name, cls)
     try:
         functions = _native(answers, memory)
-    except native.RefusedError:
-        memory = python.memory_type(_memory_type(name, cls, apart=False))
-        functions = python.functions(answers)
+    except RefusedError:
+        memory = _plain_memory_type(_memory_type(name, cls, apart=False))
+        functions = _python_functions(answers)
         functions["create"] = c.address(PYFUNCTYPE(py_object)(memory))
     support.data = c.pointer(
         _Callbacks(
@@ -237,7 +326,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
 
 
 def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
-    """Return identifier and data of a service's type support; handles of its messages given."""
+    """Return identifier and data of a service's type support, from its messages' handles."""
     package, kind, short = name.split("/")
     functions = _ServiceCallbacks(
         f"{package}::{kind}".encode(), short.encode(), request, response

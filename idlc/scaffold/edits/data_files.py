@@ -1,4 +1,4 @@
-"""Adding files and folders of modules to what a setup.py installs."""
+"""Adding files and folders of modules to the ones that a setup.py installs."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ def add_launch(text: str, package: str, path: str) -> Outcome:
     module = parsed(text)
     if module is None:
         return Refused("this is not valid Python", line, WHERE)
-    if any("launch" in one for one in setup_strings(module, constants(module))):
+    if any("launch" in value for value in setup_strings(module, constants(module))):
         return Edited(text)
     calls = setup_calls(module)
-    given = _given(calls, "data_files")
-    if not given:
+    values = _keyword_values(calls, "data_files")
+    if not values:
         return Edited(text)
-    listed = [value for value in given if isinstance(value, cst.List)]
+    listed = [value for value in values if isinstance(value, cst.List)]
     if len(calls) != 1 or len(listed) != 1:
         return Refused("the data files are not written out as a list", line, WHERE)
     like = [part for element in listed[0].elements for part in _literals(element.value)]
-    folder, file = (quoted(one, like).value for one in (f"share/{package}/launch", path))
+    folder, file = (quoted(word, like).value for word in (f"share/{package}/launch", path))
     new = cst.Element(cst.parse_expression(f"({folder}, [{file}])"))
     changed = module.deep_replace(listed[0], appended(listed[0], new))
     assert isinstance(changed, cst.Module)
@@ -47,14 +47,14 @@ def add_interfaces(
 ) -> str:
     """Return a setup.py that installs interfaces, their classes and libraries for C++ tools.
 
-    What is computed in it stays; `idlc check` and the build report what is missing then.
+    Computed values stay; `idlc check` and the build report missing ones then.
     """
     problems = wiring(Source("setup.py", text), package, {key: key for key in keys}, folders)
     return apply(text, (edit for problem in problems for edit in problem.edits))[0]
 
 
-def _given(calls: Iterable[cst.Call], keyword: str) -> list[cst.BaseExpression]:
-    """Return what calls are given by a keyword."""
+def _keyword_values(calls: Iterable[cst.Call], keyword: str) -> list[cst.BaseExpression]:
+    """Return the values of a keyword argument in calls."""
     arguments = (arg for call in calls for arg in call.args)
     return [arg.value for arg in arguments if arg.keyword and arg.keyword.value == keyword]
 

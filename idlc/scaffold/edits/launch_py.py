@@ -35,32 +35,32 @@ class Started(NamedTuple):
 
     @property
     def words(self) -> dict[str, str]:
-        """What the class is told."""
-        found = {"package": self.package, "executable": self.executable, "output": "screen"}
+        """The keyword arguments of the class."""
+        words = {"package": self.package, "executable": self.executable, "output": "screen"}
         if self.lifecycle:  # these have no defaults
-            found |= {"name": self.executable, "namespace": ""}
-        return found
+            words |= {"name": self.executable, "namespace": ""}
+        return words
 
     @property
     def line(self) -> str:
         """The line for a list of nodes."""
-        given = ", ".join(f"{name}='{word}'" for name, word in self.words.items())
-        return f"{self.action}({given}),"
+        arguments = ", ".join(f"{name}='{word}'" for name, word in self.words.items())
+        return f"{self.action}({arguments}),"
 
 
 def add_node(text: str, node: Started) -> Outcome:
-    """Return the file with a node more in its only LaunchDescription.
+    """Return the file with another node in its only LaunchDescription.
 
-    Its nodes are a list that it is made from, or are added to it one by one.
+    Its nodes are the list that constructs it, or are added to it one by one.
     """
     module = parsed(text)
     if module is None:
         return Refused("this is not valid Python", node.line, WHERE)
     calls = _calls(module)
-    known = constants(module)
+    strings = constants(module)
     for call in (*calls["Node"], *calls["LifecycleNode"]):
-        given = {a.keyword.value: string(a.value, known) for a in call.args if a.keyword}
-        if given.get("executable") == node.executable and given.get("package") in (
+        arguments = {a.keyword.value: string(a.value, strings) for a in call.args if a.keyword}
+        if arguments.get("executable") == node.executable and arguments.get("package") in (
             node.package,
             None,
         ):
@@ -140,7 +140,7 @@ def _returns(statement: cst.CSTNode, name: str) -> bool:
 
 
 def _literals(listed: cst.List | None, module: cst.Module) -> list[cst.BaseExpression]:
-    """Return values whose quotes are those to use."""
+    """Return values whose style of quotes is to be used."""
     calls = _calls(module)["Node"]
     if listed is not None:
         calls = [e.value for e in listed.elements if isinstance(e.value, cst.Call)]
@@ -151,26 +151,26 @@ def _node_call(
     function: str, node: Started, like: list[cst.BaseExpression], margin: str, tail: str
 ) -> str:
     """Return the call that starts the node, in the quotes of others, in a function's block."""
-    given = [f"{name}={quoted(word, like).value}" for name, word in node.words.items()]
-    line = f"{function}({', '.join(given)})"
+    arguments = [f"{name}={quoted(word, like).value}" for name, word in node.words.items()]
+    line = f"{function}({', '.join(arguments)})"
     head = "" if tail == "," else " " * len("description.add_action(")
     if len(f"    {margin}{head}{line}{tail}") > WIDTH:
-        lines = "".join(f"{margin}    {one},\n" for one in given)
+        lines = "".join(f"{margin}    {argument},\n" for argument in arguments)
         line = f"{function}(\n{lines}{margin})"
     return line
 
 
 def _calls(module: cst.Module) -> dict[str, list[cst.Call]]:
-    found: dict[str, list[cst.Call]] = {"Node": [], "LifecycleNode": [], "LaunchDescription": []}
+    calls: dict[str, list[cst.Call]] = {"Node": [], "LifecycleNode": [], "LaunchDescription": []}
 
-    class Collect(cst.CSTVisitor):
+    class LaunchCalls(cst.CSTVisitor):
         def visit_Call(self, node: cst.Call) -> None:  # noqa: N802
             called = node.func.attr if isinstance(node.func, cst.Attribute) else node.func
-            if isinstance(called, cst.Name) and called.value in found:
-                found[called.value].append(node)
+            if isinstance(called, cst.Name) and called.value in calls:
+                calls[called.value].append(node)
 
-    module.visit(Collect())
-    return found
+    module.visit(LaunchCalls())
+    return calls
 
 
 def _list(call: cst.Call) -> cst.List | None:
@@ -181,7 +181,7 @@ def _list(call: cst.Call) -> cst.List | None:
 
 
 def _imported(module: cst.Module, action: str) -> str | None:
-    """Return how a class of launch_ros is called; empty if it is not imported, `None` if taken."""
+    """Return the local name of a class of launch_ros; empty if not imported, `None` if taken."""
     for statement in module.body:
         for small in statement.body if isinstance(statement, cst.SimpleStatementLine) else ():
             if isinstance(small, cst.ImportFrom) and not isinstance(small.names, cst.ImportStar):
@@ -228,7 +228,7 @@ def _aliases(statement: cst.ImportFrom) -> list[cst.ImportAlias]:
 
 
 def _extended(statement: cst.ImportFrom, action: str) -> cst.ImportFrom:
-    """Return an import of one name more, in the order of names."""
+    """Return an import of another name, in the order of names."""
     names = [*_aliases(statement), cst.ImportAlias(cst.Name(action))]
     names.sort(key=lambda alias: alias.evaluated_name.lower())
     comma = cst.Comma(whitespace_after=cst.SimpleWhitespace(" "))

@@ -1,7 +1,7 @@
 """Python source as libcst trees: reading strings that are written out, appending to lists.
 
 An appended element looks like its neighbours: quotes, indentation, trailing comma. Comments stay
-with the elements that they stand beside.
+with the elements beside them.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ INDENT = 4
 
 def constants(module: cst.Module) -> dict[str, str]:
     """Return the names that are given a string once, at the top of a module, and never again."""
-    found: dict[str, list[str | None]] = {}
+    by_name: dict[str, list[str | None]] = {}
     for name, value in assignments(module):
-        found.setdefault(name, []).append(string(value, {}))
+        by_name.setdefault(name, []).append(string(value, {}))
     return {
         name: values[0]
-        for name, values in found.items()
+        for name, values in by_name.items()
         if len(values) == 1 and values[0] is not None
     }
 
 
 def assignments(module: cst.Module) -> list[tuple[str, cst.BaseExpression]]:
     """Return every `NAME = value` outside of functions and classes, in order."""
-    found: list[tuple[str, cst.BaseExpression]] = []
+    values: list[tuple[str, cst.BaseExpression]] = []
 
-    class Collect(cst.CSTVisitor):
+    class Assignments(cst.CSTVisitor):
         def visit_FunctionDef(self, node: cst.FunctionDef) -> bool:  # noqa: N802, ARG002
             return False
 
@@ -39,33 +39,33 @@ def assignments(module: cst.Module) -> list[tuple[str, cst.BaseExpression]]:
 
         def visit_Assign(self, node: cst.Assign) -> None:  # noqa: N802
             names = (target.target for target in node.targets)
-            found.extend((name.value, node.value) for name in names if isinstance(name, cst.Name))
+            values.extend((name.value, node.value) for name in names if isinstance(name, cst.Name))
 
         def visit_AnnAssign(self, node: cst.AnnAssign) -> None:  # noqa: N802
             if isinstance(node.target, cst.Name) and node.value is not None:
-                found.append((node.target.value, node.value))
+                values.append((node.target.value, node.value))
 
         def visit_AugAssign(self, node: cst.AugAssign) -> None:  # noqa: N802
             if isinstance(node.target, cst.Name):
-                found.append((node.target.value, node.value))
+                values.append((node.target.value, node.value))
 
-    module.visit(Collect())
-    return found
+    module.visit(Assignments())
+    return values
 
 
-def string(node: cst.BaseExpression, known: Mapping[str, str]) -> str | None:
-    """Return the string that an expression is, where that can be read off the source."""
+def string(node: cst.BaseExpression, strings: Mapping[str, str]) -> str | None:
+    """Return the string value of an expression, where the source shows it."""
     match node:
         case cst.SimpleString() | cst.ConcatenatedString():
             value = _evaluated(node)
             return value if isinstance(value, str) else None
         case cst.Name():
-            return known.get(node.value)
+            return strings.get(node.value)
         case cst.FormattedString():
-            parts = [_part(part, known) for part in node.parts]
+            parts = [_part(part, strings) for part in node.parts]
             return None if None in parts else "".join(part for part in parts if part)
         case cst.BinaryOperation(operator=cst.Add()):
-            left, right = string(node.left, known), string(node.right, known)
+            left, right = string(node.left, strings), string(node.right, strings)
             return None if left is None or right is None else left + right
     return None
 
@@ -79,14 +79,14 @@ def _evaluated(node: cst.SimpleString | cst.ConcatenatedString) -> str | bytes |
         return None
 
 
-def _part(part: cst.BaseFormattedStringContent, known: Mapping[str, str]) -> str | None:
+def _part(part: cst.BaseFormattedStringContent, strings: Mapping[str, str]) -> str | None:
     match part:
         case cst.FormattedStringText():
             return part.value.replace("{{", "{").replace("}}", "}")
         case cst.FormattedStringExpression(
             expression=cst.Name(), conversion=None, format_spec=None, equal=None
         ):
-            return string(part.expression, known)
+            return string(part.expression, strings)
     return None
 
 

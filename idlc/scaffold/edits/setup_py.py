@@ -1,7 +1,7 @@
-"""Adding a console script to a setup.py, whatever shape its entry points have.
+"""Adding a console script to a setup.py, with entry points of any shape.
 
-In: the file's text. Out: the text with one entry more, all else untouched, or a refusal with the
-line to add by hand. An entry that is there already changes nothing.
+In: the file's text. Out: the text with another entry, all else untouched, or a refusal with the
+line to add by hand. An existing entry changes nothing.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def _section(lines: list[str], name: str) -> tuple[int, int] | None:
     """Return the lines of a section, without its header and the empty lines at its end."""
     headers = [n for n, line in enumerate(lines) if _HEADER.match(line)]
     for at, number in enumerate(headers):
-        found = _HEADER.match(lines[number])
-        if found and found[1].strip() == name:
+        header = _HEADER.match(lines[number])
+        if header and header[1].strip() == name:
             end = headers[at + 1] if at + 1 < len(headers) else len(lines)
             while end > number + 1 and not lines[end - 1].strip():
                 end -= 1
@@ -40,13 +40,13 @@ def _section(lines: list[str], name: str) -> tuple[int, int] | None:
 def add_entry(text: str, section: str, script: Script) -> Outcome:
     """Return a text with `name = target` in a section of entries, which is made if need be."""
     lines = text.splitlines(keepends=True)
-    found = _section(lines, section)
-    if found is None:
+    body = _section(lines, section)
+    if body is None:
         if not lines:
             return Edited(f"\n[{section}]\n{script.line}\n")
         margin = _margin(lines)
         return _inserted(lines, _last(lines), [f"{margin}[{section}]", f"{margin}{script.line}"])
-    start, end = found
+    start, end = body
     refused = _present(lines[start:end], script)
     if refused is not None:
         return Edited(text) if isinstance(refused, Edited) else refused
@@ -66,13 +66,13 @@ def add_line(text: str, script: Script) -> Outcome:
 def add_to_cfg(text: str, script: Script) -> Outcome:
     """Return a setup.cfg with a console script in its `[options.entry_points]`."""
     lines = text.splitlines(keepends=True)
-    found = _section(lines, SECTION)
-    if found is None:
+    section = _section(lines, SECTION)
+    if section is None:
         gap = "\n" if lines else ""
         if lines and not lines[-1].endswith("\n"):
             lines[-1] += "\n"
         return Edited("".join(lines) + f"{gap}[{SECTION}]\n{KEY} =\n    {script.line}\n")
-    start, end = found
+    start, end = section
     key = next((n for n in range(start, end) if re.match(rf"{KEY}\s*[=:]", lines[n])), None)
     if key is None:
         return _inserted(lines, end, [f"{KEY} =", f"    {script.line}"])
@@ -92,7 +92,7 @@ def add_to_cfg(text: str, script: Script) -> Outcome:
 
 
 def _present(lines: list[str], script: Script) -> Outcome | None:
-    """Return what is so if the command is there: nothing to do, or another target."""
+    """Return the outcome for an existing command: nothing to do, or a refusal; `None` without."""
     for line in lines:
         name, target = split(line.partition("#")[0])
         if name == script.name and target:
@@ -103,7 +103,7 @@ def _present(lines: list[str], script: Script) -> Outcome | None:
 
 
 def _margin(lines: list[str]) -> str:
-    """Return the white space before the last line that has any text."""
+    """Return the whitespace before the last line with text."""
     for line in reversed(lines):
         if line.strip():
             return line[: len(line) - len(line.lstrip())]
@@ -111,7 +111,7 @@ def _margin(lines: list[str]) -> str:
 
 
 def _last(lines: list[str]) -> int:
-    """Return where a line goes that is to follow the last one with text."""
+    """Return the index after the last line with text."""
     end = len(lines)
     while end and not lines[end - 1].strip():
         end -= 1
@@ -130,7 +130,7 @@ def _inserted(lines: list[str], at: int, new: list[str]) -> Outcome:
 ENTRY_POINT_KEY = "console_scripts"
 IN_SETUP = "to `console_scripts` in the `entry_points` of setup()"
 
-#: A node and what is to stand in its place, or why nothing can.
+#: A node and its replacement, or the reason why there is none.
 Change: TypeAlias = tuple[cst.CSTNode, cst.CSTNode] | str
 
 
@@ -139,26 +139,26 @@ def add_to_setup(text: str, script: Script) -> Outcome:
     module = parsed(text)
     if module is None:
         return _refusal(script, "this is not valid Python")
-    known = constants(module)
-    found = setup_strings(module, known)
-    if any(script.same(one) for one in found):
+    strings = constants(module)
+    texts = setup_strings(module, strings)
+    if any(script.same(value) for value in texts):
         return Edited(text)
     calls = setup_calls(module)
     if len(calls) != 1:
         return _refusal(script, f"there are {len(calls) or 'no'} calls of setup()")
-    change = _edit(module, calls[0], script, known)
+    change = _edit(module, calls[0], script, strings)
     if isinstance(change, str):
         return _refusal(script, change)
     result = module.deep_replace(*change)
     assert isinstance(result, cst.Module)
-    return _checked(result.code, script, found)
+    return _checked(result.code, script, texts)
 
 
 def _checked(text: str, script: Script, before: list[str]) -> Outcome:
     """Return the edited text if it is sound: valid, with the entry, nothing lost."""
     module = parsed(text)
     after = setup_strings(module, constants(module)) if module else []
-    if not any(script.same(line) for one in after for line in one.splitlines()):
+    if not any(script.same(line) for value in after for line in value.splitlines()):
         return _refusal(script, "the entry points are written in a way that idlc does not know")
     lost = set(_lines(before)) - set(_lines(after))
     if lost:
@@ -174,28 +174,28 @@ def _refusal(script: Script, why: str) -> Refused:
     return Refused(why, f"'{script.line}',", IN_SETUP)
 
 
-def setup_strings(module: cst.Module | None, known: Mapping[str, str]) -> list[str]:
-    """Return every string of a module that can be read off the source."""
-    found: list[str] = []
+def setup_strings(module: cst.Module | None, strings: Mapping[str, str]) -> list[str]:
+    """Return every string of a module that the source shows."""
+    texts: list[str] = []
 
-    class Collect(cst.CSTVisitor):
+    class Strings(cst.CSTVisitor):
         def on_visit(self, node: cst.CSTNode) -> bool:
-            value = string(node, known) if isinstance(node, cst.BaseExpression) else None
+            value = string(node, strings) if isinstance(node, cst.BaseExpression) else None
             if value is not None:
-                found.append(value)
+                texts.append(value)
             return value is None
 
     if module is not None:
-        module.visit(Collect())
-    return found
+        module.visit(Strings())
+    return texts
 
 
 def setup_calls(module: cst.Module) -> list[cst.Call]:
     """Return the calls of setuptools' function, however it was imported."""
     names = {"setup"}
-    found: list[cst.Call] = []
+    calls: list[cst.Call] = []
 
-    class Collect(cst.CSTVisitor):
+    class SetupCalls(cst.CSTVisitor):
         def visit_ImportAlias(self, node: cst.ImportAlias) -> None:  # noqa: N802
             if node.evaluated_name == "setup" and node.evaluated_alias:
                 names.add(node.evaluated_alias)
@@ -204,25 +204,25 @@ def setup_calls(module: cst.Module) -> list[cst.Call]:
             function = node.func
             called = function.attr if isinstance(function, cst.Attribute) else function
             if isinstance(called, cst.Name) and called.value in names:
-                found.append(node)
+                calls.append(node)
 
-    module.visit(Collect())
-    return found
+    module.visit(SetupCalls())
+    return calls
 
 
-def _edit(module: cst.Module, call: cst.Call, script: Script, known: Mapping[str, str]) -> Change:
-    """Return which node to replace by which, or why none can be."""
-    given = next((a for a in call.args if a.keyword and a.keyword.value == "entry_points"), None)
-    if given is not None:
-        return _entry_points(given.value, script, known, module)
+def _edit(module: cst.Module, call: cst.Call, script: Script, strings: Mapping[str, str]) -> Change:
+    """Return a node and its replacement, or why there is none."""
+    argument = next((a for a in call.args if a.keyword and a.keyword.value == "entry_points"), None)
+    if argument is not None:
+        return _entry_points(argument.value, script, strings, module)
     if any(arg.star == "**" for arg in call.args):
         return "setup() gets its arguments from elsewhere (`**`)"
     return call, _with_argument(call, script, module)
 
 
 def _named(name: cst.Name, module: cst.Module) -> cst.BaseExpression | str:
-    """Return the value that a variable is given, if that happens in one place."""
-    values = [value for one, value in assignments(module) if one == name.value]
+    """Return the value of a variable that is assigned in one place."""
+    values = [value for variable, value in assignments(module) if variable == name.value]
     if len(values) == 1:
         return values[0]
     return f"`{name.value}` is not set in exactly one place"
@@ -271,7 +271,7 @@ def _with_argument(call: cst.Call, script: Script, module: cst.Module) -> cst.Ca
 
 
 def _entry_points(
-    value: cst.BaseExpression, script: Script, known: Mapping[str, str], module: cst.Module
+    value: cst.BaseExpression, script: Script, strings: Mapping[str, str], module: cst.Module
 ) -> Change:
     """Find the change to the value of `entry_points`."""
     match value:
@@ -279,24 +279,24 @@ def _entry_points(
             named = _named(value, module)
             if isinstance(named, (str, cst.Name)):
                 return str(named) if isinstance(named, str) else "the entry points are a variable"
-            return _entry_points(named, script, known, module)
+            return _entry_points(named, script, strings, module)
         case cst.Dict():
-            return _in_dict(value, script, known, module)
+            return _in_dict(value, script, strings, module)
         case cst.Call(func=cst.Name("dict")):
             for arg in value.args:
                 if arg.keyword and arg.keyword.value == ENTRY_POINT_KEY:
-                    return _scripts(arg.value, script, known, module)
+                    return _scripts(arg.value, script, strings, module)
         case cst.SimpleString():
             return _in_literal(value, lambda body: add_entry(body, ENTRY_POINT_KEY, script))
     return "the entry points are not written out as a dictionary or a text"
 
 
 def _in_dict(
-    value: cst.Dict, script: Script, known: Mapping[str, str], module: cst.Module
+    value: cst.Dict, script: Script, strings: Mapping[str, str], module: cst.Module
 ) -> Change:
     for element in value.elements:
-        if isinstance(element, cst.DictElement) and string(element.key, known) == ENTRY_POINT_KEY:
-            return _scripts(element.value, script, known, module)
+        if isinstance(element, cst.DictElement) and string(element.key, strings) == ENTRY_POINT_KEY:
+            return _scripts(element.value, script, strings, module)
     if any(isinstance(element, cst.StarredDictElement) for element in value.elements):
         return "the entry points come from elsewhere (`**`)"
     keys = [e.key for e in value.elements if isinstance(e, cst.DictElement)]
@@ -305,7 +305,7 @@ def _in_dict(
 
 
 def _scripts(
-    value: cst.BaseExpression, script: Script, known: Mapping[str, str], module: cst.Module
+    value: cst.BaseExpression, script: Script, strings: Mapping[str, str], module: cst.Module
 ) -> Change:
     """Find the change to the value of `console_scripts`."""
     match value:
@@ -313,26 +313,26 @@ def _scripts(
             named = _named(value, module)
             if isinstance(named, (str, cst.Name)):
                 return str(named) if isinstance(named, str) else "the scripts are a variable"
-            return _scripts(named, script, known, module)
+            return _scripts(named, script, strings, module)
         case cst.List() | cst.Tuple():
-            return _in_list(value, script, known)
+            return _in_list(value, script, strings)
         case cst.SimpleString() if len(value.quote) == 3:
             return _in_literal(value, lambda body: add_line(body, script))
         case cst.SimpleString():
             both = cst.List([cst.Element(value)])
-            new = _in_list(both, script, known)
+            new = _in_list(both, script, strings)
             return new if isinstance(new, str) else (value, new[1])
         case cst.BinaryOperation(operator=cst.Add()):
             for side in (value.left, value.right):
                 if isinstance(side, (cst.List, cst.BinaryOperation)):
-                    return _scripts(side, script, known, module)
+                    return _scripts(side, script, strings, module)
     return "the console scripts are not written out as a list"
 
 
-def _in_list(value: cst.List | cst.Tuple, script: Script, known: Mapping[str, str]) -> Change:
+def _in_list(value: cst.List | cst.Tuple, script: Script, strings: Mapping[str, str]) -> Change:
     values = [element.value for element in value.elements]
-    for one in values:
-        name, target = split(string(one, known) or "")
+    for item in values:
+        name, target = split(string(item, strings) or "")
         if name == script.name:
             return taken(script, target, IN_SETUP).why
     return value, appended(value, cst.Element(quoted(script.line, values)))
@@ -361,7 +361,7 @@ TABLE = "project.scripts"
 
 
 def add_console_script(files: Mapping[str, str], script: Script) -> tuple[str, Outcome]:
-    """Return which of a package's files to edit, and how; `files` are those that exist.
+    """Return the file of a package to edit, and the edit; `files` are the existing ones.
 
     The order is setuptools' own: `[project]` outranks setup.cfg, which outranks setup.py.
     """
@@ -387,10 +387,10 @@ def _declares_scripts(text: str) -> bool:
 
 def _table(text: str, name: str) -> dict[str, Any] | Refused:
     try:
-        found = tomllib.loads(text).get(name, {})
+        table = tomllib.loads(text).get(name, {})
     except tomllib.TOMLDecodeError:
         return Refused("this is not valid TOML", "", f"to [{TABLE}]")
-    return found if isinstance(found, dict) else {}
+    return table if isinstance(table, dict) else {}
 
 
 def _line(script: Script) -> str:
@@ -399,7 +399,7 @@ def _line(script: Script) -> str:
 
 
 def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome:
-    """Return a pyproject.toml with a line more in `[project.scripts]`, which is made if need be."""
+    """Return a pyproject.toml with another line in `[project.scripts]`, added if missing."""
     where = f"to [{TABLE}]"
     scripts = project.get("scripts", {})
     if script.name in scripts:
@@ -429,8 +429,8 @@ def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome
 
 
 def _checked_scripts(text: str, before: dict[str, Any], script: Script, where: str) -> Outcome:
-    """Return the edited text if it says what it said, and the script."""
-    wanted = {**before, "scripts": {**before.get("scripts", {}), script.name: script.target}}
-    if _table(text, "project") == wanted:
+    """Return the edited text if it differs only by the script."""
+    expected = {**before, "scripts": {**before.get("scripts", {}), script.name: script.target}}
+    if _table(text, "project") == expected:
         return Edited(text)
     return Refused("the scripts are written in a way that idlc does not edit", _line(script), where)

@@ -152,7 +152,7 @@ def _client_node(context: Context) -> ActionClientPart:
         log_feedback = (f"feedback: {type_}.Feedback = message.feedback", *log_feedback)
     if result.fields:
         log_result = (f"result: {type_}.Result = ending.result().result", *log_result)
-    given = ["goal", f"feedback_callback=self.follow_{word}"]
+    arguments = ["goal", f"feedback_callback=self.follow_{word}"]
     words = ["self", type_, repr(context.endpoint.topic)]
     return ActionClientPart(
         **context.names,
@@ -162,7 +162,7 @@ def _client_node(context: Context) -> ActionClientPart:
         follow_head=signature(f"def follow_{word}", ["self", "message: Any"], "None", depth=1),
         cancel_head=signature(f"async def cancel_{word}", ["self"], "None", depth=1),
         drop_head=signature(f"def drop_{word}", ["self"], "None", depth=1),
-        send=tuple(call(f"sent = self.{word}_client.send_goal_async", given, depth=2)),
+        send=tuple(call(f"sent = self.{word}_client.send_goal_async", arguments, depth=2)),
         log_feedback=log_feedback,
         log_result=log_result,
         remember=(f"self.{word}_sent: Future | None = None",),

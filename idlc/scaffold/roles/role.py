@@ -1,6 +1,6 @@
-"""What a role is: one kind of thing that nodes do, from its option to its test.
+"""The description of a role: a kind of endpoint of nodes, from its option to its test.
 
-Each role has a module beside this one, which holds all that idlc knows of it, and two templates,
+Each role has a module beside this one, with all knowledge of it, and two templates,
 `node/ROLE.py.jinja` and `node_test/ROLE.py.jinja`.
 """
 
@@ -20,7 +20,7 @@ from idlc.scaffold.samples import Page
 
 
 class Qos(NamedTuple):
-    """A preset: its name on the command line, and what stands for it in a module.
+    """A preset: its name on the command line, and its expression in a module.
 
     `imports` come from rclpy.qos; `constant` is the line that defines `source`, if none does.
     """
@@ -45,13 +45,13 @@ QOS_NAMES = tuple(preset.name for preset in QOS_PRESETS)
 
 def qos_preset(name: str) -> Qos:
     """Return the preset of a name; raise ValueError if there is none."""
-    for one in QOS_PRESETS:
-        if one.name == name:
-            return one
+    for preset in QOS_PRESETS:
+        if preset.name == name:
+            return preset
     raise ValueError(f"--qos is one of {', '.join(QOS_NAMES)}, not {name!r}")
 
 
-#: What a module imports: the names from each module.
+#: The imports of a module: the names from each other module.
 Imports = Mapping[str, tuple[str, ...]]
 NO_IMPORTS: Imports = MappingProxyType({})
 
@@ -64,7 +64,7 @@ PATIENCE = 20.0
 
 
 class Question(NamedTuple):
-    """What the wizard asks besides type and name; the answer is appended to the option's value."""
+    """A question of the wizard besides type and name; the answer is appended to the value."""
 
     text: str
     default: str
@@ -72,9 +72,9 @@ class Question(NamedTuple):
 
 
 class Request(NamedTuple):
-    """How a node asks others for something, which its command line describes.
+    """A request that a node sends, with values from its command line.
 
-    `method` begins the name of the coroutine that asks, `cancel` of one that takes that back.
+    `method` begins the name of the coroutine that sends it, `cancel` of one that cancels it.
     """
 
     method: str
@@ -137,7 +137,7 @@ class Endpoint(NamedTuple):
 
 
 class Part(msgspec.Struct, frozen=True, kw_only=True):
-    """What an endpoint adds to the class of a node. Each role adds attributes of its own.
+    """The part of an endpoint in the class of a node. Each role adds attributes of its own.
 
     `remember`, `create` and `work` are lines of `__init__`. In a lifecycle node the second are run
     when it is configured and the third when it is activated.
@@ -169,7 +169,7 @@ class TestPart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PartNames(TypedDict):
-    """What all parts of nodes begin with."""
+    """The first attributes of all parts of nodes."""
 
     template: str
     word: str
@@ -178,7 +178,7 @@ class PartNames(TypedDict):
 
 
 class TestNames(TypedDict):
-    """What all parts of tests begin with."""
+    """The first attributes of all parts of tests."""
 
     template: str
     word: str
@@ -189,7 +189,7 @@ class TestNames(TypedDict):
 class Context(NamedTuple):
     """An endpoint of a node whose module is being written.
 
-    `type` is what the module calls the interface's class; `sections` are the interface's messages.
+    `type` is the name of the interface's class in the module; `sections` are its messages.
     """
 
     endpoint: Endpoint
@@ -239,12 +239,12 @@ class TestContext(NamedTuple):
         )
 
     def logged(self, variable: str, message: ir.Message) -> str:
-        """Return a literal of how the line begins in which the node logs a message."""
+        """Return a literal of the start of the line that logs a message."""
         return repr(layout.log_head(_title(self.endpoint, self.word), variable, message))
 
     @property
     def patience(self) -> float:
-        """How many seconds to wait for what happens twice."""
+        """The number of seconds to wait for two messages."""
         return round(PATIENCE + 3 * (self.endpoint.period or 0.0), 1)
 
 
@@ -259,7 +259,7 @@ def creation(function: str, words: list[str]) -> str:
 
 
 def _title(endpoint: Endpoint, word: str) -> str:
-    """Return how text calls an endpoint."""
+    """Return the name of an endpoint in text."""
     return endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word
 
 
@@ -280,7 +280,7 @@ def typed(text: str, shape: str = "TYPE:NAME") -> Value:
 
 
 def positive(text: str, what: str, unit: str) -> float:
-    """Return the number that a text is, within reasonable limits."""
+    """Return the number in a text, within reasonable limits."""
     try:
         value = float(text)
     except ValueError:

@@ -179,9 +179,8 @@ def garbage_is_dropped():
 def without_machine_code(name):
     """Do something where there is no machine code, which Fast DDS can do without."""
     native = importlib.import_module("std_msgs._idlc.typesupport.machine_code")
-    native._MACHINES = ()
+    native.CODE, native._executable = {}, None  # to call this would be an error
     globals()[name]()
-    assert not [name for name in sys.modules if name.startswith("std_msgs") and "x86_64" in name]
 
 
 def received_garbage_is_dropped():
@@ -461,7 +460,7 @@ def says_what_to_do(case):
     if case in {"machine", "memory"}:
         utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
     if case == "machine":
-        native._MACHINES = ()
+        native.CODE = {}
     elif case == "memory":
         native._MAP_PRIVATE = 0  # the system refuses this, too
     elif case == "middleware":

@@ -8,6 +8,7 @@ from __future__ import annotations
 from array import array
 
 from .cdr import (
+    ENDS,
     HEADERS,
     NATIVE,
     PAD2,
@@ -24,18 +25,37 @@ from .cdr import (
     phases,
     read_flags,
     read_octets,
+    read_wide_text,
+    rows_writer,
+    sizes,
+    strings_reader,
+    text_block,
     text_phases,
+    texts_reader,
+    unsized,
+    wide_block,
+    wide_text,
+    wide_texts_reader,
 )
-from .codec import Codec, Reading, maker
-from .construction import construct
+from .codec import Codec, Reading, construct, maker
 from .errors import DecodeError, ValidationError, importing
-from .interfaces import Action, Imported, Package, Service, complete, several
-from .lazy import Fresh, FreshList, lazily
-from .message import Message, dataclass, table
+from .message import (
+    Action,
+    Imported,
+    Message,
+    Package,
+    Service,
+    complete,
+    dataclass,
+    table,
+)
+from .names import lazily
 from .objects import same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
+    Fresh,
+    FreshList,
     Int8Sequence,
     Int16Sequence,
     Int32Sequence,
@@ -49,21 +69,9 @@ from .sequences import (
     sequence_copier,
     sequence_reader,
     sequence_writer,
+    several,
     to_array,
     to_list,
-)
-from .strings import (
-    ENDS,
-    read_wide_text,
-    rows_writer,
-    sizes,
-    strings_reader,
-    text_block,
-    texts_reader,
-    unsized,
-    wide_block,
-    wide_text,
-    wide_texts_reader,
 )
 
 TYPE_CHECKING = False

@@ -1,27 +1,27 @@
-"""How a class gets its codec: imported and made for one byte order, on first use.
+"""Making messages: codecs, imported and made for one byte order on first use, and constructors.
 
 The codecs of a module of classes are in the module of the same name and `__codec`.
+Constructors leave checks to `on_demand.validation`, which is rarely needed.
 """
 
 from __future__ import annotations
 
 import struct
+from os import environ
 
-from .cdr import HEADERS, NATIVE
-from .construction import CHECK_FIELDS, checking
+from .cdr import NATIVE, order_of
 from .errors import DecodeError, ValidationError
 from .objects import owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
     from .hints import Join
-    from .message import Message
 
-    #: What turns bytes into a str.
+    #: A function that decodes bytes.
     Text: TypeAlias = Callable[[Any], str]
     #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
     Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
@@ -37,6 +37,10 @@ else:
     # functools takes longer to import than all that is here
     from _functools import partial
 
+
+#: Whether all messages check their fields. Read once, as in rosidl's modules.
+CHECK_FIELDS = environ.get("ROS_PYTHON_CHECK_FIELDS") == "1"
+
 ORDERS = {"little": "<", "big": ">"}
 
 #: Takes a memoryview, too. Slower than `bytes.decode`.
@@ -44,7 +48,7 @@ text_of_view: Text = partial(str, encoding="utf-8")
 
 
 class Reading:
-    """How a decoder makes values: strings by `text`, numeric arrays as copies or as views."""
+    """The values that a decoder makes: strings by `text`, numeric arrays as copies or as views."""
 
     def __init__(self, text: Text, copy: bool) -> None:
         self.text = text
@@ -53,7 +57,7 @@ class Reading:
         self.small = 8192 if copy else 0
 
     def of(self, kind: type) -> Reading:
-        """Return how the sequences of a class of another package are made.
+        """Return the reading for sequences of a class of another package.
 
         Classes of rosidl get copies: their `==` cannot compare views.
         """
@@ -68,7 +72,7 @@ READINGS: dict[tuple[Text, bool], Reading] = {
 COPYING = READINGS[bytes.decode, True]
 
 
-#: What decoding raises when a buffer is not a message.
+#: The exceptions of decoding a buffer that is not a message.
 FAILURES = (struct.error, ValueError, IndexError, OverflowError)
 
 
@@ -98,31 +102,16 @@ def codecs_of(kind: type) -> Codecs:
     owner = owner_of(kind)
     module = __import__(f"{owner.__init__.__module__}__codec", fromlist=["CODECS"])
     make = module.CODECS[owner.__name__]
-    made: dict[tuple[str, Reading], Codec] = {}
+    cached: dict[tuple[str, Reading], Codec] = {}
 
     def codecs(order: str, reading: Reading = COPYING) -> Codec:
-        found = made.get((order, reading))
-        if found is None:
-            found = made[order, reading] = make(owner, order, reading)
-        return found
+        codec = cached.get((order, reading))
+        if codec is None:
+            codec = cached[order, reading] = make(owner, order, reading)
+        return codec
 
     owner._codec_ = staticmethod(codecs)
     return codecs
-
-
-def maker(kind: Any) -> Callable[[], Any]:
-    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
-    if hasattr(type(kind), "_message"):
-        return partial(object.__new__, checking(kind) if CHECK_FIELDS else kind)
-    if "_check_fields" not in getattr(kind, "__slots__", ()):
-        return partial(object.__new__, kind)
-
-    def make() -> Any:
-        made: Any = object.__new__(kind)
-        made._check_fields = CHECK_FIELDS
-        return made
-
-    return make
 
 
 def functions(kind: type) -> Functions:
@@ -131,13 +120,13 @@ def functions(kind: type) -> Functions:
     They replace those that the class inherits, unless its fields have these names.
     """
     owner = owner_of(kind)
-    made: Functions | None = owner.__dict__.get("_functions_")
-    if made is None:
-        made = owner._functions_ = _functions(owner)
-        serialize, deserialize = made
+    pair: Functions | None = owner.__dict__.get("_functions_")
+    if pair is None:
+        pair = owner._functions_ = _functions(owner)
+        serialize, deserialize = pair
         _provide(owner, "serialize", serialize)
         _provide(owner, "deserialize", staticmethod(deserialize))
-    return made
+    return pair
 
 
 def _provide(owner: Any, name: str, function: object) -> None:
@@ -207,31 +196,17 @@ def extended(owner: Any) -> None:
         owner.deserialize = classmethod(deserialize)
 
 
-def order_of(data: Any) -> str:
-    """Return the byte order that an encapsulation header names; raise DecodeError otherwise."""
-    if len(data) < 4:
-        raise DecodeError(
-            f"the encapsulation header needs 4 bytes, there are {len(data)}"
-        )
-    for order, header in HEADERS.items():
-        if bytes(data[:2]) == header[:2]:
-            return order
-    raise DecodeError(
-        f"unknown encapsulation {bytes(data[:2]).hex()}, only plain CDR is read"
-    )
-
-
 def recover(kind: type, buffer: Any, failure: Exception) -> Any:
     """Return the message after all, if a middleware would; raise DecodeError otherwise."""
     if isinstance(failure, DecodeError):
         raise failure
-    from .on_demand.field_reader import read_carefully
+    from .on_demand.typeinfo import read_carefully
 
     data = bytes(buffer)
-    return read_carefully(kind, data, order_of(data))
+    return read_carefully(kind, data, maker)
 
 
-def encode_error(message: Message, byteorder: str, error: Exception) -> Exception:
+def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
@@ -239,17 +214,59 @@ def encode_error(message: Message, byteorder: str, error: Exception) -> Exceptio
 
     try:
         validate(message, wire_only=True)
-    except ValidationError as found:
-        return found
+    except ValidationError as exact:
+        return exact
     return error
 
 
-__all__ = [
-    "Codec",
-    "Reading",
-    "Text",
-    "codecs_of",
-    "encode_error",
-    "functions",
-    "maker",
-]
+# constructors
+
+
+def construct(
+    message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
+) -> bool:
+    """Check a constructor's arguments; return whether the message got all its fields."""
+    from .on_demand import validation
+
+    return validation.construct(message, options, arguments)
+
+
+def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
+    """Make a message that checks its fields, as the environment asks for."""
+    if "check_fields" in cls._fields_and_field_types:
+        return type.__call__(cls, *values, **named)  # the name is a field's
+    if owner_of(cls) is cls:
+        return type.__call__(cls, *values, **{"check_fields": True, **named})
+    message = type.__call__(cls, *values, **named)
+    message._check_fields = True
+    return message
+
+
+def maker(kind: Any) -> Callable[[], Any]:
+    """Return a function that makes an empty instance, of an idlc-made or rosidl-made class."""
+    if hasattr(type(kind), "_message"):
+        return partial(object.__new__, _checking(kind) if CHECK_FIELDS else kind)
+    if "_check_fields" not in getattr(kind, "__slots__", ()):
+        return partial(object.__new__, kind)
+
+    def make() -> Any:
+        message: Any = object.__new__(kind)
+        message._check_fields = CHECK_FIELDS
+        return message
+
+    return make
+
+
+def _checking(kind: Any) -> Any:
+    """Return the subclass of a message class whose instances check their fields."""
+    from .on_demand import validation
+
+    return validation.checked_class(kind)
+
+
+def is_checked(kind: type) -> bool:
+    """Return whether the instances of a class check their fields."""
+    # only what has imported `validation` has such instances
+    return any(
+        base.__module__.endswith(".on_demand.validation") for base in kind.__mro__
+    )

@@ -1,4 +1,4 @@
-"""What can go wrong with a message, as exceptions."""
+"""The exceptions of messages, and of importing those of other packages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ValidationError(ValueError):
     """A value that its field cannot hold.
 
     `path` names the field, `allowed` says what it can hold, `value` is what it holds. A
-    `problem` is told instead of "must be `allowed`, not `value`".
+    `problem` is reported instead of "must be `allowed`, not `value`".
     """
 
     def __init__(
@@ -56,15 +56,15 @@ class ValidationError(ValueError):
 
 
 class FieldTypeError(ValidationError, TypeError):
-    """A value of the wrong type, found when it was assigned."""
+    """A value of the wrong type, detected at its assignment."""
 
 
 class FieldRangeError(ValidationError, OverflowError):
-    """A number that is too large or too small, found when it was assigned."""
+    """A number that is too large or too small, detected at its assignment."""
 
 
 class FieldCheckError(ValidationError, AssertionError):
-    """What `check_fields` refuses; rosidl's classes raise AssertionError."""
+    """A value that `check_fields` refuses; rosidl's classes raise AssertionError."""
 
 
 class FieldNameError(FieldTypeError, FieldCheckError):

@@ -1,8 +1,9 @@
-"""The base of generated messages: what rosidl's classes offer, and dataclasses besides.
+"""The bases of generated messages, services and actions, and their metaclasses.
 
 A message class declares `_fields_and_field_types`. Its metaclass makes a slot of each field,
 named as rosidl names it (`_stamp`), and gives it its public name (`stamp`): the same slot, or a
 property that converts for numeric arrays. Nothing else is computed until it is asked for.
+Services and actions are names for their messages, never instances.
 """
 
 from __future__ import annotations
@@ -10,14 +11,21 @@ from __future__ import annotations
 import sys
 
 from . import codec
-from .construction import CHECK_FIELDS, call_checked, is_checked
-from .lazy import OnDemand, dataclass_fields, dataclass_params, slot_types
-from .names import public_name, slot_name
-from .objects import copied, deeply_copied, pretty, represented
+from .errors import MissingPackageError, importing
+from .names import public_name, slot_name, wire_name
+from .objects import (
+    copied,
+    deeply_copied,
+    named_values,
+    owner_of,
+    pretty,
+    represented,
+    same,
+)
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
     from dataclasses import Field, dataclass
     from typing import Any, ClassVar, Literal
 
@@ -31,12 +39,56 @@ else:
         return lambda cls: cls
 
 
-#: What generated classes call `dict`; linters take a display for a mistake there.
+#: `dict` for generated classes, in which linters object to a display.
 table = dict
 
 
+# attributes on first access
+
+
+class OnDemand:
+    """A class attribute that is made on first access.
+
+    An error in that is an AttributeError, as code that looks at all attributes of a class expects.
+    """
+
+    def __init__(self, make: Callable[[type], Any]) -> None:
+        self._make = make
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        """Return the value."""
+        try:
+            return self._make(owner)
+        except Exception as error:
+            raise AttributeError(str(error)) from error
+
+
+def slot_types(kind: type) -> tuple[Any, ...]:
+    """Return SLOT_TYPES of a message class."""
+    from .on_demand import typeinfo
+
+    return typeinfo.slot_types(kind)
+
+
+def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
+    """Return `__dataclass_fields__` of a message class."""
+    from .on_demand import conversions
+
+    return conversions.dataclass_fields(kind)
+
+
+def dataclass_params(_kind: type) -> Any:
+    """Return `__dataclass_params__` of a message class."""
+    from .on_demand import conversions
+
+    return conversions.dataclass_params()
+
+
+# messages
+
+
 class InterfaceMeta(type):
-    """What rclpy looks for on the class of a class; one subclass for each interface."""
+    """The attributes that rclpy reads from a metaclass; one subclass for each interface."""
 
     _TYPE_SUPPORT: ClassVar[Any] = None
 
@@ -54,9 +106,9 @@ def metaclass_of(
     if module != namespace["__module__"]:
         namespace["__module__"] = module
         namespace.pop("__firstlineno__", None)  # that is another file's
-    made = type(f"Metaclass_{name}", (base,), {"__module__": module})
-    setattr(sys.modules.get(module), made.__name__, made)
-    return made
+    metaclass = type(f"Metaclass_{name}", (base,), {"__module__": module})
+    setattr(sys.modules.get(module), metaclass.__name__, metaclass)
+    return metaclass
 
 
 class MessageMeta(InterfaceMeta):
@@ -82,23 +134,21 @@ class MessageMeta(InterfaceMeta):
         if fields is None:
             if not bases:
                 return super().__new__(cls, name, bases, namespace)
-            from .subclasses import subclass
-
-            return subclass(cls, name, bases, namespace, options)
+            return _subclass(cls, name, bases, namespace, options)
         metaclass = metaclass_of(cls, name, namespace)
         converted = {
             public: namespace.pop(public, None) for public in map(public_name, fields)
         }
         namespace["__slots__"] = [slot_name(field) for field in fields]
-        made: Any = type.__new__(metaclass, name, bases, namespace)
+        created: Any = type.__new__(metaclass, name, bases, namespace)
         for slot, (public, conversion) in zip(
-            made.__slots__, converted.items(), strict=True
+            created.__slots__, converted.items(), strict=True
         ):
-            member = made.__dict__[slot]
+            member = created.__dict__[slot]
             attribute = member if conversion is None else conversion.property_of(member)
-            type.__setattr__(made, public, attribute)
-        metaclass._message = made
-        return made
+            type.__setattr__(created, public, attribute)
+        metaclass._message = created
+        return created
 
     @classmethod
     def __import_type_support__(cls) -> None:
@@ -131,12 +181,12 @@ class Message(metaclass=MessageMeta):
 
     @property
     def _check_fields(self) -> bool:
-        """Whether the message checks each value when it is assigned, as in rosidl."""
-        return is_checked(type(self))
+        """True if the message checks each value at its assignment, as in rosidl."""
+        return codec.is_checked(type(self))
 
     @_check_fields.setter
     def _check_fields(self, check: bool) -> None:
-        from .checked import become_checked
+        from .on_demand.validation import become_checked
 
         become_checked(self, check)
 
@@ -203,7 +253,7 @@ class Message(metaclass=MessageMeta):
 
         They are a structured array; or Columns, where that cannot hold them or if `ragged`.
         """
-        from .on_demand.columns.rows import to_columns
+        from .on_demand.columns.read import to_columns
 
         return to_columns(cls, messages, fields, ragged, datetimes)
 
@@ -236,7 +286,7 @@ class Message(metaclass=MessageMeta):
 
         Nested messages become dictionaries, arrays lists, and bytes integers.
         """
-        from .on_demand.dictionaries import to_dict
+        from .on_demand.conversions import to_dict
 
         return to_dict(self)
 
@@ -246,7 +296,7 @@ class Message(metaclass=MessageMeta):
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
         """
-        from .on_demand.dictionaries import from_dict
+        from .on_demand.conversions import from_dict
 
         message: typing_extensions.Self = from_dict(cls, values)
         return message
@@ -271,14 +321,12 @@ class Message(metaclass=MessageMeta):
 
     def __rich_repr__(self) -> Iterable[tuple[str, Any]]:
         """Return names and values, for rich."""
-        from .on_demand.fields import named_values
-
         return named_values(self)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a message."""
-        from .on_demand.pydantic_schema import message_schema
+        from .on_demand.conversions import message_schema
 
         return message_schema(cls, handler(source), handler)
 
@@ -287,13 +335,221 @@ class Message(metaclass=MessageMeta):
         return super().__reduce_ex__(max(protocol, 2))
 
 
-if CHECK_FIELDS:
-    MessageMeta.__call__ = call_checked  # type: ignore[assignment]
+if codec.CHECK_FIELDS:
+    MessageMeta.__call__ = codec.call_checked  # type: ignore[assignment]
+
+
+# classes that users derive from generated ones, with `@dataclass` or without
+
+
+def _subclass(
+    metaclass: Any,
+    name: str,
+    bases: tuple[type, ...],
+    namespace: dict[str, Any],
+    options: dict[str, Any],
+) -> Any:
+    """Return the subclass; its `deserialize` and `==` are of its own kind."""
+    if "__slots__" in namespace:
+        fields = {field for base in bases for field in _field_names(base)}
+        namespace["__slots__"] = _without_fields(fields, namespace["__slots__"])
+        namespace.pop("__weakref__", None)  # dataclass() of Python 3.10 forgets it
+    created: Any = type.__new__(metaclass, name, bases, namespace, **options)
+    owner = metaclass._message
+    if owner is not None:
+        codec.extended(owner)
+        if created.__eq__ is owner.__eq__ and _holds_numbers(owner):
+            created.__eq__ = _equal
+    return created
+
+
+def _field_names(kind: type) -> tuple[str, ...]:
+    return getattr(kind, "__match_args__", ())
+
+
+def _without_fields(fields: set[str], slots: Any) -> Any:
+    """Return slots without those of fields, which have theirs: a second one would hide them.
+
+    `dataclass(slots=True)` asks for them.
+    """
+    if isinstance(slots, str):
+        return slots
+    if isinstance(slots, dict):
+        return {name: doc for name, doc in slots.items() if name not in fields}
+    return tuple(name for name in slots if name not in fields)
+
+
+def _holds_numbers(owner: Any) -> bool:
+    """Return whether a field may hold a `numpy.ndarray`, compared element by element."""
+    return any(
+        isinstance(owner.__dict__[name], property) for name in _field_names(owner)
+    )
+
+
+def _equal(self: Any, other: Any) -> Any:
+    """Compare as the generated class does, and then the fields that a dataclass adds."""
+    kind = type(self)
+    owner = owner_of(kind)
+    is_dataclass = kind.__dataclass_fields__ is not owner.__dataclass_fields__
+    if not is_dataclass or not kind.__dataclass_params__.eq:
+        return owner.__eq__(self, other)
+    if type(other) is not kind:
+        return NotImplemented
+    return owner.__eq__(self, other) and all(
+        same(getattr(self, name), getattr(other, name))
+        for name, field in kind.__dataclass_fields__.items()
+        if field.compare and name not in _field_names(owner)
+    )
+
+
+# services and actions
+
+
+class Package:
+    """A module of another package, imported on first access to one of its classes."""
+
+    def __init__(self, module: str) -> None:
+        self._module = module
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a class; what begins with an underscore is none."""
+        if name[0] == "_":
+            raise AttributeError(f"{self._module} has no class {name!r}")
+        with importing():
+            return getattr(__import__(self._module, fromlist=[name]), name)
+
+
+class Imported:
+    """A class attribute: a class of another package, imported on first access."""
+
+    def __init__(self, module: str, name: str) -> None:
+        self._package = Package(module)
+        self._name = name
+
+    def __get__(self, instance: object, owner: type | None = None) -> Any:
+        """Return the class; without the package, the attribute is missing."""
+        try:
+            return getattr(self._package, self._name)
+        except MissingPackageError as error:
+            raise AttributeError(str(error)) from error
+
+
+def _protocol(module: str) -> Any:
+    """Return the module of what ROS 2 adds to the service or action of a module."""
+    return __import__(f"{module}__protocol", fromlist=["__name__"])
+
+
+def _event(service: Any) -> Any:
+    name = f"{wire_name(service.__name__)}_Event"
+    service.Event = getattr(_protocol(service.__module__), name)
+    return service.Event
+
+
+def _impl(action: Any) -> Any:
+    name = f"{wire_name(action.__name__)}_Impl"
+    action.Impl = getattr(_protocol(action.__module__), name)
+    return action.Impl
+
+
+def complete(protocol: str) -> None:
+    """Copy the names of the module `protocol` into the module where rosidl has all classes.
+
+    Pickles look for classes there, and evaluated annotations for the names in them.
+    """
+    names = vars(sys.modules[protocol.removesuffix("__protocol")])
+    for name, value in vars(sys.modules[protocol]).items():
+        names.setdefault(name, value)
+
+
+def _protocol_getter(module: str) -> Any:
+    """Return a module's `__getattr__`, which finds what ROS 2 adds."""
+
+    def get(name: str) -> Any:
+        if name[0] != "_" and hasattr(_protocol(module), name):
+            return getattr(_protocol(module), name)
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+
+    return get
+
+
+class _GroupMeta(InterfaceMeta):
+    """Gives each service and action a metaclass of its own, for its type support.
+
+    What ROS 2 adds is in a module of its own, imported when somebody asks for it.
+    """
+
+    _interface: ClassVar[Any] = None
+    #: The attribute that stands for it, in a class that is not itself part of it.
+    _added: ClassVar[str]
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
+    ) -> Any:
+        if not bases:
+            return super().__new__(cls, name, bases, namespace)
+        metaclass = metaclass_of(cls, name, namespace)
+        created: Any = type.__new__(metaclass, name, bases, namespace)
+        metaclass._interface = created
+        if cls._added not in namespace:
+            module: Any = sys.modules[created.__module__]
+            module.__getattr__ = _protocol_getter(created.__module__)
+        return created
+
+    def __call__(cls, *_values: object, **_named: object) -> Any:
+        raise NotImplementedError(
+            f"{cls.__name__} is a name for its messages, not a message"
+        )
+
+
+class ServiceMeta(_GroupMeta):
+    """The metaclass of services."""
+
+    _added = "Event"
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        typesupport.import_service(cls._interface)
+
+
+class ActionMeta(_GroupMeta):
+    """The metaclass of actions."""
+
+    _added = "Impl"
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        typesupport.import_action(cls._interface)
+
+
+class Service(metaclass=ServiceMeta):
+    """The base of services: `Request`, `Response` and `Event` are their messages."""
+
+    if not TYPE_CHECKING:
+        Event = OnDemand(_event)
+
+
+class Action(metaclass=ActionMeta):
+    """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
+
+    if not TYPE_CHECKING:
+        Impl = OnDemand(_impl)
+
 
 __all__ = [
+    "Action",
+    "Imported",
     "InterfaceMeta",
     "Message",
     "MessageMeta",
+    "Package",
+    "Service",
+    "complete",
     "dataclass",
     "table",
 ]

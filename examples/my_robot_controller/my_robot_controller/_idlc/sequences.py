@@ -1,6 +1,7 @@
-"""Fields that convert: numeric sequences to an `array.array`, others to a `list`.
+"""Descriptors of fields in a class body: conversions on assignment, and mutable defaults.
 
-Only classes for distributions whose own ones do it make lists, from Lyrical on.
+Numeric sequences convert to an `array.array`, others to a `list`. Only classes for
+distributions whose own ones do it make lists, from Lyrical on.
 """
 
 from __future__ import annotations
@@ -10,23 +11,32 @@ from array import array
 from .cdr import NATIVE, single_bytes
 from .errors import FieldTypeError
 from .names import name_of
-from .typing_stub import Generic, TypeVar
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from functools import partial
-    from typing import Any
+    from typing import Any, Generic, TypeVar
 
     from .codec import Reading
+
+    Element = TypeVar("Element")
+    Number = TypeVar("Number", int, float)
+    Value = TypeVar("Value")
 else:
-    # functools takes longer to import than all that is here
+    # functools and typing take longer to import than all that is here
     from _functools import partial
 
-Element = TypeVar("Element")
-Number = TypeVar("Number", int, float)
+    class Generic:
+        """A base that can be subscripted and does nothing."""
 
-#: How other buffers spell the same numbers, where C has two names for them.
+        def __class_getitem__(cls, _parameters):
+            return cls
+
+    Element = Number = Value = None
+
+
+#: The codes of other buffers for the same numbers, where C has two names for them.
 SAME_NUMBER = {"l": "q", "L": "Q"} if array("l").itemsize == 8 else {"l": "i", "L": "I"}
 
 
@@ -92,7 +102,7 @@ class NumberSequence(Generic[Number]):
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a sequence."""
-        from .on_demand.pydantic_schema import numbers_schema
+        from .on_demand.conversions import numbers_schema
 
         kind = float if cls.code in "fd" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
@@ -178,10 +188,10 @@ def to_list(
     if read and raw is not None:
         return read(raw)
     try:
-        found = iter(values)
+        elements = iter(values)
     except TypeError:
         raise FieldTypeError(name, "a sequence", values) from None
-    return list(found)
+    return list(elements)
 
 
 class ListOf(Generic[Element]):
@@ -282,3 +292,30 @@ def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], 
         return result
 
     return native if order == NATIVE else swapped
+
+
+# defaults
+
+
+class Fresh(Generic[Value]):
+    """A class attribute whose value is created at each access, for mutable defaults."""
+
+    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
+        self._make = make
+        self._arguments = arguments
+
+    def __get__(self, instance: object, owner: type | None = None) -> Value:
+        """Return a new value."""
+        return self._make(*self._arguments)
+
+
+class FreshList(Fresh[list[Value]]):
+    """A class attribute whose value is a new list of the same values at each access."""
+
+    def __init__(self, *values: Value) -> None:
+        super().__init__(list, values)
+
+
+def several(kind: Any, count: int) -> list[Any]:
+    """Return a list of `count` new instances."""
+    return [kind() for _ in range(count)]

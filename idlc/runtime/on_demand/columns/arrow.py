@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..typeinfo import type_name, types
-from .definition import definition_of
+from ..typeinfo import FieldInfo, fields_of, type_name, types
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
 from .read import table_of
 from .table import columns_of
 
+#: Between a definition and those that it refers to.
+SEPARATOR = "=" * 80
 #: The unit of times in Arrow, by their dtype.
 TIMES = {"M8[ns]": "timestamp", "m8[ns]": "duration"}
 
@@ -67,7 +68,9 @@ def _flattened(pa: Any, struct: Any) -> Any:
 
 
 def _struct(pa: Any, names: list[str], arrays: list[Any], count: int) -> Any:
-    fields = [pa.field(name, one.type) for name, one in zip(names, arrays, strict=True)]
+    fields = [
+        pa.field(name, array.type) for name, array in zip(names, arrays, strict=True)
+    ]
     return pa.Array.from_buffers(pa.struct(fields), count, [None], children=arrays)
 
 
@@ -136,3 +139,50 @@ class _Arrays:
         type_ = pa.large_list(inner.type)
         buffers = [None, offsets]
         return pa.Array.from_buffers(type_, len(column), buffers, children=[inner])
+
+
+def definition_of(name: str) -> str:
+    """Return a type's definition and those it refers to, as recordings have them.
+
+    MCAP calls this form ros2msg.
+    """
+    needed = [name]
+    for type_ in needed:
+        nested = (field.nested for field in fields_of(type_) if field.nested)
+        needed += [other for other in dict.fromkeys(nested) if other not in needed]
+    parts = [_message_text(name)]
+    parts += [
+        f"{SEPARATOR}\nMSG: {_short_name(other)}\n{_message_text(other)}"
+        for other in needed[1:]
+    ]
+    return "".join(parts)
+
+
+def _message_text(name: str) -> str:
+    """Return a message file, or what its fields would be in one."""
+    source = types()["sources"].get(name)
+    if source is None or "/msg/" not in name:
+        source = "".join(
+            f"{_field_type(field)} {field.name}\n" for field in fields_of(name)
+        )
+    return source if source.endswith("\n") else f"{source}\n"
+
+
+def _field_type(field: FieldInfo) -> str:
+    if field.nested:
+        element = _short_name(field.nested)
+    elif field.primitive:
+        element = field.primitive.name
+    else:
+        bound = "" if field.text_bound is None else f"<={field.text_bound}"
+        element = f"{'wstring' if field.wide else 'string'}{bound}"
+    if field.size is not None:
+        return f"{element}[{field.size}]"
+    if field.bound is not None:
+        return f"{element}[<={field.bound}]"
+    return f"{element}[]" if field.is_sequence else element
+
+
+def _short_name(name: str) -> str:
+    package, _, short = name.split("/")
+    return f"{package}/{short}"

@@ -1,4 +1,4 @@
-"""Reading many serialized messages of one type: the whole of it, up to a table."""
+"""Reading many serialized messages of one type into a table, columns or a structured array."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ import numpy as np
 
 from ...errors import DecodeError
 from ..batches import failed
-from ..field_reader import check
-from ..typeinfo import type_name
-from .alike import alike
-from .build import plan_of
-from .gather import Flat, Pieces, Source
-from .lanes import Found, Lanes, UnreadableError
-from .plan import Level
-from .scan import Scan
-from .table import Elements, Table
+from ..typeinfo import check_buffer, type_name
+from .plan import Level, plan_of
+from .scan import Cursors, ScanResult, UnreadableError, VectorScan, scan_uniform
+from .source import Flat, Pieces, Source
+from .table import Elements, Table, UnevenError, columns_of, structured
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -38,7 +34,9 @@ class Messages(NamedTuple):
 
     def raw(self, index: int) -> bytes:
         """Return one message."""
-        start, stop = (np.array([int(one[index])]) for one in (self.starts, self.stops))
+        start, stop = (
+            np.array([int(positions[index])]) for positions in (self.starts, self.stops)
+        )
         return bytes(self.source.ranges(start, stop - start))
 
 
@@ -60,8 +58,8 @@ def messages_of(messages: Any) -> Messages:
 def _of_batch(batch: Any) -> Messages:
     array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
     starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
-    for one in (starts, stops):
-        if one.size and one.dtype.kind not in "iu":
+    for positions in (starts, stops):
+        if positions.size and positions.dtype.kind not in "iu":
             raise TypeError("starts and stops of a batch must be integers")
     starts, stops = starts.astype(np.int64), stops.astype(np.int64)
     if starts.shape != stops.shape or starts.ndim != 1:
@@ -69,6 +67,24 @@ def _of_batch(batch: Any) -> Messages:
     if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
         raise ValueError("a message of the batch is not within its buffer")
     return Messages(Flat(array), starts, stops)
+
+
+def to_columns(
+    kind: type,
+    messages: Any,
+    fields: Iterable[str] | None = None,
+    ragged: bool | None = None,
+    datetimes: bool = False,
+) -> Any:
+    """Return a row for each message, as a structured array or as Columns."""
+    table, top = table_of(kind, messages, fields, datetimes)
+    if not ragged:
+        try:
+            return structured(table, top)
+        except UnevenError as error:
+            if ragged is not None:
+                raise ValueError(f"{error}; ragged=True takes it") from None
+    return columns_of(table, top)
 
 
 def table_of(
@@ -88,23 +104,23 @@ def table_of(
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
     big = big_endian(messages)
     mixed = bool(big.any() and not big.all())
-    source, found = messages.source, Found()
+    source, result = messages.source, ScanResult()
     done: list[Any] = []
     for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
         starts = messages.starts[rows] + 4
-        lanes = Lanes(starts, messages.stops[rows], starts)
+        cursors = Cursors(starts, messages.stops[rows], starts)
         rest = np.ones(len(rows), bool)
-        for chosen in alike(plan, source, order, lanes, found):
+        for chosen in scan_uniform(plan, source, order, cursors, result):
             done.append(rows[chosen])
             rest[chosen] = False
         if rest.any():
-            first = found.count[plan.key]
-            found.count[plan.key] += int(rest.sum())
-            Scan(source, order, found).level(plan, lanes.some(rest), first)
+            first = result.count[plan.key]
+            result.count[plan.key] += int(rest.sum())
+            VectorScan(source, order, result).level(plan, cursors.select(rest), first)
             done.append(rows[rest])
     order = ">" if big.any() and not mixed else "<"
     size = int((messages.stops - messages.starts).sum())
-    table = Table(source, size, order, found)
+    table = Table(source, size, order, result)
     order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
     return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
 
@@ -131,7 +147,7 @@ def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check(name, messages.raw(first))
+        check_buffer(name, messages.raw(first))
     except DecodeError as error:
         failed(error, first)
     raise AssertionError(f"[{first}] can be read by itself")

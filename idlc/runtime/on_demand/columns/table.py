@@ -1,4 +1,4 @@
-"""Columns out of what a scan found: everything in the order of the messages again."""
+"""Columns and structured arrays from the result of a scan, in the order of the messages."""
 
 from __future__ import annotations
 
@@ -6,18 +6,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .gather import Place, Source, rows_of
-from .lanes import Found, joined
-from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings
-from .texts import narrow_texts, offsets_of, wide_texts, without_zeros
+from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings, Struct
+from .scan import ScanResult, joined
+from .source import (
+    Place,
+    Source,
+    narrow_texts,
+    offsets_of,
+    rows_of,
+    wide_texts,
+    without_zeros,
+)
 from .values import Columns, Ragged, Texts
+
+#: Texts take as much room as the longest of their column. So many bytes are always taken, and
+#: more only up to so many for each byte of the messages.
+ALWAYS_TAKEN = 1 << 28
+MOST_PER_BYTE = 100
 
 
 class Elements(NamedTuple):
     """The elements of a level.
 
-    `order` has the place of each, in the order in which they were found; None if that is the
-    order. `big` says which are big-endian, if only some are.
+    `order` has the place of each, in the order of the scan; None if they are in order. `big`
+    says which are big-endian, if only some are.
     """
 
     level: Level
@@ -27,26 +39,28 @@ class Elements(NamedTuple):
 
 
 class Table:
-    """What was found in messages of `size` bytes, by column.
+    """The located fields of messages of `size` bytes, by column.
 
     `order` is that of all messages; "<" if only some are big-endian.
     """
 
-    def __init__(self, source: Source, size: int, order: str, found: Found) -> None:
+    def __init__(
+        self, source: Source, size: int, order: str, scanned: ScanResult
+    ) -> None:
         self.source = source
         self.size = size
         self.order = order
-        self.found = found
+        self.scanned = scanned
         self.places: dict[int, tuple[Any, Any]] = {}
         self.lists: dict[int, tuple[Any, Elements]] = {}
 
     def sorted(self, elements: Elements, parts: list[Any]) -> Any:
-        """Return what was found of elements in their order."""
-        found = joined(parts)
+        """Return values of elements in the elements' order."""
+        values = joined(parts)
         if elements.order is None:
-            return found
-        result = np.empty_like(found)
-        result[elements.order] = found
+            return values
+        result = np.empty_like(values)
+        result[elements.order] = values
         return result
 
     def strings(self, elements: Elements, node: Strings) -> tuple[Any, Any]:
@@ -54,8 +68,8 @@ class Table:
         key = node.text.key
         assert key is not None
         if key not in self.places:
-            starts = self.sorted(elements, self.found.at[key])
-            sizes = self.sorted(elements, self.found.size[key])
+            starts = self.sorted(elements, self.scanned.at[key])
+            sizes = self.sorted(elements, self.scanned.size[key])
             if not node.text.wide:
                 sizes = without_zeros(self.source, starts, sizes)
             self.places[key] = starts, sizes
@@ -72,14 +86,14 @@ class Table:
         """Return the offsets of a column of sequences, and what the elements are."""
         assert step.key is not None
         if step.key not in self.lists:
-            counts = self.sorted(elements, self.found.size[step.key])
+            counts = self.sorted(elements, self.scanned.size[step.key])
             offsets = offsets_of(counts)
             level, order = step.level, None
             if not level.packed:
-                parent = joined(self.found.parent[level.key])
+                parent = joined(self.scanned.parent[level.key])
                 if elements.order is not None:
                     parent = elements.order[parent]
-                order = offsets[parent] + joined(self.found.index[level.key])
+                order = offsets[parent] + joined(self.scanned.index[level.key])
                 if (order == np.arange(len(order))).all():
                     order = None
             big = None if elements.big is None else np.repeat(elements.big, counts)
@@ -92,7 +106,7 @@ class Table:
         result: dict[int, Any] = {}
         for step in elements.level.steps:
             if isinstance(step, Segment) and step.leaves:
-                starts = self.sorted(elements, self.found.at[step.key])
+                starts = self.sorted(elements, self.scanned.at[step.key])
                 place = self.source.blocks(starts, step.size)
                 self.cut(step, place, result)
         return result
@@ -110,8 +124,8 @@ class Table:
         assert step.key is not None
         result: dict[int, Any] = {}
         if packed.leaves:
-            starts = self.sorted(around, self.found.at[step.key])
-            counts = self.sorted(around, self.found.size[step.key])
+            starts = self.sorted(around, self.scanned.at[step.key])
+            counts = self.sorted(around, self.scanned.size[step.key])
             size = packed.size
             place = rows_of(self.source, starts, counts, size) if even else None
             if place is None:
@@ -186,7 +200,7 @@ class _Making(Reading):
             return self.table.texts(self.elements, node)
         if isinstance(node, Instant):
             parts = (node.seconds, node.nanoseconds)
-            return instants(node, *(self.column(one, count, depth) for one in parts))
+            return instants(node, *(self.column(part, count, depth) for part in parts))
         if isinstance(node, Lists):
             return self.lists(node, count, depth)
         columns = {
@@ -209,3 +223,116 @@ class _Making(Reading):
 def instants(node: Instant, seconds: Any, nanoseconds: Any) -> Any:
     """Return times of numpy."""
     return (seconds.astype(np.int64) * 1_000_000_000 + nanoseconds).view(node.code)
+
+
+class UnevenError(Exception):
+    """Columns that a structured array cannot hold."""
+
+
+def structured(table: Table, top: Elements) -> Any:
+    """Return a structured array with a row for each message; raise UnevenError."""
+    node = top.level.node
+    dtype = _Types(table, top).dtype(node, top, "")
+    needed, present = top.total * dtype.itemsize, table.size
+    if needed > max(ALWAYS_TAKEN, MOST_PER_BYTE * present):
+        raise UnevenError(
+            f"the array would take {needed:,} bytes for {present:,} bytes of messages, "
+            f"as each text takes as much as the longest of its column"
+        )
+    result = np.zeros(top.total, dtype)
+    _Filling(table, top, table.numbers(top)).fill(node, result)
+    return result
+
+
+class _Types:
+    """Finds the dtypes of columns; raises UnevenError where there is none."""
+
+    def __init__(self, table: Table, top: Elements) -> None:
+        self.table = table
+        self.top = top
+
+    def dtype(self, node: Node, elements: Elements, path: str) -> Any:
+        """Return the dtype of a column."""
+        if isinstance(node, Numbers):
+            made: Any = np.dtype(node.code)
+            return made if node.size is None else np.dtype((made, (node.size,)))
+        if isinstance(node, Instant):
+            return np.dtype(node.code)
+        if isinstance(node, Struct):
+            return np.dtype(
+                [
+                    (
+                        name,
+                        self.dtype(inner, elements, f"{path}.{name}" if path else name),
+                    )
+                    for name, inner in node.fields.items()
+                ]
+            )
+        if isinstance(node, Lists):
+            count, inside = self.count(node, elements, path)
+            element = self.dtype(node.element, inside, path)
+            return np.dtype((element, (count,)))
+        if node.text.wide:
+            raise UnevenError(
+                f"{path} is a wstring, which no structured array can hold"
+            )
+        _, sizes = self.table.strings(elements, node)
+        return np.dtype(f"S{max(1, int(sizes.max(initial=0)))}")
+
+    def count(self, node: Lists, elements: Elements, path: str) -> tuple[int, Elements]:
+        """Return how many elements all have, and what these are."""
+        if node.step is None:
+            assert node.size is not None
+            return node.size, elements
+        offsets, inside = self.table.list(elements, node.step)
+        counts = np.diff(offsets)
+        if not len(counts):
+            return node.size or 0, inside
+        other = np.flatnonzero(counts != counts[0])
+        if len(other):
+            where = f"[{other[0]}].{path}" if elements is self.top else path
+            raise UnevenError(
+                f"{where}: has {counts[other[0]]} elements and {counts[0]} before; "
+                f"a structured array needs the same number in each"
+            )
+        return int(counts[0]), inside
+
+
+class _Filling(Reading):
+    """Copies columns of the elements of one level into a structured array."""
+
+    def fill(self, node: Node, target: Any) -> None:
+        """Copy a column."""
+        if isinstance(node, Struct):
+            for name, inner in node.fields.items():
+                self.fill(inner, target[name])
+        elif isinstance(node, Lists):
+            self.lists(node, target)
+        elif isinstance(node, Strings):
+            self.strings(node, target)
+        else:
+            target[...] = self.value(node).reshape(target.shape)
+
+    def strings(self, node: Strings, target: Any) -> None:
+        """Copy a column of strings."""
+        starts, sizes = self.table.strings(self.elements, node)
+        texts = self.table.source.strings(starts, sizes, target.dtype.itemsize)
+        target[...] = texts.reshape(target.shape)
+
+    def value(self, node: Numbers | Instant) -> Any:
+        """Return numbers or times, which may be in the buffer."""
+        if isinstance(node, Instant):
+            return instants(
+                node, self.value(node.seconds), self.value(node.nanoseconds)
+            )
+        numbers, big = self.numbers[node.key], self.elements.big
+        if node.code == "?" or big is not None:
+            return self.table.native(numbers, node.code, big)
+        return numbers
+
+    def lists(self, node: Lists, target: Any) -> None:
+        """Copy a column of sequences or arrays."""
+        inside = self
+        if node.step is not None:
+            _, inside = self.inside(node.step, self.elements.big is None)
+        inside.fill(node.element, target)

@@ -1,4 +1,4 @@
-"""What columns of serialized messages are made of, and what they are made from."""
+"""Columns of serialized messages, and batches of the messages they are made from."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Batch:
 
 
 class Column:
-    """What Texts, Ragged and Columns have in common: elements, as of a list."""
+    """The base of Texts, Ragged and Columns: access to elements, as of a list."""
 
     __slots__ = ()
 
@@ -55,8 +55,8 @@ class Column:
 
     def _index(self, place: Any) -> int:
         """Return the index of one element, counted from the front."""
-        found: int = range(len(self))[place]
-        return found
+        index: int = range(len(self))[place]
+        return index
 
 
 class _Sliced(Column):
@@ -168,7 +168,7 @@ class Columns(Column):
             raise KeyError(f"no column {place!r}, but {', '.join(self._columns)}")
         if isinstance(place, slice):
             count = len(range(self._count)[place])
-            columns = {name: one[place] for name, one in self._columns.items()}
+            columns = {name: column[place] for name, column in self._columns.items()}
             return Columns(columns, count)
         index = self._index(place)
         return self[index : index + 1].to_list()[0]
@@ -191,7 +191,7 @@ class Columns(Column):
         for name, column in self._columns.items():
             if isinstance(column, Columns):
                 inner = column.flat()
-                result |= {f"{name}.{below}": one for below, one in inner.items()}
+                result |= {f"{name}.{below}": leaf for below, leaf in inner.items()}
             else:
                 result[name] = column
         return result

@@ -1,4 +1,4 @@
-"""What ROS 2 is told about a type: its hash, its description and its source text.
+"""Type information for ROS 2: hash, description and source text of each type.
 
 The facts are JSON in `type_data.py` beside this module, written with the package and
 read only when rclpy asks for type support:
@@ -53,7 +53,7 @@ class Field(NamedTuple):
 
 
 class Types(NamedTuple):
-    """What is known of types; fields by type."""
+    """The facts about a package's types; fields by type."""
 
     package: str
     types: dict[str, list[Field]]
@@ -131,5 +131,5 @@ def about(name: str) -> c.About:
     individuals = c.sequence([_individual(n) for n in others], c.IndividualDescription)
     description = c.Description(_individual(name), individuals)
     sources = c.sequence([_source(n) for n in (name, *others)], c.Source)
-    told = (_type_hash(name), description, sources)
-    return c.About(*(c.constant(c.pointer(value)) for value in told))
+    values = (_type_hash(name), description, sources)
+    return c.About(*(c.constant(c.pointer(value)) for value in values))

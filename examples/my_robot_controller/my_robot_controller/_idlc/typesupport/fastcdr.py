@@ -24,11 +24,11 @@ _LITTLE_ENDIAN = 1
 
 
 class _Names(NamedTuple):
-    """How a version of Fast CDR calls what is needed of it."""
+    """The names that a version of Fast CDR has for the needed functions."""
 
     libraries: tuple[str, ...]
     new: str
-    plain: int  #: what plain CDR is called when a Cdr is made
+    plain: int  #: the constructor's value for plain CDR
     append: str
     position: str
     begin: str
@@ -87,8 +87,8 @@ def _words(cdr: int) -> list[int]:
 def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
     """Return the only index of the three pairs, else None."""
     pattern = [word for position in positions for word in (begin, position)]
-    found = [i for i in range(_WORDS - 6) if words[i : i + 6] == pattern]
-    return found[0] if len(found) == 1 else None
+    indices = [i for i in range(_WORDS - 6) if words[i : i + 6] == pattern]
+    return indices[0] if len(indices) == 1 else None
 
 
 @cache
@@ -127,8 +127,8 @@ def fast_cdr() -> FastCdr:
         or data.value != b"\1\2\3\4\5"
     ):
         raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    found = FastCdr(index + 1, index + 5)
-    c.WORDS[(here >> 3) + found.position] = begin + 1
+    layout = FastCdr(index + 1, index + 5)
+    c.WORDS[(here >> 3) + layout.position] = begin + 1
     if position_of(here) != begin + 1:
         raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
-    return found
+    return layout

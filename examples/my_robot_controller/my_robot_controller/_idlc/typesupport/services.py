@@ -45,7 +45,7 @@ class Event(NamedTuple):
 
 
 class _Memory:
-    """What rclpy finds on a message class's metaclass, for calls from here."""
+    """The functions of message memory that a class's metaclass has for rclpy."""
 
     def __init__(self, cls: type) -> None:
         def function(name: str, *prototype: Any) -> Any:
@@ -65,23 +65,23 @@ class _Memory:
 def event(cls: Any, handle: int) -> Event:
     """Return how rcl makes and frees messages of a service's Event class.
 
-    Both functions are needed as soon as there is a handle: rcl calls them without a look.
+    Both functions are needed as soon as there is a handle: rcl does not check for NULL.
     """
     requests, responses, events = map(_Memory, (cls.Request, cls.Response, cls.Event))
 
     def create(info: Any, _: int, request: int | None, response: int | None) -> int:
         memory = 0
         try:
-            told = info.contents
+            event_info = info.contents
             message = cls.Event(
                 request=requests.messages(request),
                 response=responses.messages(response),
             )
-            message.info.event_type = told.event_type
-            message.info.stamp.sec = told.sec
-            message.info.stamp.nanosec = told.nanosec
-            message.info.client_gid = list(told.client_gid)
-            message.info.sequence_number = told.sequence_number
+            message.info.event_type = event_info.event_type
+            message.info.stamp.sec = event_info.sec
+            message.info.stamp.nanosec = event_info.nanosec
+            message.info.client_gid = list(event_info.client_gid)
+            message.info.sequence_number = event_info.sequence_number
             memory = int(events.create())
             events.store(message, memory)
             return memory
@@ -123,7 +123,7 @@ def event(cls: Any, handle: int) -> Event:
 def service(
     name: str, request: int, response: int, event: Event, kind: ModuleType
 ) -> int:
-    """Return the address of a service's type support, made of its messages' handles."""
+    """Return the address of a service's type support, made from its messages' handles."""
     identifier, data = kind.service(name, request, response, event.handle)
     return c.pointer(
         c.ServiceTypeSupport(

@@ -1,8 +1,8 @@
 """Many serialized messages of one type as columns, without making messages.
 
-`values.py` has what is given and returned. In between, `build.py` makes the plan of a type,
-`scan.py` finds by it where everything is, and `table.py` makes columns of what was found;
-`rows.py` and `arrow.py` bring them into the forms of numpy and Arrow.
+`values.py` has the types that are passed in and returned. In between, `plan.py` makes the plan
+of a type, `scan.py` locates every field by it, and `table.py` makes columns and structured
+arrays; `read.py` and `arrow.py` are the entries, for numpy and for Arrow.
 """
 
 from .values import Batch, Columns, Ragged, Texts

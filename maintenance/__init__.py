@@ -1,0 +1,1 @@
+"""For the people who maintain idlc: releases, the documentation site, what CI installs."""

@@ -1,0 +1,128 @@
+"""Writing the version, its day and the place of the repository wherever they stand."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import NamedTuple
+
+from maintenance.release.project import EXTENSION, EXTENSION_FILES, FailedError, Project
+
+#: The paragraphs that say what to do as long as there is no repository and no index.
+_UNTIL = re.compile(r"<!-- until idlc is published -->\n.*?<!-- end -->\n\n?", re.DOTALL)
+#: What documents tell people to paste: as long as there is none, and from then on.
+PASTED = {
+    "README.md": {
+        "    pip install .            # '.[ros]'": "    pip install idlc         # 'idlc[ros]'",
+    },
+    "docs/ci.md": {
+        "wheels/idlc-*.whl": "idlc=={version}",
+        "repo: ../idlc": "repo: {repository}",
+        "rev: HEAD": "rev: v{version}",
+        "uses: ./tools/idlc": "uses: {name}@v{version}",
+    },
+    "docs/install.md": {},
+    "docs/interface-packages.md": {},
+}
+#: How an earlier release is named in the same places.
+_EARLIER = re.compile(r"(idlc==|rev: v|uses: [\w.-]+/[\w.-]+@v)\d+\.\d+\.\d+(?![\w.])")
+_URLS = """
+[project.urls]
+Repository = "{repository}"
+Documentation = "{repository}/blob/main/docs/index.md"
+Changelog = "{repository}/blob/main/CHANGELOG.md"
+Issues = "{repository}/issues"
+Security = "{repository}/security/policy"
+"""
+_NO_CHANGES = (
+    "{path} has no part for {version}: add `## {version} (not released yet)` above the other "
+    "versions, with what users can see; nothing was written"
+)
+_NO_VERSION = "{path} names no version; nothing was written"
+_REPOSITORY = re.compile(r"https://github\.com/([\w.-]+/[\w.-]+)")
+
+
+class _Edits(NamedTuple):
+    """What is to be written, by path: all of it, or nothing if something is wrong."""
+
+    project: Project
+    texts: dict[str, str]
+
+    def text(self, path: str) -> str:
+        """Return what a file will hold."""
+        return self.texts[path] if path in self.texts else self.project.text(path)
+
+    def write(self, path: str, text: str) -> None:
+        """Note what a file is to hold."""
+        self.texts[path] = text
+
+    def write_json(self, path: str, content: dict[str, object]) -> None:
+        """Note what a JSON file is to hold."""
+        self.write(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+
+    def substitute(self, path: str, pattern: str, new: str, missing: str) -> None:
+        """Replace what is in one place; fail with what is `missing` otherwise."""
+        text, number = re.subn(pattern, new, self.text(path))
+        if number != 1:
+            raise FailedError(missing if not number else f"{path} has {number} places for {new}")
+        self.write(path, text)
+
+    def save(self) -> None:
+        """Write the files."""
+        for path, text in self.texts.items():
+            (self.project.root / path).write_text(text, encoding="utf-8")
+
+
+def publish_at(project: Project, repository: str) -> None:
+    """Name the repository where it has to stand; the first release does that once."""
+    known = _REPOSITORY.fullmatch(repository)
+    if known is None:
+        raise FailedError(f"{repository} is not like https://github.com/OWNER/NAME")
+    if project.repository is not None:
+        raise FailedError(f"pyproject.toml names {project.repository} already")
+    edits = _Edits(project, {})
+    facts = {"repository": repository, "name": known[1], "version": project.version}
+    mark = "\n[project.optional-dependencies]\n"
+    text = edits.text("pyproject.toml")
+    edits.write("pyproject.toml", text.replace(mark, _URLS.format(**facts) + mark, 1))
+    citation = edits.text("CITATION.cff")
+    edits.write("CITATION.cff", f"{citation}repository-code: {repository}\n")
+    place = {"type": "git", "url": f"{repository}.git", "directory": EXTENSION}
+    manifest = json.loads(edits.text(f"{EXTENSION}/package.json"))
+    edits.write_json(f"{EXTENSION}/package.json", {**manifest, "repository": place})
+    for path, pairs in PASTED.items():
+        text = _UNTIL.sub("", edits.text(path))
+        for now, then in pairs.items():
+            if now not in text:
+                raise FailedError(f"{path} does not say {now}")
+            text = text.replace(now, then.format(**facts))
+        edits.write(path, text)
+    edits.save()
+
+
+def version_is(project: Project, version: str, day: str) -> None:
+    """Give the version and its day to everything that names them.
+
+    That is the package, the extension of VS Code, the changelog, documents and the citation.
+    """
+    if not re.fullmatch(r"\d+\.\d+\.\d+", version):
+        raise FailedError(f"{version} is not like 1.2.3")
+    if not re.fullmatch(r"\d{4}-\d\d-\d\d", day):
+        raise FailedError(f"{day} is not like 2026-12-31")
+    edits = _Edits(project, {})
+    for path, pattern, new, missing in (
+        ("CHANGELOG.md", rf"## {re.escape(version)} \(.*\)", f"## {version} ({day})", _NO_CHANGES),
+        ("idlc/version.py", '__version__ = ".*"', f'__version__ = "{version}"', _NO_VERSION),
+        ("CITATION.cff", "version: .*", f"version: {version}", _NO_VERSION),
+    ):
+        edits.substitute(path, f"(?m)^{pattern}$", new, missing.format(path=path, version=version))
+    manifest, lock = (json.loads(edits.text(path)) for path in EXTENSION_FILES)
+    for part in (manifest, lock, lock["packages"][""]):
+        part["version"] = version
+    for path, content in zip(EXTENSION_FILES, (manifest, lock), strict=True):
+        edits.write_json(path, content)
+    text = re.sub(r"(?m)^date-released: .*\n", "", edits.text("CITATION.cff"))
+    edits.write("CITATION.cff", f"{text}date-released: {day}\n")
+    for path in PASTED:
+        edits.write(path, _EARLIER.sub(rf"\g<1>{version}", edits.text(path)))
+    edits.save()
