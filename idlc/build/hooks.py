@@ -21,8 +21,8 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import did_you_mean, without_options
 from idlc.project import prefixes, settings
 from idlc.project.files import reason
-from idlc.project.package_xml import MANIFEST
 from idlc.project.prefixes import Distribution
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     from idlc.build import manifest
     from idlc.build.manifest import completed
 
-    load_settings(report)  # which reports what is no TOML
+    load_settings(Root.here(), report)  # which reports what is no TOML
     if not Path(MANIFEST).is_file():
         message = f"there is no {MANIFEST} beside pyproject.toml"
         hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"

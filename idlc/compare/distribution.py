@@ -73,7 +73,12 @@ class _Layered(Library):
     ) -> None:
         own = {package.package: package.folders for package in packages}
         super().__init__(
-            scope.include, Report(), own=own, exclude=scope.exclude, distro=scope.distro
+            scope.include,
+            scope.root,
+            Report(),
+            own=own,
+            exclude=scope.exclude,
+            distro=scope.distro,
         )
         self.other = other
         self._other_first = other_first

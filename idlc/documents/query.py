@@ -78,20 +78,22 @@ def requested_models(
 
     Interfaces with errors are left out.
     """
-    paths = [target for target in targets if is_path(target)]
+    paths = [target for target in targets if is_path(target, scope.root)]
     for target in targets:
         if target not in paths:
             problems = Report()
             yield from _named(target, scope, problems)
             report.extend(problems)
-    recordings, paths = split_recordings(paths)
+    recordings, paths = split_recordings(paths, scope.root)
     if recordings:
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(recordings, scope, report)
     if paths:
         problems = Report()
-        packages = inputs.packages(find(paths, problems, scope.exclude), scope, problems)
+        packages = inputs.packages(
+            find(paths, scope.root, problems, scope.exclude), scope, problems
+        )
         report.extend(problems)
         report.notes += problems.notes
         if not problems.had_errors:

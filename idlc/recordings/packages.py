@@ -16,7 +16,6 @@ from idlc.diagnostics.text import including
 from idlc.generate.requested import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
-from idlc.project.files import absolute
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
@@ -110,7 +109,7 @@ def recorded_packages(
     if not whole:
         _note_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
-    home = absolute(paths[0])
+    home = scope.root.absolute(paths[0])
     return [msgspec.structs.replace(package, home=home) for package in packages], types.texts
 
 

@@ -15,8 +15,9 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.project import write
-from idlc.project.files import absolute, decode, read_bytes
+from idlc.project.files import decode, read_bytes
 from idlc.project.lock import Obstacle, Tree, is_same
+from idlc.project.root import Root
 from idlc.project.write import Change, Plan, difference
 
 
@@ -30,9 +31,9 @@ class FileOutcome(NamedTuple):
 class Project:
     """A package's folder, existing or not; `name` is its name in reports."""
 
-    def __init__(self, name: str, report: Report, *, force: bool = False) -> None:
+    def __init__(self, name: str, root: Root, report: Report, *, force: bool = False) -> None:
         self.name = name
-        self.path: Path = absolute(name)
+        self.path: Path = root.absolute(name)
         self._report = report
         self._force = force
 
