@@ -24,10 +24,11 @@ def gen(package: Path, out: Path) -> None:
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions
     from idlc.generate.gen import gen as gen_gen
+    from idlc.project.root import Root
     from idlc.project.settings import Scope
 
     paths, include = (str(package),), (str(package.parent),)
-    options = GenOptions(paths, str(out / package.name), Scope(package.name, include))
+    options = GenOptions(paths, Scope(Root.here(), package.name, include), str(out / package.name))
     assert gen_gen(options, Report()), f"idlc gen failed on {package}"
 
 

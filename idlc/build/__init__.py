@@ -18,7 +18,7 @@ from idlc.generate.python.render import support_packages
 from idlc.project.files import is_file, read_bytes
 from idlc.project.find import look
 from idlc.project.inputs import packages
-from idlc.project.package_xml import MANIFEST
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
 
@@ -46,13 +46,13 @@ def compile_interfaces(package: str) -> dict[str, type]:
 def _compiled(package: str) -> type:
     """Compile the package in the working folder; return a class for setup(distclass=...)."""
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     where = scope(settings, package)
-    inputs = packages(look((".",), Report(), where.exclude).files, where, report)
+    inputs = packages(look((".",), where.root, Report(), where.exclude).files, where, report)
     if not inputs:
         return distribution_class(package, {})
-    home = home_of(Path.cwd(), package).relative_to(Path.cwd()).as_posix()
-    gen(GenOptions((".",), home, scope=where, vendor_deps=settings.vendor_deps), report)
+    home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
+    gen(GenOptions((".",), where, home, vendor_deps=settings.vendor_deps), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)

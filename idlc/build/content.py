@@ -15,12 +15,12 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
 from idlc.project import settings
-from idlc.project.files import is_folder, read_bytes, shown
+from idlc.project.files import is_folder, read_bytes
 from idlc.project.find import look, nothing_in
 from idlc.project.inputs import Inputs, packages
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import MANIFEST
 from idlc.project.prefixes import INDEX, Distribution
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import Place, Scope, load_settings, scope
 
 
@@ -47,7 +47,8 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
 
     Returns `None` after a problem.
     """
-    config = load_settings(report)
+    root = Root.here()
+    config = load_settings(root, report)
     if config.source:
         place = Place(config.source, "tool.idlc", "[tool.idlc]")
         if config.vendor_deps:
@@ -64,9 +65,9 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     package = _package(name, where, report)
     if package is None:
         return None
-    _refuse_code(name, report)
+    _refuse_code(name, root, report)
     generated = Report()
-    gen(GenOptions(paths=(".",), out=str(classes), scope=where), generated)
+    gen(GenOptions((".",), where, str(classes)), generated)
     # the environment of a build need not be able to import the package
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     report.extend(each for each in generated if each.code != unimportable)
@@ -81,14 +82,14 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     return Content(classes, shared(model, manifest, libraries, report), libraries)
 
 
-def _refuse_code(name: str, report: Report) -> None:
+def _refuse_code(name: str, root: Root, report: Report) -> None:
     """Report Python modules beside committed classes: the wheel would not have them."""
     lock = load_lock(Path(name), name, report)
     # where classes are committed, people describe the package in the first of these
     generated = {Path(name, path) for path in ("__init__.py", *(lock.outputs if lock else ()))}
     own = sorted({*Path(name).rglob("*.py")} - generated)
     if own:
-        files = first_few((f"`{shown(path)}`" for path in own), 3)
+        files = first_few((f"`{root.shown(path)}`" for path in own), 3)
         message = f"idlc.backend builds interfaces alone, and here is {files}"
         hint = 'use `build-backend = "setuptools.build_meta"` with the setup.py of a package'
         report.add(codes.BAD_CONFIG.of(settings.SETTINGS_FILE, message, hint=hint))
@@ -108,9 +109,9 @@ def _required_prefixes() -> list[str]:
 
 def _package(name: str, where: Scope, report: Report) -> Inputs | None:
     """Return the files of the package in the working folder; report IDL606 or IDL608 for none."""
-    files = look((".",), report, where.exclude)
+    files = look((".",), where.root, report, where.exclude)
     if files.empty:
-        report.add(nothing_in(".", where.exclude))
+        report.add(nothing_in(".", where.root, where.exclude))
     inputs = () if report.had_errors else packages(files.files, where, report)
     if inputs and [package.package for package in inputs] != [name]:
         others = ", ".join(f"`{package.package}`" for package in inputs)

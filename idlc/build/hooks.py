@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from idlc.cli import output
-from idlc.cli.exit_status import ended
+from idlc.cli.exit_status import status_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.text import did_you_mean, without_options
 from idlc.project import prefixes, settings
 from idlc.project.files import reason
-from idlc.project.package_xml import MANIFEST
 from idlc.project.prefixes import Distribution
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def finished(build: Callable[[Report], str | None]) -> str:
         output.notes(report, sys.stderr)
         return 0 if built else output.status(report) or 1
 
-    status = ended(command)
+    status = status_of(command)
     if status:
         sys.stderr.write("idlc: nothing was built, see above\n")
         raise SystemExit(status)
@@ -126,7 +126,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     from idlc.build import manifest
     from idlc.build.manifest import completed
 
-    load_settings(report)  # which reports what is no TOML
+    load_settings(Root.here(), report)  # which reports what is no TOML
     if not Path(MANIFEST).is_file():
         message = f"there is no {MANIFEST} beside pyproject.toml"
         hint = "`idlc scaffold package NAME --interfaces` writes a folder that can be built"

@@ -11,7 +11,8 @@ from typing import Any
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.model.names import why_not_package
-from idlc.project.package_xml import MANIFEST, Statement, declared_name, read_statements
+from idlc.project.package_xml import Statement, declared_name, read_statements
+from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import SETTINGS_FILE
 
 #: The packages on PyPI that every generated package needs. The packages of ROS 2 that it imports
@@ -26,15 +27,15 @@ _READMES = ("README.md", "README.rst", "README.txt")
 
 def project(report: Report) -> dict[str, Any]:
     """Return the table by the working folder's package.xml; empty after a problem."""
-    path = Path(MANIFEST)
-    name = declared_name(path, MANIFEST, report)
+    root = Root.here()
+    name = declared_name(root.base / MANIFEST, root, report)
     if name is None:
         return {}
     if why := why_not_package(name):
         hint = "change `<name>`, and its uses in other packages"
         report.add(codes.UNIMPORTABLE_PACKAGE.of(MANIFEST, f"`{name}` {why}", hint=hint))
         return {}
-    statements = read_statements(path, MANIFEST, report)
+    statements = read_statements(root.base / MANIFEST, MANIFEST, root, report)
     version = None if report.had_errors else _version(statements, report)
     if version is None:
         return {}

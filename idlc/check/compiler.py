@@ -153,12 +153,12 @@ def library_for(
     own = {package.package: package.folders for package in packages}
     return Library(
         scope.include,
+        scope.root,
         report,
         own=own,
         exclude=scope.exclude,
         distro=scope.distro,
         texts=texts,
-        unsaved=scope.unsaved,
     )
 
 

@@ -153,7 +153,7 @@ def _is_char(type_: ir.FieldType) -> bool:
 
 
 def _constant_type(constant: ir.Constant) -> Span | None:
-    """Return where a constant's type stands: at the beginning of its line."""
+    """Return the range of a constant's type: at the beginning of its line."""
     span = constant.name_span
     if span is None:
         return None

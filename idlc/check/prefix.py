@@ -21,7 +21,6 @@ from idlc.generate.native.library import (
 )
 from idlc.model import derive
 from idlc.project import inputs
-from idlc.project.files import absolute, shown
 from idlc.project.find import look
 from idlc.project.prefixes import (
     INDEX,
@@ -33,6 +32,7 @@ from idlc.project.prefixes import (
     machine,
     prefixes,
 )
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 _AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
 
 
-def check_prefix(folder: str, report: Report) -> Checked:
+def check_prefix(folder: str, root: Root, report: Report) -> Checked:
     """Report each package in a prefix, or in the prefixes in a folder, that stops recorders."""
-    folders = prefixes(absolute(folder))
+    folders = prefixes(root.absolute(folder))
     if not folders:
         message = f"no packages are installed in `{folder}`: there is no share/ament_index"
         hint = "name the folder that is in AMENT_PREFIX_PATH, or colcon's `install`"
@@ -51,10 +51,10 @@ def check_prefix(folder: str, report: Report) -> Checked:
     for prefix in folders:
         for package, why in inconsistencies(prefix):
             message = f"`{package}`, which is in ROS 2's index, {why}"
-            place = shown(prefix / INDEX)
+            place = root.shown(prefix / INDEX)
             report.add(codes.INCONSISTENT_INDEX.of(place, message, hint=_AGAIN))
     files = []
-    for owner in (owner for prefix in folders for owner in installed_packages(prefix)):
+    for owner in (owner for prefix in folders for owner in installed_packages(prefix, root)):
         model = _model(owner)
         for identifier in (OWN, FIELDS_CPP):
             name = f"lib{owner.package}__{identifier}.so"
@@ -74,11 +74,12 @@ def check_prefix(folder: str, report: Report) -> Checked:
 def _model(package: InstalledPackage) -> Model | None:
     """Return the model of a package's installed interfaces; `None` after errors."""
     dropped = Report()
-    files = look((package.share,), dropped).files
-    package_inputs = inputs.load(
-        package.package, files, package.prefix / "share" / package.package, dropped
-    )
-    models = list(models_of((package_inputs,), Scope(include=(str(package.prefix),)), dropped))
+    root = package.root
+    files = look((package.share,), root, dropped).files
+    home = package.prefix / "share" / package.package
+    package_inputs = inputs.load(package.package, files, home, root, dropped)
+    scope = Scope(root, include=(str(package.prefix),))
+    models = list(models_of((package_inputs,), scope, dropped))
     return None if dropped.had_errors or not files else models[0][1]
 
 

@@ -12,7 +12,6 @@ from idlc.check.package.facts import facts
 from idlc.check.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import inputs
-from idlc.project.files import absolute
 from idlc.project.find import KINDS, look, nothing_in
 from idlc.project.settings import Scope
 
@@ -31,7 +30,7 @@ class CheckOptions(msgspec.Struct, frozen=True):
     """The options of `idlc check`."""
 
     paths: tuple[str, ...]
-    scope: Scope = Scope()
+    scope: Scope
     selection: Selection = Selection()
     fix: bool = False
 
@@ -54,21 +53,21 @@ def check(options: CheckOptions, report: Report) -> Checked:
     With `fix`, problems with a harmless edit are fixed, and the others reported.
     """
     if not all(path.endswith(tuple(KINDS)) for path in options.paths):
-        from idlc.recordings.find import divided
+        from idlc.recordings.find import split_recordings
 
-        recordings, others = divided(options.paths)
+        recordings, others = split_recordings(options.paths, options.scope.root)
         if recordings:
             return _with_recordings(recordings, others, options, report)
     fixed = 0
     for rounds_left in reversed(range(_ROUNDS + 1)):
         looked = Report()
-        checked, problems = _once(options, looked)
+        checked, problems = _check_once(options, looked)
         edits = [change for problem in problems for change in problem.edits]
         if not (options.fix and edits and rounds_left) or looked.had_errors or report.had_errors:
             break
         from idlc.project.atomic import edit
 
-        done = edit(edits, report, tidied)
+        done = edit(edits, options.scope.root, report, tidied)
         fixed += done
         if not done:
             break
@@ -94,7 +93,7 @@ def _with_recordings(
 
 
 def tidied(name: str, old: str, new: str) -> str:
-    """Return an edited file in its old layout: that of `idlc fmt`, or without long lines."""
+    """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
     if name.endswith("setup.py"):
         from idlc.check.package.setup_edits import wrapped
 
@@ -109,13 +108,14 @@ def tidied(name: str, old: str, new: str) -> str:
     return format_file(parse(Source(name, new)))
 
 
-def _once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
+def _check_once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
-    listing = look(options.paths, report, scope.exclude, scope.unsaved)
+    root = scope.root
+    listing = look(options.paths, root, report, scope.exclude)
     packages = inputs.packages(listing.files, scope, report, listing.packages)
     for path in listing.empty:
-        if not any(package.home.is_relative_to(absolute(path)) for package in packages):
-            report.add(nothing_in(path, scope.exclude, also="package.xml and no "))
+        if not any(package.home.is_relative_to(root.absolute(path)) for package in packages):
+            report.add(nothing_in(path, root, scope.exclude, also="package.xml and no "))
     reports: dict[str, Report] = {}
     models: list[Model] = []
     for distro, checker in checkers(packages, scope).items():
@@ -190,9 +190,8 @@ class Checker:
 
     def package_facts(self, package: inputs.Inputs) -> Facts | None:
         """Return the facts about a package, with its current texts."""
-        scope = self._scope
         if package.package not in self._facts:
-            new = facts(package, self.library.packages, scope.exclude, scope.unsaved)
+            new = facts(package, self.library.packages, self._scope)
             self._facts[package.package] = new
         current = self._facts[package.package]
         if current is None or not current.inputs:

@@ -50,7 +50,7 @@ QUANTITIES = {
     "yaw": "rad",
 }
 
-#: Units that are not those of REP 103, and those that are.
+#: Unusual units, and their replacements in REP 103.
 _USUAL = {
     "bar": "Pa",
     "cm": "m",
@@ -96,7 +96,7 @@ _USUAL = {
 }
 
 
-#: Words of names of places on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
+#: Words for positions on the earth, which are in degrees, as in sensor_msgs/NavSatFix.
 _ON_EARTH = frozenset(("lat", "latitude", "lon", "long", "longitude"))
 
 
@@ -195,7 +195,7 @@ def _top(interface: ir.Interface, first: ir.Field | None = None) -> Span:
 
 
 def documented_interfaces(model: Model, report: Report) -> None:
-    """Every file begins with a comment that says what it is for."""
+    """Every file begins with a comment about its purpose."""
     for interface in model.own:
         if interface.source and not any(part.comment for part in derive.sections(interface)):
             noun = {"msg": "message", "srv": "service"}.get(interface.name.kind, "action")
@@ -233,7 +233,7 @@ def missing_units(model: Model, report: Report) -> None:
     """A number whose name is a physical quantity has a unit."""
     for field in _quantities(model):
         unit = expects_unit(field.name)
-        if unit and not unit_of(field) and field.name_span and not _says(field.comment, unit):
+        if unit and not unit_of(field) and field.name_span and not _names_unit(field.comment, unit):
             report.add(
                 codes.MISSING_UNIT.at(
                     field.name_span,
@@ -243,13 +243,13 @@ def missing_units(model: Model, report: Report) -> None:
             )
 
 
-def _says(comment: Iterable[str], unit: str) -> bool:
+def _names_unit(comment: Iterable[str], unit: str) -> bool:
     """Return whether a comment names a unit without the brackets."""
     return any(unit in line.replace("(", " ").replace(")", " ").split() for line in comment)
 
 
 def unusual_units(model: Model, report: Report) -> None:
-    """Units are those of REP 103: metres, radians, seconds."""
+    """Units follow REP 103: metres, radians, seconds."""
     for field in _quantities(model):
         unit = unit_of(field)
         usual = usual_unit(unit) if unit else None
@@ -283,7 +283,7 @@ def constant_prefixes(model: Model, report: Report) -> None:
 
 
 def suffixes(model: Model, report: Report) -> None:
-    """The name of a file does not repeat what its extension says."""
+    """The name of a file does not repeat its extension."""
     for interface in model.own:
         name, kind = interface.name.name, interface.name.kind
         suffix = next(

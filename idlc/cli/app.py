@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from idlc.cli.exit_status import PipeClosedError, ended
+from idlc.cli.exit_status import PipeClosedError, status_of
 from idlc.version import __version__
 
 
@@ -158,7 +158,7 @@ def app() -> None:
 
 def run(words: list[str]) -> int:
     """Run a command and return the exit status."""
-    return ended(lambda: _through_click(words))
+    return status_of(lambda: _through_click(words))
 
 
 def _through_click(words: list[str]) -> object:

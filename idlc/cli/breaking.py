@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from idlc.compare.recording import RecordedVerdict
     from idlc.compare.running import GraphVerdict
     from idlc.diagnostics.report import Report
-
+    from idlc.project.root import Root
 GRAPH = "graph"
 PATIENCE = 5.0
 
@@ -42,10 +42,11 @@ def compare(typed: BreakingArguments) -> int:
     from idlc.compare.changes import LEVELS
     from idlc.compare.distribution import is_distro
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     against = typed.against or packages.against(settings, report)
     allowed = packages.allowances(settings, report)
     if against is None and not report.had_errors:
@@ -56,7 +57,7 @@ def compare(typed: BreakingArguments) -> int:
         raise click.UsageError("--timeout is for --against graph")
     verdict: Verdict | GraphVerdict | RecordedVerdict | None = None
     if against is not None and not report.had_errors:
-        recordings, paths = _recordings(against, typed.paths)
+        recordings, paths = _recordings(against, typed.paths, settings.root)
         needs_none = recordings or is_distro(against)
         comparison = BreakingOptions(
             paths=paths or settings.paths or (() if needs_none else (".",)),
@@ -74,7 +75,9 @@ def compare(typed: BreakingArguments) -> int:
     return output.status(report)
 
 
-def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _recordings(
+    against: str, paths: tuple[str, ...], root: Root
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the recordings to compare with, and the paths that are none of them."""
     from idlc.compare.breaking import GIT
     from idlc.compare.distribution import is_distro
@@ -83,7 +86,7 @@ def _recordings(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], 
         return (), paths
     from idlc.recordings.find import recordings_of
 
-    return recordings_of(against, paths)
+    return recordings_of(against, paths, root)
 
 
 def _compared(

@@ -9,6 +9,7 @@ from idlc.model import ir
 from idlc.model.distros import BY_NAME
 from idlc.project import inputs
 from idlc.project.library import Library
+from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 
 
@@ -34,7 +35,7 @@ def types(
     package, slash, rest = word.partition("/")
     if slash:
         return sorted(_within(package, rest, library, kinds))
-    near = list(inputs.near())
+    near = list(inputs.near(Root.here()))
     named = {
         interface.name
         for name in (library.packages() if bare == "all" else near)
@@ -54,10 +55,12 @@ def types(
 
 def topics(word: str, paths: Sequence[str]) -> list[str]:
     """Return the topics of recordings that begin with a word."""
-    from idlc.recordings.find import divided
-    from idlc.recordings.versions import read
+    from idlc.recordings.find import split_recordings
+    from idlc.recordings.versions import read_topics
 
-    recordings = filter(None, (read(path, Report()) for path in divided(paths)[0]))
+    recordings = filter(
+        None, (read_topics(path, Report()) for path in split_recordings(paths, Root.here())[0])
+    )
     names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 
@@ -75,7 +78,7 @@ def _within(package: str, rest: str, library: Library, kinds: Sequence[ir.Kind])
 
 def _library(include: Sequence[str], distro: str | None) -> Library:
     """Return the library for a distribution, by default for the one in the settings."""
-    report = Report()
+    report, root = Report(), Root.here()
     name = distro if distro in BY_NAME else None
-    selected = scope(load_settings(report), distro=name).distro
-    return Library(include, report, own=inputs.near(), distro=selected)
+    selected = scope(load_settings(root, report), distro=name).distro
+    return Library(include, root, report, own=inputs.near(root), distro=selected)

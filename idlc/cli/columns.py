@@ -72,17 +72,18 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     Each row has the time when a message was recorded, and a column for each of its fields.
     """
     from idlc.cli import output
-    from idlc.cli.output import shown
+    from idlc.cli.output import progress_bar
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.recordings.columns import ColumnsOptions, columns
-    from idlc.recordings.find import divided, expanded
+    from idlc.recordings.find import expanded, split_recordings
 
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
-    recordings, topics = divided(arguments.pop("topics"))
+    recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
     paths = (*expanded(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
-    with shown(sys.stderr) as update:
+    with progress_bar(sys.stderr) as update:
         written = columns(request, report, update)
     for file in written:
         sys.stderr.write(f"{file.topic}: {file.rows:,} messages → {file.path}\n")

@@ -33,10 +33,11 @@ def command(subject: str, package: str | None, include: tuple[str, ...], distro:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.documents.query import describe
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     where = scope(settings, package, include, distro=distro)
     content = None if report.had_errors else describe(subject, where, report)
     if content is not None:

@@ -10,6 +10,7 @@ from idlc.check import select
 from idlc.check.run import Checked, CheckOptions, check
 from idlc.cli import output, reports
 from idlc.diagnostics.report import Report
+from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 
 
@@ -33,14 +34,14 @@ def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None)
     """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
     arguments = arguments or CheckArguments()
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     configured = select.selection(settings, report)
     chosen = configured.with_lists(arguments.select, arguments.ignore)
     checked = Checked(())
     if arguments.prefix is not None:
         from idlc.check.prefix import check_prefix
 
-        checked = check_prefix(arguments.prefix, report)
+        checked = check_prefix(arguments.prefix, settings.root, report)
     elif not report.had_errors:
         where = scope(
             settings,

@@ -41,10 +41,11 @@ def command(
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.terminal import counted
     from idlc.documents.docs import docs
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     pages = 0
     if not report.had_errors:
         paths = paths or settings.paths or (".",)

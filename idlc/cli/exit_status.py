@@ -50,7 +50,7 @@ class PipeClosedError(Exception):
     """The reader of the output is gone; click would end the process itself."""
 
 
-def ended(command: Callable[[], object]) -> int:
+def status_of(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
     set_up()
     try:

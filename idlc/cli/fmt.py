@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.source import Source
     from idlc.project.find import Exclusions, InterfaceFile
+    from idlc.project.root import Root
 
 
 class Formatted(NamedTuple):
@@ -30,7 +31,7 @@ class Formatted(NamedTuple):
 
 
 def fmt(
-    paths: Sequence[str], exclude: Exclusions, report: Report, *, write: bool
+    paths: Sequence[str], root: Root, exclude: Exclusions, report: Report, *, write: bool
 ) -> Iterator[Formatted]:
     """Yield each file that paths mean, laid out; with `write`, after writing it.
 
@@ -41,7 +42,7 @@ def fmt(
     from idlc.project.files import read_source
     from idlc.project.find import find
 
-    for file in find(paths, report, exclude):
+    for file in find(paths, root, report, exclude):
         source = read_source(file.path, file.shown, report)
         if source is None:
             continue
@@ -65,15 +66,18 @@ def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: 
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.diagnostics.text import one_line
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     files: list[Formatted] = []
     done = "changed" if write else "would change"
     if not report.had_errors:
         left_out = scope(settings, exclude=exclude).exclude
-        for file in fmt(paths or settings.paths or (".",), left_out, report, write=write):
+        for file in fmt(
+            paths or settings.paths or (".",), settings.root, left_out, report, write=write
+        ):
             files.append(file)
             if file.changed and diff:
                 sys.stdout.writelines(_diff(file, sys.stdout))

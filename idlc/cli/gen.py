@@ -134,7 +134,8 @@ def _snapshot(request: GenOptions) -> dict[str, Stamp]:
     from idlc.project.find import snapshot, stamps
     from idlc.recordings.find import files
 
-    return snapshot(request.paths, request.scope.include) | stamps(files(request.paths))
+    root = request.scope.root
+    return snapshot(request.paths, request.scope.include, root) | stamps(files(request.paths, root))
 
 
 EPILOG = """\
@@ -198,10 +199,11 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.generate.gen import GenOptions, in_package, with_settings
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     if report.had_errors:
         refuse(report, style)
         return output.status(report)
@@ -213,7 +215,7 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     if not request.paths or not (request.out or request.ament):
         missing = "-o OUT or --ament PREFIX" if request.paths else "PATH"
         raise click.UsageError(f"give {missing}, or set it in [tool.idlc] of pyproject.toml")
-    _refuse_useless(request.paths, package, request.topics)
+    _refuse_useless(request, package)
     if request.check and (watch or request.force):
         raise click.UsageError(
             "--check writes nothing, so it goes with neither --watch nor --force"
@@ -225,15 +227,18 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     return once(request, style)
 
 
-def _refuse_useless(paths: Sequence[str], package: str | None, topics: Sequence[str]) -> None:
+def _refuse_useless(request: GenOptions, package: str | None) -> None:
     """Refuse options that have no effect on the paths."""
     from idlc.project.find import is_path
-    from idlc.recordings.find import divided
+    from idlc.recordings.find import split_recordings
 
-    recordings, others = divided(paths) if package or topics else ((), ())
-    if topics and not recordings:
+    root = request.scope.root
+    recordings, others = (
+        split_recordings(request.paths, root) if package or request.topics else ((), ())
+    )
+    if request.topics and not recordings:
         raise click.UsageError("--topic is for recordings, and none was given")
-    if package and not any(map(is_path, others)):
+    if package and not any(is_path(word, root) for word in others):
         what = "what was recorded" if recordings else "what is installed"
         raise click.UsageError(
             f"--package is for files, and none was given; {what} keeps the name that messages have"

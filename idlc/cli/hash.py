@@ -43,10 +43,11 @@ def command(
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.documents.query import hashes
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     if not report.had_errors:
         where = scope(settings, package, include, exclude, distro)
         for value, name in hashes(subjects, where, report):

@@ -34,10 +34,11 @@ def command(
     from idlc.diagnostics.terminal import counted
     from idlc.diagnostics.text import one_line
     from idlc.project import library
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    where = scope(load_settings(report), include=include, distro=distro)
+    where = scope(load_settings(Root.here(), report), include=include, distro=distro)
     listed = [] if packages else library.packages(where, report)
     names = library.interfaces(packages, where, report) if packages else []
     if style == "json":

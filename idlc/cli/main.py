@@ -34,14 +34,14 @@ def _run(words: list[str]) -> int:
     if words[:1] == ["check"] and not any(word.startswith("-") for word in words):
         # hooks call this for each commit, and importing click takes longer than checking a file
         from idlc.cli.direct import check_paths
-        from idlc.cli.exit_status import ended
+        from idlc.cli.exit_status import status_of
 
-        return ended(lambda: check_paths(tuple(words[1:])))
+        return status_of(lambda: check_paths(tuple(words[1:])))
     if words[:1] == ["lsp"] and all(map(_is_added_by_clients, words[1:])):
         from idlc.cli.direct import serve_editor
-        from idlc.cli.exit_status import ended
+        from idlc.cli.exit_status import status_of
 
-        return ended(serve_editor)
+        return status_of(serve_editor)
     from idlc.cli.app import run
 
     return run(words)

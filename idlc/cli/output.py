@@ -38,7 +38,7 @@ WIDTH = 30
 
 
 @contextmanager
-def shown(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
+def progress_bar(stream: TextIO) -> Iterator[Callable[[str, int, int], None]]:
     """Give a function that updates a progress bar; the bar is erased at the end."""
     if not stream.isatty():
         yield lambda _what, _done, _total: None

@@ -120,10 +120,11 @@ def _problems(path: Path) -> list[Diagnostic]:
     from idlc.check import select
     from idlc.check.run import CheckOptions, check
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     selection = select.selection(settings, report)
     if not report.had_errors:
         check(CheckOptions((str(path),), scope(settings), selection), report)

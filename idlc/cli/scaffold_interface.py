@@ -39,6 +39,7 @@ def command(
     """
     from idlc.diagnostics.report import Report
     from idlc.model.ir import KINDS
+    from idlc.project.root import Root
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.interface import (
         check_fields,
@@ -54,7 +55,7 @@ def command(
         interface_text(kind, fields, comment)
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    settings = Settings(include=include, **arguments)
+    settings = Settings(Root.here(), include=include, **arguments)
     checked_kind = KINDS[KINDS.index(kind)]
     result = interface(checked_kind, name, fields, comment, settings, report)
     return finish(result, report)

@@ -177,11 +177,12 @@ def command(name: str, **arguments: Any) -> int:
     to package.xml and the node to the launch file, unless it does one thing and ends.
     """
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.scaffold import changes, new_node
     from idlc.scaffold.changes import Settings
 
     shared = ("dry_run", "force", "include", "templates", "launch")
-    settings = Settings(**{key: arguments[key] for key in shared})
+    settings = Settings(Root.here(), **{key: arguments[key] for key in shared})
     described = (*(role.name for role in ROLES), "parameters", "lifecycle")
     try:
         spec.check_name(name)

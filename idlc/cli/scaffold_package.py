@@ -57,6 +57,7 @@ def command(
     from idlc.cli.output import program
     from idlc.diagnostics.report import Report
     from idlc.project.git import setting
+    from idlc.project.root import Root
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.interface import starter
     from idlc.scaffold.package import Package, check_package_name, package
@@ -74,18 +75,18 @@ def command(
         examples = dict(map(starter, (starters or ("Example",)) if interfaces_only else ()))
     except ValueError as error:
         raise click.UsageError(str(error)) from error
-    report = Report()
+    report, root = Report(), Root.here()
     requested = Package(
         name,
         arguments["description"] or f"The package {name}.",
-        arguments["maintainer"] or setting("user.name") or "Your Name",
-        arguments["email"] or setting("user.email") or "you@example.com",
+        arguments["maintainer"] or setting("user.name", root.base) or "Your Name",
+        arguments["email"] or setting("user.email", root.base) or "you@example.com",
         arguments["licence"] or LICENSES[0],
         BUILD_TYPES[1] if interfaces_only else BUILD_TYPES[0],
     )
     shared = {key: arguments[key] for key in ("dry_run", "force", "include", "templates")}
     chosen = {"license" if key == "licence" else key for key, value in arguments.items() if value}
     chosen |= {"starters"} if starters else set()
-    result = package(requested, folder, Settings(**shared), report, examples, chosen)
+    result = package(requested, folder, Settings(root, **shared), report, examples, chosen)
     inside = name if folder in ("", ".") else f"{folder}/{name}"
     return finish(result, report, (f"cd {inside}", f"{program()} scaffold interface --help"))

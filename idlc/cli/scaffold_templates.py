@@ -38,6 +38,7 @@ def command(copies: tuple[str, ...], listing: bool, **arguments: Any) -> int:
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
     from idlc.scaffold import changes
     from idlc.scaffold.changes import Settings
     from idlc.scaffold.templates import names, suggestion
@@ -49,7 +50,7 @@ def command(copies: tuple[str, ...], listing: bool, **arguments: Any) -> int:
             hint = suggestion(name) or "`idlc scaffold templates` lists them"
             raise click.UsageError(f"there is no template {name!r}; {hint}")
     report = Report()
-    settings = Settings(**arguments)
+    settings = Settings(Root.here(), **arguments)
     if copies:
         return finish(changes.copied(copies, settings, report), report)
     listed = changes.listed(settings, report)

@@ -118,13 +118,14 @@ def command(
     from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.documents.show import show
+    from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
     from idlc.recordings.find import is_recording
 
     report = Report()
-    settings = load_settings(report)
+    settings = load_settings(Root.here(), report)
     where = scope(settings, package, include, distro=distro)
-    if is_recording(subject) and not report.had_errors:
+    if is_recording(subject, settings.root) and not report.had_errors:
         return show_recording(subject, topics, style, where, report)
     if topics:
         raise click.UsageError(f"`{subject}` is no recording, so it has no topics")

@@ -1,1 +1,1 @@
-"""Changes between two versions of interfaces, and what they break."""
+"""Changes between two versions of interfaces, and the levels that they break."""

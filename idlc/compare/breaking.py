@@ -18,12 +18,12 @@ from idlc.compare.packages import (
     added_package,
     against,
     allowances,
+    combined,
     compare,
     compare_hashes,
     part_to_raise,
     raised,
     removed_package,
-    together,
     without_allowed,
 )
 from idlc.diagnostics import codes
@@ -31,13 +31,14 @@ from idlc.diagnostics.report import Diagnostic, Report, Severity, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
-from idlc.project.files import NOTHING_OPEN, absolute, is_folder
+from idlc.project.files import is_folder
 from idlc.project.find import InterfaceFile, find, look, nothing_in
 from idlc.project.git import Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import manifest, read_statements
-from idlc.project.settings import Config, Scope, working_in
+from idlc.project.package_xml import read_statements
+from idlc.project.root import Root
+from idlc.project.settings import Config, Scope
 from idlc.wire.layout import ContentSizes, oversized
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class BreakingOptions(NamedTuple):
 
     paths: tuple[str, ...]
     against: str
-    scope: Scope = Scope()
+    scope: Scope
     levels: tuple[str, ...] = LEVELS
     allowed: tuple[Allowance, ...] = ()
     allowed_in: str = ""
@@ -79,14 +80,15 @@ class Verdict(NamedTuple):
 
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     """Report each change that breaks something; `None` if a version could not be compiled."""
-    listing = look(options.paths, report, options.scope.exclude)
+    root, exclude = options.scope.root, options.scope.exclude
+    listing = look(options.paths, root, report, exclude)
     packages = inputs.packages(listing.files, options.scope, report)
     comparison = None if report.had_errors else _against(options, packages, report)
     if comparison is None:
         return None
     if listing.empty and not (comparison.differs or report.had_errors):
         # an empty folder is fine if its interfaces were removed
-        report.extend(nothing_in(path, options.scope.exclude) for path in listing.empty)
+        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
         return None
     if comparison.left_out:  # for which allowances may be
         changes = not_allowed(comparison.changes, options, report)
@@ -99,7 +101,7 @@ def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     part = None
     if not (comparison.left_out or is_distro(options.against)):
         part = part_to_raise(comparison)
-    version = _version(packages, report)
+    version = _version(packages, root, report)
     return Verdict(
         {level: sum(level in change.levels for change in selected) for level in LEVELS},
         len(comparison.changes) - len(changes),
@@ -129,12 +131,12 @@ def _against(
         return compare_with_distro(options.against, packages, options.scope, report)
     if options.against.startswith(GIT):
         name = options.against.removeprefix(GIT)
-        with checked_out(name, options.paths[0], report) as revision:
+        with checked_out(name, options.paths[0], options.scope.root, report) as revision:
             comparison = revision and _compare(options, packages, revision, report)
         return comparison and comparison.placed(f"{options.against}:")
     if options.against.endswith(lock.FILE):
         return _compare_with_lock(options, packages, report)
-    if is_revision(options.against, options.paths[0]):
+    if is_revision(options.against, options.paths[0], options.scope.root):
         report.add(
             codes.NO_SUCH_PATH.of(
                 options.against,
@@ -164,7 +166,8 @@ def earlier(
     """Return the packages as they are in a folder or git revision; `None` after errors."""
     if not options.against.startswith(GIT):
         return _before(options, packages, None, report)
-    with checked_out(options.against.removeprefix(GIT), options.paths[0], report) as revision:
+    name, root = options.against.removeprefix(GIT), options.scope.root
+    with checked_out(name, options.paths[0], root, report) as revision:
         return _before(options, packages, revision, report) if revision else None
 
 
@@ -194,7 +197,7 @@ def _compare(
             for package, model in old.items()
         ]
         come = (model for package, model in new.items() if package not in old)
-        whole = together([*changes, *map(added_package, come)])
+        whole = combined([*changes, *map(added_package, come)])
     elsewhere = {*map(str, others), *submodules}
     report.extend(
         _not_compared(names, reason, options, hint)
@@ -254,19 +257,21 @@ def _before(
 ) -> Side | None:
     scope = options.scope
     if revision is None:
-        files = find([options.against], report, scope.exclude)
+        files = find([options.against], scope.root, report, scope.exclude)
     else:
         files = revision.files(options.paths, scope.exclude, report)
         include = tuple(revision.counterpart(path) or path for path in scope.include)
         scope = msgspec.structs.replace(
-            scope, include=include, exclude=scope.exclude.seen_from(revision.root, revision.top)
+            scope, include=include, exclude=scope.exclude.seen_from(revision.folder, revision.top)
         )
     problems = Report()
     old = _named_alike(inputs.packages(files, scope, problems), packages, files, scope, problems)
     report.extend(problem for problem in problems if problem.code in codes.USAGE)
     if any(problem.code in codes.USAGE for problem in report):
         return None
-    homes = {package.home: files for package in old} if scope.package else by_home(files)
+    homes = (
+        {package.home: files for package in old} if scope.package else by_home(files, scope.root)
+    )
     return _side(old, homes, scope, problems)
 
 
@@ -313,7 +318,9 @@ def _named_alike(
     """Give two single packages one name, unless both are named by a package.xml."""
     if len(old) != 1 or len(new) != 1 or old[0].package == new[0].package:
         return old
-    if all(manifest(package.folders[0]) for package in (old[0], new[0]) if package.folders):
+    if all(
+        scope.root.manifest(package.folders[0]) for package in (old[0], new[0]) if package.folders
+    ):
         return old
     return inputs.packages(files, msgspec.structs.replace(scope, package=new[0].package), report)
 
@@ -336,7 +343,7 @@ def _compare_with_lock(
     options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
 ) -> Comparison | None:
     folder = options.against.removesuffix(lock.FILE).rstrip("/") or "."
-    record = load_lock(absolute(folder), folder, report)
+    record = load_lock(options.scope.root.absolute(folder), folder, report)
     if record is None:
         if not report.had_errors:
             report.add(codes.NO_SUCH_PATH.of(options.against, f"no such file: `{options.against}`"))
@@ -344,7 +351,7 @@ def _compare_with_lock(
     mine = [package for package in packages if package.package == record.package]
     if len(packages) == 1 and not mine:
         named = msgspec.structs.replace(options.scope, package=record.package)
-        files = find(options.paths, report, named.exclude)
+        files = find(options.paths, named.root, report, named.exclude)
         mine = list(inputs.packages(files, named, report))
     models = error_free_models(mine, options.scope, report)
     if report.had_errors:
@@ -356,12 +363,12 @@ def _compare_with_lock(
         return comparison._replace(differs=comparison.differs or not same)
 
 
-def _version(packages: tuple[inputs.Inputs, ...], report: Report) -> str | None:
+def _version(packages: tuple[inputs.Inputs, ...], root: Root, report: Report) -> str | None:
     """Return the version in the package.xml if there is one package only."""
     if len(packages) != 1 or not packages[0].folders:
         return None
-    path = manifest(packages[0].folders[0])
-    statements = read_statements(path, path.as_posix(), report) if path else ()
+    path = root.manifest(packages[0].folders[0])
+    statements = read_statements(path, path.as_posix(), root, report) if path else ()
     return next((statement.text for statement in statements if statement.tag == "version"), None)
 
 
@@ -374,15 +381,13 @@ class Earlier:
     def __init__(self, folder: Path, wished: str, settings: Config, scope: Scope) -> None:
         ignored = Report()  # `idlc breaking` reports problems of its table
         version = wished or against(settings, ignored) or ""
-        comparable = version.startswith(GIT) or (
-            bool(version) and is_folder(absolute(folder / version))
-        )
+        comparable = version.startswith(GIT) or (bool(version) and is_folder(folder / version))
         self._folder = folder
         self.name = version if comparable else ""
         self._options = BreakingOptions(
             (),
             self.name,
-            msgspec.structs.replace(scope, unsaved=NOTHING_OPEN),
+            scope,
             allowed=allowances(settings, ignored),
         )
         self.commit: str | None = None
@@ -393,9 +398,11 @@ class Earlier:
         if self.has_moved() or self._side is None:
             report = Report()
             paths = tuple(package.home.as_posix() for package in packages)
-            options = self._options._replace(paths=paths)
-            with working_in(self._folder):
-                side = earlier(options, tuple(packages), report) if paths and self.name else None
+            # open texts are for the version that is compared with this one
+            scope = self._options.scope
+            scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
+            options = self._options._replace(paths=paths, scope=scope)
+            side = earlier(options, tuple(packages), report) if paths and self.name else None
             why = next(
                 (problem.message for problem in report if problem.severity is Severity.ERROR), ""
             )
@@ -412,7 +419,7 @@ class Earlier:
         if not self.name.startswith(GIT):
             return False
         name = self.name.removeprefix(GIT)
-        before, self.commit = self.commit, git.commit(name, str(self._folder)) or ""
+        before, self.commit = self.commit, git.commit(name, self._folder) or ""
         if before == self.commit:
             return False
         self._side = None
@@ -420,7 +427,7 @@ class Earlier:
 
     def repository(self) -> tuple[Path, ...]:
         """Return the folders in which git stores the commits of names, if there is a repository."""
-        return git.places(str(self._folder)) if self.name.startswith(GIT) else ()
+        return git.places(self._folder) if self.name.startswith(GIT) else ()
 
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that the settings do not allow."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from idlc.check.compiler import Compiler, compile_package, library_for, stage
-from idlc.compare.packages import Comparison, compare, together
+from idlc.compare.packages import Comparison, combined, compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -48,7 +48,7 @@ def compare_with_distro(
     with stage("compare", against):
         used = _used(after).union(*(package.names for package in packages if package not in own))
         comparisons = [compare(old, new) for old, new in zip(before, after, strict=True)]
-        return together(
+        return combined(
             [
                 *comparisons,
                 *_of_packages(used if packages else _all(library, other), library, other_library),
@@ -73,7 +73,12 @@ class _Layered(Library):
     ) -> None:
         own = {package.package: package.folders for package in packages}
         super().__init__(
-            scope.include, Report(), own=own, exclude=scope.exclude, distro=scope.distro
+            scope.include,
+            scope.root,
+            Report(),
+            own=own,
+            exclude=scope.exclude,
+            distro=scope.distro,
         )
         self.other = other
         self._other_first = other_first

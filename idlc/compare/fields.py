@@ -289,7 +289,7 @@ def constant_changes(sides: Sides) -> Iterator[Change]:
     """Yield the changes of the constants; their order has no meaning."""
     pairing = pair(sides.old.constants, sides.new.constants, _content)
     for constant in pairing.removed:
-        yield _gone(sides, constant)
+        yield _removed_constant(sides, constant)
     for old, new in pairing.renamed:
         yield _renamed_constant(sides, old, new)
     for old, new in pairing.kept:
@@ -314,7 +314,7 @@ def _native(constant: ir.Constant) -> object:
     return ir.Primitive("uint8") if constant.type == ir.Primitive("char") else constant.type
 
 
-def _gone(sides: Sides, constant: ir.Constant) -> Change:
+def _removed_constant(sides: Sides, constant: ir.Constant) -> Change:
     return Change(
         codes.CONSTANT_REMOVED,
         sides.subject(constant.name),

@@ -267,7 +267,7 @@ def _all_sides(
         return
     before, after = (models[key] for key in keys)
     name = ir.TypeName.parse(old.type)
-    for shared in sorted(_held(name, before) & _held(name, after)):
+    for shared in sorted(_with_nested(name, before) & _with_nested(name, after)):
         if before.describer.hash(str(shared)) != after.describer.hash(str(shared)):
             sides = Sides(before.messages[shared], after.messages[shared], before, after)
             if any(_changes(sides)):
@@ -306,7 +306,7 @@ def _with_wire(changes: Sequence[Change], misread: bool) -> Iterator[Change]:
             yield change
 
 
-def _held(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
+def _with_nested(name: ir.TypeName, model: Model) -> set[ir.TypeName]:
     held: set[ir.TypeName] = set()
     waiting = [name]
     while waiting:

@@ -25,7 +25,7 @@ from idlc.project.settings import Place, Tables, Text, command_table, read_table
 if TYPE_CHECKING:
     from idlc.project.settings import Config
 
-#: Interfaces of equal content among which a renamed one is looked for.
+#: A renamed interface is searched among this many interfaces of equal content.
 CANDIDATES = 50
 
 
@@ -49,7 +49,7 @@ class Comparison(NamedTuple):
         return self._replace(changes=tuple(changes))
 
 
-def together(comparisons: Iterable[Comparison]) -> Comparison:
+def combined(comparisons: Iterable[Comparison]) -> Comparison:
     """Return the comparisons of several packages as one."""
     parts = list(comparisons)
     return Comparison(
@@ -60,7 +60,7 @@ def together(comparisons: Iterable[Comparison]) -> Comparison:
 
 
 def compare(before: Model, after: Model) -> Comparison:
-    """Return what changed in a package's own interfaces; both models must be free of errors."""
+    """Return the changes of a package's own interfaces; both models must be free of errors."""
     old = {interface.name: interface for interface in before.own}
     new = {interface.name: interface for interface in after.own}
     removed = [interface for name, interface in old.items() if name not in new]
@@ -68,7 +68,7 @@ def compare(before: Model, after: Model) -> Comparison:
     renamed = dict(_renamed(removed, appeared))
     changes = [_removed(interface) for interface in removed if interface.name not in renamed]
     changes += [
-        called(interface, renamed[interface.name])
+        renamed_interface(interface, renamed[interface.name])
         for interface in removed
         if interface.name in renamed
     ]
@@ -116,7 +116,7 @@ def compare_hashes(recorded: Mapping[str, str], after: Model) -> Comparison:
             continue  # follows from the interface that it is derived from
         if name not in sources:
             levels = frozenset(LEVELS[:3])
-            message = f"{_what(kind)} `{name}` was removed"
+            message = f"{_noun(kind)} `{name}` was removed"
             changes.append(Change(codes.INTERFACE_REMOVED, name, message, levels, path=name))
         elif recorded[name] != after.describer.hash(name):
             source = sources[name]
@@ -139,7 +139,7 @@ def _shorter(name: str) -> Iterator[str]:
     return (name[:at] for at, character in enumerate(name) if character == "_")
 
 
-def _what(kind: str) -> str:
+def _noun(kind: str) -> str:
     return {"msg": "message", "srv": "service"}.get(kind, kind)
 
 
@@ -151,7 +151,7 @@ def _removed(interface: ir.Interface) -> Change:
     return Change(
         codes.INTERFACE_REMOVED,
         str(interface.name),
-        f"{_what(interface.name.kind)} `{interface.name}` was removed",
+        f"{_noun(interface.name.kind)} `{interface.name}` was removed",
         frozenset(LEVELS[:3]),
         path=_path(interface),
         place=interface.source.file if interface.source else "",
@@ -159,15 +159,15 @@ def _removed(interface: ir.Interface) -> Change:
 
 
 def _added(interface: ir.Interface) -> str:
-    return f"{_what(interface.name.kind)} `{interface.name}`"
+    return f"{_noun(interface.name.kind)} `{interface.name}`"
 
 
-def called(old: ir.Interface, new: ir.Interface) -> Change:
+def renamed_interface(old: ir.Interface, new: ir.Interface) -> Change:
     """Return the change of an interface's name."""
     return Change(
         codes.INTERFACE_RENAMED,
         str(old.name),
-        f"{_what(old.name.kind)} `{old.name}` is called `{new.name}` now",
+        f"{_noun(old.name.kind)} `{old.name}` is called `{new.name}` now",
         frozenset({"hash", "source"}),
         path=_path(new),
     )
@@ -252,9 +252,9 @@ def without_allowed(
     path: str,
     report: Report,
 ) -> tuple[Change, ...]:
-    """Return the changes that nobody allowed.
+    """Return the changes without an allowance.
 
-    Reports entries that have expired, and those that no change needs; `path` is the file that
+    Reports entries that have expired, or that no change needs; `path` is the file that
     holds them, `today` a day as YYYY-MM-DD.
     """
     allowed: set[int] = set()

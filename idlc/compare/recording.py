@@ -14,7 +14,6 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.files import absolute, shown
 from idlc.project.find import look, nothing_in
 from idlc.recordings.types import NAMED, LocalTypes, recorded_types
 from idlc.recordings.versions import topics_of, versions
@@ -39,11 +38,13 @@ def compare_with_recordings(
 ) -> RecordedVerdict | None:
     """Report changes since recordings were made; `None` if something could not be read.
 
-    The interfaces of PATHs are compared, or without any those of this machine. Without levels,
+    The interfaces of PATHs are compared, or without PATHs the ones of this machine. Without levels,
     only changes that affect readers are reported.
     """
-    listing = look(options.paths, report, options.scope.exclude)
-    report.extend(nothing_in(path, options.scope.exclude) for path in listing.empty)
+    listing = look(options.paths, options.scope.root, report, options.scope.exclude)
+    report.extend(
+        nothing_in(path, options.scope.root, options.scope.exclude) for path in listing.empty
+    )
     problems = Report()
     packages = inputs.packages(listing.files, options.scope, problems)
     report.extend(problems)
@@ -79,6 +80,7 @@ class _LocalVersions:
         self, packages: Sequence[inputs.Inputs], options: BreakingOptions, report: Report
     ) -> None:
         self.types = LocalTypes(options.scope, report)
+        self._root = options.scope.root
         self._packages = {package.package: package for package in packages}
         self._models = error_free_models(packages, options.scope, report)
         self._unknown: set[ir.TypeName] = set()
@@ -94,7 +96,7 @@ class _LocalVersions:
                 self._unknown |= _names(old) - _names(new)
             elif model.package in self._packages:
                 new = self._models[model.package]
-                if self._packages[model.package].is_whole:
+                if self._packages[model.package].is_whole(self._root):
                     yield old, new  # missing interfaces were removed
                     continue
             else:
@@ -104,7 +106,7 @@ class _LocalVersions:
     def placed(self, changes: Iterable[Change], package: str) -> list[Change]:
         """Return changes, with the path of the missing file for removed interfaces."""
         compared = self._packages.get(package)
-        home = shown(absolute(compared.home)) if compared else ""
+        home = self._root.shown(compared.home) if compared else ""
         return [
             change._replace(place=f"{home}/{change.path.rpartition(f'{package}/')[2]}")
             if compared and not change.span

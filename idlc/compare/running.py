@@ -98,7 +98,7 @@ def joined(report: Report) -> Iterator[Graph | None]:
     except ImportError as error:
         hint = "source your ROS 2 and use its Python, or pip install ros-jazzy-rclpy"
         report.add(codes.NO_RCLPY.of("graph", f"this needs rclpy: {error}", hint=hint))
-    except Exception as error:  # rclpy has no common base for what goes wrong here
+    except Exception as error:  # rclpy's errors have no common base
         report.add(codes.NO_RCLPY.of("graph", f"rclpy cannot start a node: {error}"))
     if node is None:
         yield None
@@ -348,9 +348,10 @@ def _empty(patience: float) -> Diagnostic:
 
 def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
     """Return the models of the user's files, or of the files in the working folder."""
-    listing = look(options.paths, report, options.scope.exclude)
+    root, exclude = options.scope.root, options.scope.exclude
+    listing = look(options.paths, root, report, exclude)
     if has_paths:
-        report.extend(nothing_in(path, options.scope.exclude) for path in listing.empty)
+        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
     packages = inputs.packages(listing.files, options.scope, report)
     problems = Report()
     models = [model for _, model in models_of(packages, options.scope, problems)]
@@ -385,7 +386,7 @@ def _add(model: Model, models: dict[Key, Model]) -> Iterator[Key]:
 def _installed(names: Iterable[str], scope: Scope) -> Iterator[Model]:
     """Yield the models of interfaces that are installed, or found along -I, without broken ones."""
     dropped = Report()
-    library = Library(scope.include, dropped, distro=scope.distro)
+    library = Library(scope.include, scope.root, dropped, distro=scope.distro)
     compiler = Compiler(library)
     for name in sorted(set(map(interface_of, names))):
         try:

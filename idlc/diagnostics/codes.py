@@ -246,5 +246,5 @@ _BY_WORD = {
 
 
 def find(word: str) -> Code | None:
-    """Return the code that a word means: its id in any case, the id's digits, or its name."""
+    """Return the code of a word: its id in any case, the id's digits, or its name."""
     return _BY_WORD.get(word.lower().replace("_", "-"))

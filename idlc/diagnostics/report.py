@@ -1,4 +1,4 @@
-"""Diagnostics as values: what is wrong, where, and what to do about it.
+"""Diagnostics as values: a problem, its location, and a hint.
 
 Passes append to one `Report`; nothing here prints, raises or knows a file system.
 Messages are lower-case, without a final stop, with the user's words in backticks.

@@ -1,6 +1,6 @@
 """A report as text with source lines and carets, or as JSON lines.
 
-In: diagnostics. Out: strings. Nothing is looked up: colour and width are arguments. Text from
+In: diagnostics. Out: strings. Colour and width are arguments, not looked up here. Text from
 files is made harmless first: no control character, terminal escape or invisible character of
 a file reaches the terminal as itself.
 """
@@ -139,7 +139,7 @@ def _marks(diagnostic: Diagnostic) -> list[_Mark]:
 
 
 def _mark(span: Span, sign: str, label: str) -> _Mark:
-    """Return the part of a span that lies on its first line; at least one column."""
+    """Return the part of a span on its first line; at least one column."""
     line, column = span.source.position(span.start)
     start = min(column - 1, len(span.source.line_text(line)))
     end = min(start + span.end - span.start, len(span.source.line_text(line)))

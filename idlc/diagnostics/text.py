@@ -85,7 +85,7 @@ def edit_distance(left: str, right: str) -> int:
     return row[-1]
 
 
-#: Ends of package names, which say nothing about how much two names are alike.
+#: Ends of package names, which are ignored when two names are compared.
 _ENDS = ("_msgs", "_interfaces", "_srvs", "_actions")
 
 
@@ -108,7 +108,7 @@ def closest(name: str, names: Iterable[str]) -> str | None:
 
 
 def package_hint(name: str, names: Iterable[str]) -> str:
-    """Return the hint for a package that is nowhere to be found."""
+    """Return the hint for an unknown package."""
     near = closest_package(name, names)
     if near is not None:
         return f"did you mean `{near}`?"

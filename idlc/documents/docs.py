@@ -13,10 +13,10 @@ from idlc.diagnostics.report import Diagnostic, Report
 from idlc.generate.gen import is_name, named_packages
 from idlc.project import inputs
 from idlc.project.atomic import alone
-from idlc.project.files import absolute
 from idlc.project.find import find
 from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
-from idlc.project.package_xml import manifest, read_statements
+from idlc.project.package_xml import read_statements
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.project.write import Change, Plan, apply_changes, journals, sweep
 
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 LISTING = "idlc-docs.json"
 
 
-def write(out: str, files: Mapping[str, str], report: Report) -> bool:
+def write(out: str, files: Mapping[str, str], root: Root, report: Report) -> bool:
     """Write files below `out`; report IDL612 to IDL614 and return `False` if that is refused."""
-    folder = absolute(out)
+    folder = root.absolute(out)
     with alone(folder):
         return _write(folder, out, files, report)
 
@@ -106,32 +106,33 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     from idlc.documents.pages import site
     from idlc.project import templates
 
-    about = {package.package: _about(package) for package in packages}
+    about = {package.package: _about(package, scope.root) for package in packages}
     templates.keep()
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
     written = Report()
-    done = write(out, files, written)
+    done = write(out, files, scope.root, written)
     report.extend(written)
     return sum(path.endswith(".html") for path in files) if done else 0
 
 
 def _packages(words: Sequence[str], scope: Scope, report: Report) -> tuple[inputs.Inputs, ...]:
-    names = [word for word in words if is_name(word)]
+    names = [word for word in words if is_name(word, scope.root)]
     named = named_packages(names, scope, report, whole=False)
-    paths = [word for word in words if not is_name(word)]
+    paths = [word for word in words if not is_name(word, scope.root)]
     if not paths or report.had_errors:
         return tuple(named)
-    files = find(paths, report, scope.exclude)
-    return inputs.without_duplicates((*inputs.packages(files, scope, report), *named), report)
+    files = find(paths, scope.root, report, scope.exclude)
+    packages = (*inputs.packages(files, scope, report), *named)
+    return inputs.without_duplicates(packages, scope.root, report)
 
 
-def _about(package: inputs.Inputs) -> About:
+def _about(package: inputs.Inputs, root: Root) -> About:
     """Return the facts about a package in its package.xml."""
     from idlc.documents.pages import About
 
-    path = manifest(package.folders[0]) if package.folders else None
-    statements = read_statements(path, path.as_posix(), Report()) if path else ()
+    path = root.manifest(package.folders[0]) if package.folders else None
+    statements = read_statements(path, path.as_posix(), root, Report()) if path else ()
     texts: dict[str, list[str]] = {}
     for statement in statements:
         texts.setdefault(statement.tag, []).append(" ".join(statement.text.split()))

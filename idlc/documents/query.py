@@ -15,7 +15,7 @@ from idlc.project import inputs
 from idlc.project.find import find, is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.find import divided
+from idlc.recordings.find import split_recordings
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
@@ -78,20 +78,22 @@ def requested_models(
 
     Interfaces with errors are left out.
     """
-    paths = [target for target in targets if is_path(target)]
+    paths = [target for target in targets if is_path(target, scope.root)]
     for target in targets:
         if target not in paths:
             problems = Report()
             yield from _named(target, scope, problems)
             report.extend(problems)
-    recordings, paths = divided(paths)
+    recordings, paths = split_recordings(paths, scope.root)
     if recordings:
         from idlc.recordings.packages import recorded_models
 
         yield from recorded_models(recordings, scope, report)
     if paths:
         problems = Report()
-        packages = inputs.packages(find(paths, problems, scope.exclude), scope, problems)
+        packages = inputs.packages(
+            find(paths, scope.root, problems, scope.exclude), scope, problems
+        )
         report.extend(problems)
         report.notes += problems.notes
         if not problems.had_errors:

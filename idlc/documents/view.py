@@ -17,7 +17,7 @@ _HEIGHT = 30
 _GAP = 12
 _CHARACTER = 7.3
 _BETWEEN = 70
-#: More neighbours than these make a picture that nobody reads.
+#: More neighbours than these make a picture unreadable.
 _MOST = 14
 
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import re
+import tempfile
 from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from urllib.parse import unquote
 
+from idlc.diagnostics.source import Source
 from idlc.editor.protocol import uris
 from idlc.editor.protocol.parts import Change, DocumentItem, Range
 from idlc.editor.protocol.positions import in_lines, lines_of
 from idlc.model import ir
-from idlc.project.files import Unsaved, absolute
+from idlc.project.cache import cache_folder
 from idlc.project.find import KINDS
 from idlc.project.lock import digest
+from idlc.project.root import Root
 
 #: The language id of interface files.
 LANGUAGE = "rosmsg"
@@ -24,9 +29,9 @@ LANGUAGE = "rosmsg"
 class Document:
     """One document; `path` is that of its file, or where it would be saved; `None` for others."""
 
-    def __init__(self, item: DocumentItem) -> None:
+    def __init__(self, item: DocumentItem, root: Root) -> None:
         self.uri = item.uri
-        self.path = uris.to_path(item.uri) or _draft(item)
+        self.path = uris.to_path(item.uri) or _draft(item, root)
         self.version: int | None = item.version
         self._lines = lines_of(item.text)
 
@@ -74,7 +79,7 @@ class Document:
         lines[low : high + 1] = found
 
 
-def _draft(item: DocumentItem) -> Path | None:
+def _draft(item: DocumentItem, root: Root) -> Path | None:
     """Return the path of an interface that has never been saved: here, or where its name says.
 
     How many sections it has says of which kind it is.
@@ -83,17 +88,18 @@ def _draft(item: DocumentItem) -> Path | None:
     if scheme != "untitled" or item.language_id != LANGUAGE:
         return None
     if Path(name).suffix in KINDS:
-        return absolute(unquote(name))
+        return root.absolute(unquote(name))
     marks = sum(line.rstrip() == "---" for line in item.text.splitlines())
     kind = ir.KINDS[min(marks, len(ir.KINDS) - 1)]
     stem = re.sub(r"[^A-Za-z0-9]", "", name.rpartition("/")[2])
-    return absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
+    return root.absolute(f"{stem[:1].upper()}{stem[1:]}.{kind}" if stem else f"Untitled.{kind}")
 
 
 class Documents:
-    """All open documents by URI."""
+    """All open documents by URI; those without a file are seen as if they lay in a root's base."""
 
-    def __init__(self) -> None:
+    def __init__(self, root: Root) -> None:
+        self._root = root
         self._open: dict[str, Document] = {}
 
     def __iter__(self) -> Iterator[Document]:
@@ -105,8 +111,8 @@ class Documents:
 
     def open(self, item: DocumentItem) -> Document:
         """Open a document, again if it is open already."""
-        found = self._open[item.uri] = Document(item)
-        return found
+        document = self._open[item.uri] = Document(item, self._root)
+        return document
 
     def close(self, uri: str) -> Document | None:
         """Close a document; `None` if it was not open."""
@@ -116,6 +122,50 @@ class Documents:
         """Return the open document of a file: of two URIs for it, that whose text counts."""
         return next((one for one in reversed(self._open.values()) if one.path == path), None)
 
-    def unsaved(self) -> Unsaved:
+    def texts(self) -> dict[Path, bytes]:
         """Return what counts instead of the files on disk."""
-        return Unsaved({one.path: one.data for one in self if one.path is not None})
+        return {one.path: one.data for one in self if one.path is not None}
+
+
+#: Where texts of the catalogue are kept in the cache.
+FOLDER = "interfaces"
+
+
+def inside(source: Source) -> str:
+    """Return what a text of the catalogue is, such as `jazzy/std_msgs/msg/Header.msg`."""
+    return source.path.replace("<", "", 1).replace(">", "", 1)
+
+
+def file_of(source: Source) -> Path | None:
+    """Return a file of this user's cache that holds a text of the catalogue; `None` if none can."""
+    base = cache_folder()
+    if base is None:
+        return None
+    path = base / FOLDER / inside(source)
+    data = source.text.encode()
+    try:
+        if not path.is_file() or path.read_bytes() != data:
+            _write(path, data)
+    except OSError:
+        return None
+    return path
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Put a file that can only be read in the place of what is there, at once."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(name).chmod(0o444)
+        Path(name).replace(path)
+    except OSError:
+        with suppress(OSError):
+            Path(name).unlink()
+        raise
+
+
+def is_built_in(source: Source) -> bool:
+    """Return whether a text is of the catalogue."""
+    return source.path.startswith("<")

@@ -8,8 +8,8 @@ from difflib import SequenceMatcher
 from idlc.diagnostics.report import Edit
 from idlc.editor.protocol.parts import TextEdit
 from idlc.editor.protocol.positions import Places, lines_of
-from idlc.editor.workspace import State
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
+from idlc.editor.workspace import Snapshot
 
 
 def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
@@ -28,24 +28,26 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
     ]
 
 
-def workspace_edit(edits: Iterable[Edit], state: State, world: World) -> dict[str, object]:
+def workspace_edit(
+    edits: Iterable[Edit], snapshot: Snapshot, state: ServerState
+) -> dict[str, object]:
     """Return edits of any files as one, for the versions that are open."""
     found: dict[str, list[TextEdit]] = {}
     for one in dict.fromkeys(edits):
-        uri = world.uri(state.path_of(one.span.source))
-        found.setdefault(uri, []).append(TextEdit(world.range(one.span), one.text))
-    return of_documents(found, world)
+        uri = state.uri(snapshot.path_of(one.span.source))
+        found.setdefault(uri, []).append(TextEdit(state.range(one.span), one.text))
+    return of_documents(found, state)
 
 
-def of_documents(edits: Mapping[str, list[TextEdit]], world: World) -> dict[str, object]:
+def of_documents(edits: Mapping[str, list[TextEdit]], state: ServerState) -> dict[str, object]:
     """Return edits by URI as one, in the form that the client understands."""
-    if not world.supports("workspace", "workspaceEdit", "documentChanges"):
+    if not state.supports("workspace", "workspaceEdit", "documentChanges"):
         return {"changes": edits}
-    return {"documentChanges": [document_edit(uri, some, world) for uri, some in edits.items()]}
+    return {"documentChanges": [document_edit(uri, some, state) for uri, some in edits.items()]}
 
 
-def document_edit(uri: str, edits: Iterable[object], world: World) -> dict[str, object]:
+def document_edit(uri: str, edits: Iterable[object], state: ServerState) -> dict[str, object]:
     """Return the edits of one document."""
-    opened = world.documents.get(uri)
+    opened = state.documents.get(uri)
     version = opened.version if opened else None
     return {"textDocument": {"uri": uri, "version": version}, "edits": list(edits)}

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 from idlc.diagnostics.source import Source, Span
 from idlc.editor.protocol.parts import Position
-from idlc.editor.world import Known, World
+from idlc.editor.state import Known, ServerState
 from idlc.language import tree
 from idlc.language.parse import parse, parse_definition
 from idlc.model import derive, ir
@@ -97,12 +97,12 @@ def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
                 yield Element(source, code, body, message, meaning)
 
 
-def spot(world: World, known: Known, position: Position) -> Spot | None:
+def spot(state: ServerState, known: Known, position: Position) -> Spot | None:
     """Return what stands at a position; `None` outside of definitions.
 
     A name counts up to the place after its last character.
     """
-    offset = world.offset(known.source, position)
+    offset = state.offset(known.source, position)
     for one in elements(known.source, known.interface):
         end = one.line.start + len(one.line.code) + len(one.line.comment)
         if not one.line.start <= offset <= end:

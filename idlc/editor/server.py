@@ -13,7 +13,6 @@ import queue
 import threading
 from collections import Counter
 from collections.abc import Callable
-from functools import cached_property
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, TypeAlias
@@ -31,7 +30,7 @@ from idlc.editor.protocol.framing import (
 )
 
 if TYPE_CHECKING:
-    from idlc.editor.workbench import Workbench
+    from idlc.editor.state import ServerState
 
 
 class Method(NamedTuple):
@@ -45,14 +44,14 @@ class Method(NamedTuple):
         """Import and return its module."""
         return import_module(f"idlc.editor.features.{self.module}")
 
-    def call(self, world: Any, params: object) -> object:
+    def call(self, state: ServerState, params: object) -> object:
         """Return what the function answers; raises ValidationError for wrong parameters."""
         import msgspec
 
         asked = msgspec.convert(
             params, getattr(import_module("idlc.editor.protocol.parts"), self.params)
         )
-        answer: object = getattr(self.prepare(), self.function)(world, asked)
+        answer: object = getattr(self.prepare(), self.function)(state, asked)
         return answer
 
 
@@ -92,91 +91,6 @@ METHODS = {
 MAX_PROCESS = 1 << 31
 
 
-class Session:
-    """A session; `notify` and `ask` send something to the client."""
-
-    def __init__(self, notify: Callable[..., None], ask: Callable[..., None]) -> None:
-        self.is_shut_down = False
-        self._notify = notify
-        self._ask = ask
-        self._given: dict[str, Any] | None = None
-
-    @cached_property
-    def workbench(self) -> Workbench:
-        """The documents, and what is known of them."""
-        from idlc.editor.workbench import Workbench
-
-        assert self._given is not None
-        return Workbench(self._given, self._notify, self._ask)
-
-    def client_is_gone(self) -> bool:
-        """Return whether the process of the client has ended; where that can be asked."""
-        client = (self._given or {}).get("processId")
-        if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
-            return False
-        try:
-            os.kill(client, 0)
-        except ProcessLookupError:
-            return True
-        except OSError:
-            return False
-        return False
-
-    def answer(self, name: str, params: object) -> object:
-        """Return the answer to a request; raises RequestError."""
-        if self.is_shut_down or (self._given is not None and name == "initialize"):
-            raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
-        if name == "initialize":
-            if not isinstance(params, dict):
-                raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
-            self._given = params
-            client = params.get("capabilities")
-            return capabilities.answer(client if isinstance(client, dict) else {})
-        if self._given is None:
-            raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
-        if name == "shutdown":
-            self.is_shut_down = True
-            return None
-        if name not in METHODS:
-            raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
-        return METHODS[name].call(self.workbench.world, params)
-
-    def take(self, name: str, params: object) -> None:
-        """Take a notification; those that are not known, or not for now, are passed over."""
-        if self._given is not None and not self.is_shut_down:
-            self.workbench.take(name, params)
-
-    def encode(self, message: object) -> bytes:
-        """Return a message as JSON."""
-        if "workbench" not in self.__dict__:
-            return json.dumps(message).encode()
-        import msgspec
-
-        try:
-            return msgspec.json.encode(message)
-        except UnicodeEncodeError:  # words of a client that are no text
-            return json.dumps(msgspec.to_builtins(message)).encode()
-
-    def idle(self) -> None:
-        """Do what can be done while the client says nothing."""
-        if "workbench" in self.__dict__ and not self.is_shut_down:
-            self.workbench.idle()
-
-    def prepare(self) -> None:
-        """Import what answers, so that the first time takes no longer than others; look around."""
-        if "workbench" not in self.__dict__ or self.is_shut_down:
-            return
-        if any(True for _ in self.workbench.world.documents):
-            for method in METHODS.values():
-                method.prepare()
-        self.workbench.rest()
-
-    def settle(self) -> None:
-        """Tell the client which problems there are now, where that changed."""
-        if "workbench" in self.__dict__ and not self.is_shut_down:
-            self.workbench.settle()
-
-
 #: Messages in a row after which problems are told although more are waiting.
 MOST_IN_A_ROW = 500
 #: Seconds without a message after which there is time for what nobody waits for; it is twice as
@@ -208,7 +122,29 @@ class Server:
         self._lock = threading.Lock()
         self._count = 0
         self._asked: dict[int, Answer] = {}
-        self._session = Session(self._notify, self._ask)
+        #: Makes the state after `initialize`, when it is needed: what it imports takes long.
+        self._make_state: Callable[[], ServerState] | None = None
+        self._state: ServerState | None = None
+        self._client_process: object = None
+        self._is_shut_down = False
+
+    @property
+    def state(self) -> ServerState:
+        """The state, made when it is asked for first; only after `initialize`."""
+        if self._state is None:
+            assert self._make_state is not None
+            self._state = self._make_state()
+        return self._state
+
+    def _begin(self, initialize: dict[str, Any]) -> ServerState:
+        from idlc.editor.state import ServerState
+
+        return ServerState(initialize, self.notify, self.ask)
+
+    @property
+    def _live_state(self) -> ServerState | None:
+        """The state if there is one and the client has not ended the session."""
+        return None if self._is_shut_down else self._state
 
     def run(self) -> int:
         """Serve, and return the exit status."""
@@ -221,7 +157,7 @@ class Server:
             while True:
                 if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
                     in_a_row = 0
-                    self._attempt("problems", self._session.settle)
+                    self._attempt("problems", self.settle)
                 if since >= MOST_IN_A_ROW:
                     since = self._tidy()
                 try:
@@ -230,23 +166,97 @@ class Server:
                     wait = min(2 * wait, PATIENCE)
                     if since:
                         since = self._tidy()
-                    elif self._session.client_is_gone():
+                    elif self._client_is_gone():
                         return 1
                     else:
-                        self._attempt("idle", self._session.idle)
+                        self._attempt("idle", self.idle)
                     continue
                 in_a_row += 1
                 since += 1
                 wait = QUIET
                 if arrival is None or _is_exit(arrival):
-                    return 0 if self._session.is_shut_down else 1
+                    return 0 if self._is_shut_down else 1
                 self._take(arrival)
         except (OSError, ValueError):  # nobody reads what is written
             return 1
 
+    def answer(self, name: str, params: object) -> object:
+        """Return the answer to a request; raises RequestError."""
+        if self._is_shut_down or (self._make_state is not None and name == "initialize"):
+            raise RequestError(INVALID_REQUEST, f"`{name}` is not for now")
+        if name == "initialize":
+            if not isinstance(params, dict):
+                raise RequestError(INVALID_PARAMS, "`initialize` needs an object")
+            self._make_state = lambda: self._begin(params)
+            self._client_process = params.get("processId")
+            client = params.get("capabilities")
+            return capabilities.answer(client if isinstance(client, dict) else {})
+        if self._make_state is None:
+            raise RequestError(NOT_INITIALIZED, "`initialize` comes first")
+        if name == "shutdown":
+            self._is_shut_down = True
+            return None
+        if name not in METHODS:
+            raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
+        return METHODS[name].call(self.state, params)
+
+    def take(self, name: str, params: object) -> None:
+        """Take a notification; those that are not known, or not for now, are passed over."""
+        if self._make_state is not None and not self._is_shut_down:
+            self.state.take(name, params)
+
+    def encode(self, message: object) -> bytes:
+        """Return a message as JSON."""
+        if self._state is None:
+            return json.dumps(message).encode()
+        import msgspec
+
+        try:
+            return msgspec.json.encode(message)
+        except UnicodeEncodeError:  # words of a client that are no text
+            return json.dumps(msgspec.to_builtins(message)).encode()
+
+    def settle(self) -> None:
+        """Tell the client which problems there are now, where that changed."""
+        if (state := self._live_state) is not None and state.is_changed:
+            from idlc.editor.publish import publish
+
+            publish(state)
+
+    def idle(self) -> None:
+        """Do what can be done while the client says nothing."""
+        if (state := self._live_state) is not None:
+            from idlc.editor.publish import idle
+
+            idle(state)
+
+    def prepare(self) -> None:
+        """Import what answers, so that the first time takes no longer than others; look around."""
+        if (state := self._live_state) is None:
+            return
+        if any(True for _ in state.documents):
+            for method in METHODS.values():
+                method.prepare()
+        from idlc.editor.publish import rest
+
+        rest(state)
+
+    def _client_is_gone(self) -> bool:
+        """Return whether the process of the client has ended; where that can be asked."""
+        client = self._client_process
+        if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
+            return False
+        try:
+            os.kill(client, 0)
+        except ProcessLookupError:
+            return True
+        except OSError:
+            return False
+        return False
+
     def _tidy(self) -> int:
         """Do what nobody waits for; return how many messages came since then."""
-        self._attempt("preparation", self._session.prepare)
+        self._attempt("preparation", self.prepare)
         gc.collect()
         return 0
 
@@ -285,7 +295,7 @@ class Server:
             self._answer(arrival)
         else:
             name, params = arrival["method"], arrival.get("params")
-            self._attempt(name, lambda: self._session.take(name, params))
+            self._attempt(name, lambda: self.take(name, params))
 
     def _take_answer(self, arrival: Message) -> None:
         """Take an answer to what was asked of the client; one to nothing that was is left."""
@@ -299,7 +309,7 @@ class Server:
         if self._is_cancelled(id_):
             self._fail(id_, RequestError(CANCELLED, "cancelled"))
             return
-        failure, result = self._result(lambda: self._session.answer(name, _params(request)))
+        failure, result = self._result(lambda: self.answer(name, _params(request)))
         if failure is None:
             self._write({"jsonrpc": "2.0", "id": id_, "result": result})
             return
@@ -341,13 +351,14 @@ class Server:
         self._write({"jsonrpc": "2.0", "id": id_, "error": told})
 
     def _log(self, message: str) -> None:
-        self._notify("window/logMessage", {"type": 1, "message": f"idlc: {message}"})
+        self.notify("window/logMessage", {"type": 1, "message": f"idlc: {message}"})
 
-    def _notify(self, method: str, params: object) -> None:
+    def notify(self, method: str, params: object) -> None:
+        """Send a notification to the client."""
         self._write({"jsonrpc": "2.0", "method": method, "params": params})
 
-    def _ask(self, method: str, params: object, answer: Answer | None = None) -> None:
-        """Ask the client something."""
+    def ask(self, method: str, params: object, answer: Answer | None = None) -> None:
+        """Send a request to the client; `answer` takes its result."""
         id_ = self._count
         self._count += 1
         if answer is not None:
@@ -355,7 +366,7 @@ class Server:
         self._write({"jsonrpc": "2.0", "id": id_, "method": method, "params": params})
 
     def _write(self, message: object) -> None:
-        framing.write(self._writer, self._session.encode(message))
+        framing.write(self._writer, self.encode(message))
 
 
 def _message(body: bytes) -> Message:

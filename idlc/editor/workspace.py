@@ -1,33 +1,37 @@
-"""What `idlc check` says of a folder, again and again while its files are edited.
+"""A folder that is checked again and again while its files are edited, as `idlc check` does.
 
-What is on disk is read when `Workspace.load` is called. After that only texts change, until the
-next load: what an editor has open counts instead of what its file holds.
+The disk is read by a load. After that only texts change, until the next load: what an editor has
+open counts instead of what its file holds. The result follows from what is on disk and what is
+open, never from the way there.
 """
 
 from __future__ import annotations
 
+import gc
+import os
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
 from idlc.check import select
+from idlc.check.compiler import InternalError
 from idlc.check.run import checkers, judged
+from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
-from idlc.project.files import MAX_SIZE, Unsaved, absolute
+from idlc.project.files import MAX_SIZE, is_folder
 from idlc.project.find import Found, Picture, look, root_of
-from idlc.project.inputs import locks, places
-from idlc.project.package_xml import MANIFEST, manifest
-from idlc.project.settings import load_settings, scope, working_in
+from idlc.project.inputs import places
+from idlc.project.root import MANIFEST, Root
+from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from idlc.check.select import Selection
     from idlc.compare.breaking import Earlier, Side
     from idlc.diagnostics.report import Diagnostic, Edit
@@ -40,8 +44,8 @@ if TYPE_CHECKING:
 AROUND = (MANIFEST, settings.SETTINGS_FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
 
 
-class Wishes(msgspec.Struct, frozen=True, rename="camel"):
-    """What an editor's settings say, as options of `idlc check` do."""
+class EditorOptions(msgspec.Struct, frozen=True, rename="camel"):
+    """Options of `idlc check` that an editor's settings give."""
 
     select: str = ""
     ignore: str = ""
@@ -51,14 +55,15 @@ class Wishes(msgspec.Struct, frozen=True, rename="camel"):
     distro: str = ""
 
 
-class State(msgspec.Struct, frozen=True, dict=True):
-    """What is known of a folder at one moment.
+class Snapshot(msgspec.Struct, frozen=True, dict=True):
+    """A folder as it was checked at one moment.
 
     `models` are those of its packages for the first of its distributions, by name, and `library`
     has everything else.
     """
 
     folder: Path
+    root: Root
     problems: tuple[Diagnostic, ...]
     models: Mapping[str, Model]
     library: Library
@@ -95,76 +100,138 @@ class State(msgspec.Struct, frozen=True, dict=True):
 
     def source(self, name: ir.TypeName) -> Source | None:
         """Return the text of an interface of any package."""
-        with working_in(self.folder):
-            return self.library.source(name)
+        return self.library.source(name)
 
     def path_of(self, source: Source) -> Path:
         """Return the absolute path of a file's text."""
-        return absolute(self.folder / source.path)
+        return Path(os.path.normpath(self.folder / source.path))
 
 
 class Workspace:
     """A folder that is checked as if `idlc check PATHS` ran in it.
 
-    Without `paths`, what its pyproject.toml says is meant, or the folder.
+    Without `paths`, what its pyproject.toml says is meant, or the folder. `texts` returns what is
+    open, by absolute path; it is called at each load.
     """
 
-    def __init__(self, folder: Path, wishes: Wishes, paths: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        options: EditorOptions,
+        texts: Callable[[], Mapping[Path, bytes]],
+        paths: tuple[str, ...] = (),
+    ) -> None:
         self.folder = folder
-        self._wishes = wishes
+        #: The last failure of idlc itself.
+        self.failure: Diagnostic | None = None
+        self.is_loaded = False
+        self._options = options
+        self._texts = texts
         self._paths = paths
         self._earlier: dict[str, Earlier] = {}
+        self._snapshot: Snapshot | None = None
 
-    def load(self, unsaved: Unsaved) -> None:
-        """Read what there is; problems that do not depend on texts are remembered.
-
-        Raises OSError if the folder is gone.
-        """
-        self._fixed = report = Report()
+    def load(self) -> None:
+        """Read the disk, unless that was done; raises OSError if the folder is gone."""
+        if self.is_loaded:
+            return
+        self._fixed = report = Report()  # problems that do not depend on texts
         self._older, self._earlier = self._earlier, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
-        there = Found((), (), (), {})
+        files = Found((), (), (), {})
         begun = time.time_ns()
-        with working_in(self.folder), without_options():
-            wishes = self._wishes
-            self._settings = settings = load_settings(report, unsaved)
+        self._root = root = Root.at(self.folder, self._texts())
+        with without_options():
+            options = self._options
+            self._settings = settings = load_settings(root, report)
             selected = select.selection(settings, report)
-            self._selection = selected.with_lists(wishes.select, wishes.ignore)
-            found = scope(
-                settings, wishes.package or None, wishes.include, wishes.exclude, wishes.distro
+            self._selection = selected.with_lists(options.select, options.ignore)
+            self._scope = scope(
+                settings, options.package or None, options.include, options.exclude, options.distro
             )
-            self._scope = msgspec.structs.replace(found, unsaved=unsaved)
             # a mistake in the settings stops the command line, too
             if not report.had_errors:
                 paths = self._paths or settings.paths or (".",)
-                there = look(paths, report, found.exclude, unsaved)
-                self._packages = inputs.packages(there.files, self._scope, report, there.packages)
+                files = look(paths, root, report, self._scope.exclude)
+                self._packages = inputs.packages(files.files, self._scope, report, files.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
-            files = (path for path in self._read(there) if not unsaved.has(path))
-            self._picture = Picture(there.folders, files, begun)
+            on_disk = (path for path in self._files_read(files) if not root.is_open(path))
+            self._picture = Picture(files.folders, on_disk, begun)
         self._places = {
-            absolute(self.folder / one.file.path): (number, at)
-            for number, given in enumerate(self._packages)
-            for at, one in enumerate(given.files)
+            self._absolute(entry.file.shown): (number, at)
+            for number, package in enumerate(self._packages)
+            for at, entry in enumerate(package.files)
         }
+        self.is_loaded = True
 
-    def _read(self, there: Found) -> Iterator[Path]:
+    def forget(self) -> None:
+        """Let everything be read again when it is needed."""
+        self.is_loaded = False
+        self._snapshot = None
+
+    def snapshot(self) -> Snapshot | None:
+        """Return the folder as it is now; `None` if it is gone, or `failure` says why."""
+        if self._snapshot is None:
+            self.failure = None
+            is_new = not self.is_loaded
+            try:
+                self.load()
+                self._snapshot = self._checked()
+                if is_new:
+                    gc.freeze()  # what a whole folder is read into is no garbage
+            except OSError:
+                self.forget()
+            except Exception as error:
+                self.failure = _failure(error, self.folder)
+        return self._snapshot
+
+    def holds(self, path: Path) -> bool:
+        """Return whether a file is one of those that are checked; reads the disk if need be."""
+        try:
+            self.load()
+        except Exception:  # which `snapshot` keeps
+            return False
+        return self.has(path)
+
+    def has(self, path: Path) -> bool:
+        """Return whether a file is one of those that are checked, as far as was read."""
+        return self.is_loaded and path in self._places
+
+    def follow(self, path: Path, data: bytes | None) -> None:
+        """Take note that other text counts for a file, `None` for what is on disk."""
+        if not self.is_loaded:
+            return
+        known = self._text(path)
+        if known is not None and data == known:
+            return
+        if data is not None and self._change(path, data):
+            self._snapshot = None
+        elif known is not None or self._concerns(path):
+            self.forget()
+
+    def _absolute(self, path: str) -> Path:
+        """Return the path of a file as the editor spells the folder, which may be a link."""
+        return Path(os.path.normpath(self.folder / path))
+
+    def _files_read(self, there: Found) -> Iterator[Path]:
         """Yield the absolute paths of the files that a load reads in packages and for settings."""
-        yield from (absolute(one.path) for one in there.files)
+        yield from (self._root.absolute(one.path) for one in there.files)
         homes = {self.folder, *there.packages, *(one.root for one in there.files)}
         homes |= {self._settings.folder} if self._settings.folder else set()
         yield from (home / name for home in homes for name in AROUND)
 
     def is_current(self) -> bool:
-        """Return whether the folder surely holds what was read last."""
+        """Return whether the disk surely holds what was read last."""
+        if not self.is_loaded:
+            return self.failure is not None or not is_folder(self.folder)
         return self._picture.is_true()
 
-    def counts(self, path: Path) -> bytes | None:
+    def _text(self, path: Path) -> bytes | None:
         """Return the text that counts for one of the files that are checked; `None` for others."""
         number, at = self._places.get(path, (-1, -1))
         return self._packages[number].files[at].data if number >= 0 else None
 
-    def change(self, path: Path, data: bytes) -> bool:
+    def _change(self, path: Path, data: bytes) -> bool:
         """Let a text count for one of the files that are checked, if that can change no other.
 
         Otherwise, a load is needed.
@@ -179,27 +246,28 @@ class Workspace:
         self._packages = tuple(packages)
         return True
 
-    def state_with(self, path: Path, text: str) -> State | None:
-        """Return what would be known with another text for a file; nothing is changed."""
+    def snapshot_with(self, path: Path, text: str) -> Snapshot | None:
+        """Return the folder as it would be with another text for a file; nothing is changed."""
         packages = self._packages
         try:
-            return self.state() if self.change(path, text.encode("utf-8", "replace")) else None
+            is_changed = self._change(path, text.encode("utf-8", "replace"))
+            return self._checked() if is_changed else None
         finally:
             self._packages = packages
 
     def _is_named_by_lock(self, number: int) -> bool:
         """Return whether the texts of a package may decide what it is called."""
         home = self._packages[number].home
-        with working_in(self.folder):
-            return not manifest(home) and any(map(locks, places(home)))
+        root = self._root
+        return not root.manifest(home) and any(map(root.locks, places(home, root)))
 
-    def concerns(self, path: Path) -> bool:
-        """Return whether a file outside of the packages may change what is known."""
+    def _concerns(self, path: Path) -> bool:
+        """Return whether a file outside of the packages may change the result of a check."""
         if path.name in (settings.SETTINGS_FILE, MANIFEST) and self.folder.is_relative_to(
             path.parent
         ):
             return True
-        folders = (self.folder, *(absolute(self.folder / one) for one in self._scope.include))
+        folders = (self.folder, *(self._absolute(one) for one in self._scope.include))
         return any(path.is_relative_to(one) for one in (*folders, *prefixes.ament_prefixes()))
 
     def name_of(self, path: Path) -> ir.TypeName:
@@ -226,20 +294,19 @@ class Workspace:
         """Return the edit of package.xml by which a file may use a package; `None` if it may."""
         from idlc.check.package.manifest import dependency
 
-        found = self._around(path)
-        return dependency(found, package) if found else None
+        facts = self._around(path)
+        return dependency(facts, package) if facts else None
 
     def declaration(self, path: Path, package: str) -> Span | None:
         """Return where package.xml of a file's package declares another."""
         from idlc.check.package.manifest import declaration
 
-        found = self._around(path)
-        return declaration(found, package) if found else None
+        facts = self._around(path)
+        return declaration(facts, package) if facts else None
 
     def _around(self, path: Path) -> Facts | None:
         given = self._packages[self._places[path][0]]
-        with working_in(self.folder):
-            return next(iter(self._checkers.values())).package_facts(given)
+        return next(iter(self._checkers.values())).package_facts(given)
 
     def earlier(self, against: str = "") -> Earlier:
         """Return what the packages are compared with: `against`, or what pyproject.toml says."""
@@ -259,19 +326,20 @@ class Workspace:
     def _library(self) -> Library:
         return next(iter(self._checkers.values())).library
 
-    def state(self) -> State:
-        """Return what is known now."""
+    def _checked(self) -> Snapshot:
+        """Return the folder, checked with the texts of now."""
         found: dict[str, Report] = {}
         models: dict[str, list[Model]] = {}
-        with working_in(self.folder), without_options():
+        with without_options():
             for distro, checker in self._checkers.items():
                 found[distro] = Report()
                 models[distro] = checker.check(self._packages, self._selection, found[distro])
             every = [model for some in models.values() for model in some]
             problems = [*self._fixed, *judged(found, every, self._selection)]
         first = next(iter(self._checkers))
-        return State(
+        return Snapshot(
             self.folder,
+            self._root,
             tuple(problems),
             {model.package: model for model in models[first]},
             self._checkers[first].library,
@@ -279,14 +347,25 @@ class Workspace:
         )
 
 
+def _failure(error: Exception, folder: Path) -> Diagnostic:
+    cause, where, subject = error, "", str(folder)
+    if isinstance(error, InternalError):
+        where, subject = f" in stage `{error.stage}`", error.subject
+        cause = error.__cause__ if isinstance(error.__cause__, Exception) else error
+    return codes.INTERNAL_ERROR.of(
+        subject,
+        f"idlc failed{where}: {type(cause).__name__}: {cause}",
+        hint="this is a bug in idlc, please report it",
+    )
+
+
 def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
     """Return for a file of no workspace the folder in which it is checked, and what is there.
 
     That is its package; without a package.xml, only the file with those that it refers to.
     """
-    root = root_of(str(path.parent))
-    manifest.cache_clear()  # there may be another since the last look
-    declared = manifest(root)
+    folder = root_of(str(path.parent))
+    declared = Root(folder).manifest(folder)
     if declared is None:
-        return root, (path.relative_to(root).as_posix(),)
+        return folder, (path.relative_to(folder).as_posix(),)
     return declared.parent, (".", path.relative_to(declared.parent).as_posix())

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import msgspec
+
 from idlc.check.compiler import Compiler, library_for
 from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
@@ -22,13 +24,14 @@ from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro
 from idlc.project import inputs, lock, settings
-from idlc.project.files import absolute, is_file, shown
+from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import declared_name, manifest
-from idlc.project.settings import Config, Scope, load_settings, scope, working_in
-from idlc.recordings.find import divided
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
+from idlc.project.settings import Config, Scope, load_settings, scope
+from idlc.recordings.find import is_recording, split_recordings
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -43,9 +46,9 @@ class GenOptions(NamedTuple):
     """
 
     paths: tuple[str, ...]
+    scope: Scope
     out: str = ""
     topics: tuple[str, ...] = ()
-    scope: Scope = Scope()
     check: bool = False
     vendor_deps: bool = False
     force: bool = False
@@ -69,16 +72,17 @@ def in_package(options: GenOptions) -> GenOptions:
     """
     if options.ament or (options.out and options.paths) or len(options.paths) > 1:
         return options
-    folder = absolute(next(iter(options.paths), "."))
-    path = manifest(folder)
+    root = options.scope.root
+    folder = root.absolute(next(iter(options.paths), "."))
+    path = root.manifest(folder)
     if path is None or (options.paths and path.parent != folder):
         return options
-    name = declared_name(path, shown(path), Report())
+    name = declared_name(path, root, Report())
     if not name or not is_file(path.parent / "setup.py"):
         return options
     return options._replace(
-        paths=options.paths or (shown(path.parent),),
-        out=options.out or shown(home_of(path.parent, options.scope.package or name)),
+        paths=options.paths or (root.shown(path.parent),),
+        out=options.out or root.shown(home_of(path.parent, options.scope.package or name, root)),
     )
 
 
@@ -88,15 +92,19 @@ def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     runs += [options] if options.ament else []  # the package may be named by OUT
     done: list[Generated] = []
     for run in runs:
-        done += () if report.had_errors else _run_once(run, report)
+        if not report.had_errors:
+            root = options.scope.root.on_disk()  # a run sees the output of the one before
+            scope = msgspec.structs.replace(options.scope, root=root)
+            done += _run_once(run._replace(scope=scope), report)
     report.notes[:] = dict.fromkeys(report.notes)
     return () if report.had_errors else tuple(done)
 
 
 def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
-    recordings, others = divided(options.paths)
-    paths = [word for word in others if not is_name(word)]
-    words = [word for word in others if is_name(word)]
+    root = options.scope.root
+    recordings, others = split_recordings(options.paths, root)
+    paths = [word for word in others if not is_name(word, root)]
+    words = [word for word in others if is_name(word, root)]
     named = named_packages(words, options.scope, report, whole=bool(options.ament))
     texts: Mapping[ir.TypeName, Source] = {}
     if recordings and not report.had_errors:
@@ -109,7 +117,9 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     if report.had_errors:
         return ()
     packages = requested_packages(paths, named, options.out, options.scope, report)
-    whole = [each for each in packages if each.is_whole or options.ament or each.package in words]
+    whole = [
+        each for each in packages if each.is_whole(root) or options.ament or each.package in words
+    ]
     _note_idl(whole, options.scope, report)
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
@@ -138,7 +148,9 @@ def _targets(
 ) -> tuple[Target, ...]:
     """Return the folder that each package is written to."""
     if not options.ament:
-        return folder_targets(packages, options.out, report, force=options.force)
+        return folder_targets(
+            packages, options.out, options.scope.root, report, force=options.force
+        )
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
     prefix = options.ament.rstrip("/") or "/"
@@ -148,16 +160,18 @@ def _targets(
     )
     distros = [distro.name for distro in options.scope.distros]
     overlays = [
-        Overlay(prefix, name, home, report, force=options.force, distros=distros)
+        Overlay(
+            prefix, name, home, options.scope.root, report, force=options.force, distros=distros
+        )
         for name, home in homes
     ]
     return tuple(overlays) if overlays[0].usable() else ()
 
 
-def is_name(word: str) -> bool:
+def is_name(word: str, root: Root) -> bool:
     """Return whether a word means a type, or a package, rather than a path that is not there."""
     last = word.rpartition("/")[2]
-    return not is_path(word) and ("/" not in word or not last[:1].islower())
+    return not is_path(word, root) and ("/" not in word or not last[:1].islower())
 
 
 def named_packages(
@@ -245,8 +259,12 @@ class Run(NamedTuple):
 
     def make(self, report: Report) -> tuple[Generated, ...]:
         """Write, and return the packages; empty after an error. Raises OSError."""
-        with working_in(self.folder):
-            return gen(self.options, report)
+        root = Root.at(self.folder)
+        paths = tuple(
+            root.path(word) if is_recording(word, root) else word for word in self.options.paths
+        )
+        scope = msgspec.structs.replace(self.options.scope, root=root)
+        return gen(self.options._replace(paths=paths, scope=scope), report)
 
 
 def run_for(path: Path, package: str) -> Run | None:
@@ -263,10 +281,10 @@ def run_for(path: Path, package: str) -> Run | None:
 
 def _by_settings(folder: Path, path: Path) -> Run | None:
     report = Report()
-    with working_in(folder):
-        settings = load_settings(report)
-        options = with_settings(GenOptions((), scope=scope(settings)), settings)
-        covered = any(path.is_relative_to(absolute(root)) for root in options.paths)
+    root = Root.at(folder)
+    settings = load_settings(root, report)
+    options = with_settings(GenOptions((), scope(settings)), settings)
+    covered = any(path.is_relative_to(root.absolute(each)) for each in options.paths)
     return Run(folder, options) if options.out and covered and not report.had_errors else None
 
 
@@ -275,8 +293,7 @@ def _by_lock(path: Path, package: str) -> Run | None:
     for out in (home / package, home):
         lock = load_lock(out, "", Report())
         if lock is not None and lock.package == package:
-            with working_in(home):
-                settings = scope(load_settings(Report()), package)
+            settings = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), name, scope=settings, vendor_deps=lock.vendor_deps))
+            return Run(home, GenOptions((".",), settings, name, vendor_deps=lock.vendor_deps))
     return None

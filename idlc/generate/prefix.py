@@ -16,11 +16,10 @@ from idlc.generate.native.inspect import inspect
 from idlc.generate.target import Target
 from idlc.project import prefixes, write
 from idlc.project.atomic import alone
-from idlc.project.files import read_bytes, shown
 from idlc.project.library import Library
 from idlc.project.lock import Tree
-from idlc.project.package_xml import manifest
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
+from idlc.project.root import Root
 from idlc.project.write import Change, Plan
 
 if TYPE_CHECKING:
@@ -137,16 +136,19 @@ class Overlay(Target):
         name: str,
         package: str,
         home: Path | None,
+        root: Root,
         report: Report,
         *,
         force: bool = False,
         distros: Sequence[str] = (),
     ) -> None:
-        super().__init__(name, package, report, force=force)
+        super().__init__(name, package, root, report, force=force)
         self._distros = distros
-        declared = manifest(home) if home else None
+        declared = root.manifest(home) if home else None
         #: The content of its package.xml; `None` if there is none to be copied.
-        self.manifest = read_bytes(declared, shown(declared), report) if declared else None
+        self.manifest = (
+            root.read_bytes(declared, root.shown(declared), report) if declared else None
+        )
         self.home = f"share/{package}/"
         self.modules = f"{prefixes.modules_folder()}/{package}/"
 
@@ -174,9 +176,15 @@ class Overlay(Target):
 
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""
-        home = Library((), Report()).home(package)
+        home = Library((), self._root, Report()).home(package)
         return Overlay(
-            self.name, package, home, self.report, force=self._force, distros=self._distros
+            self.name,
+            package,
+            home,
+            self._root,
+            self.report,
+            force=self._force,
+            distros=self._distros,
         )
 
     def unchanged(

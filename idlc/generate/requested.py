@@ -14,12 +14,13 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.generate.target import Target
 from idlc.model import catalog, ir
 from idlc.project import inputs
-from idlc.project.files import absolute, is_file, shown
+from idlc.project.files import is_file
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, places, several
 from idlc.project.library import Library
 from idlc.project.lock import FILE
-from idlc.project.package_xml import declared_name, manifest
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 
@@ -34,35 +35,36 @@ def requested_packages(
 
     Reports IDL607 for names that cannot be imported, IDL608 for folders that are no packages.
     """
-    files = find(paths, report, scope.exclude) if paths else ()
+    files = find(paths, scope.root, report, scope.exclude) if paths else ()
     packages = list(named)
     for package in named:
         accept_name(package.package, "the command line", report)
     if files and not report.had_errors:
         packages += _from_files(files, "" if packages else out, scope, report)
     usage = [diagnostic for diagnostic in report if diagnostic.code in codes.USAGE]
-    return () if usage else inputs.without_duplicates(packages, report)
+    return () if usage else inputs.without_duplicates(packages, scope.root, report)
 
 
 def _from_files(
     files: tuple[InterfaceFile, ...], out: str, scope: Scope, report: Report
 ) -> tuple[inputs.Inputs, ...]:
     """Return files by package: as one, by default with the name of the folder `out`."""
-    homes = by_home(files)
-    apart = [] if scope.package else several(homes)
-    if _mixed(apart, report):
+    root = scope.root
+    homes = by_home(files, root)
+    apart = [] if scope.package else several(homes, root)
+    if _mixed(apart, root, report):
         return ()
-    declared = next((path for home in homes if (path := manifest(home))), None)
+    declared = next((path for home in homes if (path := root.manifest(home))), None)
     if apart or not out:
         packages = inputs.packages(files, scope, report)
         folders = (package.home for package in packages)
-        origins = ["package.xml" if manifest(folder) else "its folder" for folder in folders]
+        origins = ["package.xml" if root.manifest(folder) else "its folder" for folder in folders]
     else:
         name, origins = scope.package, ["--package"]
         if name is None and declared:
-            name, origins = declared_name(declared, shown(declared), report), ["package.xml"]
+            name, origins = declared_name(declared, root, report), ["package.xml"]
         if name is None:
-            name, origins = absolute(out).name, ["the folder given with -o"]
+            name, origins = root.absolute(out).name, ["the folder given with -o"]
             if catalog.is_standard(name) and min(homes).name != name:
                 report.add(
                     codes.UNIMPORTABLE_PACKAGE.of(
@@ -71,9 +73,9 @@ def _from_files(
                         hint=f"choose another folder; add `--package {name}` if they are its files",
                     )
                 )
-            _note_name(name, min(homes), out, report)
-        packages = (inputs.load(name, files, min(homes), report),)
-    if out and any(absolute(str(file.path.parent)) == absolute(out) for file in files):
+            _note_name(name, min(homes), out, root, report)
+        packages = (inputs.load(name, files, min(homes), root, report),)
+    if out and any(root.absolute(file.path.parent) == root.absolute(out) for file in files):
         report.add(
             codes.FOREIGN_FILE.of(
                 out,
@@ -86,24 +88,24 @@ def _from_files(
     return packages
 
 
-def _note_name(name: str, home: Path, out: str, report: Report) -> None:
+def _note_name(name: str, home: Path, out: str, root: Root, report: Report) -> None:
     """Note a name that other commands cannot know."""
-    if name != home.name and absolute(out).parent not in places(home):
+    if name != home.name and root.absolute(out).parent not in places(home, root):
         report.notes.append(
             f"the package is called `{name}`, as the folder given with -o; other commands need "
             f"`--package {name}`, or a package.xml beside the interfaces"
         )
 
 
-def _mixed(homes: Sequence[Path], report: Report) -> bool:
+def _mixed(homes: Sequence[Path], root: Root, report: Report) -> bool:
     """Report nested folders of interfaces without a package.xml."""
-    loose = [home for home in homes if not manifest(home)]
+    loose = [home for home in homes if not root.manifest(home)]
     if not any(set(home.parents) & set(homes) for home in loose):
         return False
-    names = first_few((f"`{shown(home)}`" for home in homes), 5)
+    names = first_few((f"`{root.shown(home)}`" for home in homes), 5)
     report.add(
         codes.SEVERAL_PACKAGES.of(
-            shown(homes[0]),
+            root.shown(homes[0]),
             f"these may be one package or {len(homes)}: {names}",
             hint="give --package NAME to compile them as one, or each folder a package.xml",
         )
@@ -164,18 +166,18 @@ def _borrowed(name: ir.TypeName, word: str, library: Library) -> inputs.Input:
 
 
 def folder_targets(
-    packages: Sequence[inputs.Inputs], out: str, report: Report, *, force: bool
+    packages: Sequence[inputs.Inputs], out: str, root: Root, report: Report, *, force: bool
 ) -> tuple[Target, ...]:
     """Return the folder of each package: OUT for one, a folder of its name in OUT for several.
 
     Reports IDL608 where a package of an earlier run is in the way, IDL612 for other files.
     """
-    top = absolute(out)
+    top = root.absolute(out)
     if len(packages) == 1:
         package = packages[0].package
         beside_others = is_file(top / package / FILE) and not is_file(top / FILE)
         folder = f"{out}/{package}" if beside_others else out
-        targets = [Target(folder, package, report, force=force)]
+        targets = [Target(folder, package, root, report, force=force)]
     elif is_file(top / FILE):
         message = f"`{out}` holds one package, and these are {len(packages)}"
         hint = "choose a folder for all of them with -o, each gets one of its name there"
@@ -184,5 +186,5 @@ def folder_targets(
     else:
         base = out.rstrip("/") or out
         names = [each.package for each in packages]
-        targets = [Target(f"{base}/{name}", name, report, force=force) for name in names]
+        targets = [Target(f"{base}/{name}", name, root, report, force=force) for name in names]
     return tuple(targets) if all(target.usable() for target in targets) else ()

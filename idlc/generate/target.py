@@ -13,9 +13,10 @@ from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.model.ir import TypeName
 from idlc.project import prefixes, write
 from idlc.project.atomic import alone
-from idlc.project.files import absolute, is_file, is_folder
+from idlc.project.files import is_file, is_folder
 from idlc.project.library import Library
 from idlc.project.lock import FILE, Lock, Obstacle, Tree, digest, encode, load_lock, meaning
+from idlc.project.root import Root
 from idlc.project.write import Change, Plan, plan
 from idlc.version import __version__
 
@@ -123,10 +124,13 @@ class Target:
     #: The folder of the package's modules, in the same form.
     modules = ""
 
-    def __init__(self, name: str, package: str, report: Report, *, force: bool = False) -> None:
+    def __init__(
+        self, name: str, package: str, root: Root, report: Report, *, force: bool = False
+    ) -> None:
         self.name = name
         self.package = package
-        self._path = absolute(name)
+        self._root = root
+        self._path = root.absolute(name)
         self.report = report
         self._force = force
 
@@ -137,7 +141,7 @@ class Target:
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
-        return Target(name, package, self.report, force=self._force)
+        return Target(name, package, self._root, self.report, force=self._force)
 
     @cached_property
     def lock(self) -> Lock | None:

@@ -177,7 +177,7 @@ def _columns(words: _Column) -> set[_Edge]:
 def _place(words: _Column) -> None:
     """Close the stray gaps before the words of one kind in a section."""
     columns = _columns(words)
-    usual = _usual(words)
+    usual = _common_gap(words)
     blocks: dict[int, _Column] = defaultdict(list)
     for row, word in words:
         blocks[row.block].append((row, word))
@@ -210,7 +210,7 @@ def _nearest(anchors: Sequence[tuple[int, int]], at: int) -> int:
     return min(close, key=lambda anchor: abs(anchor[0] - at), default=(0, 0))[1]
 
 
-def _usual(words: _Column) -> str:
+def _common_gap(words: _Column) -> str:
     """Return the narrow gap before words of a kind: of those before comments the most common."""
     if not words or words[0][1].kind != "comment":
         return " "  # where `=` has a stray gap, it has one on either side
@@ -220,7 +220,7 @@ def _usual(words: _Column) -> str:
 
 #: Trailing whitespace.
 _INVISIBLE = re.compile(r"[ \t]+$", re.MULTILINE)
-#: More blank lines than these in a row say nothing.
+#: More blank lines than these in a row have no meaning.
 BLANK_LINES = 2
 
 
@@ -272,7 +272,7 @@ def _trimmed(texts: Iterable[str], *, first: bool) -> Iterator[str]:
         if not text:
             blanks += 1
             continue
-        # a blank line before the first comment says that it is not about the whole structure
+        # a blank line before the first comment separates it from the whole structure
         yield from [""] * min(blanks, BLANK_LINES if begun else 1)
         yield text
         blanks, begun = 0, True

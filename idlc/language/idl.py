@@ -109,7 +109,7 @@ class IdlFile(msgspec.Struct, frozen=True):
     broken: Piece | None = None
 
     def span(self, piece: Piece) -> Span:
-        """Return the place of a piece."""
+        """Return the range of a piece."""
         return Span(self.source, piece.start, piece.end)
 
 

@@ -1,7 +1,7 @@
 """One file's lossless syntax: every character of the text belongs to one line of the tree.
 
 Offsets inside a definition count from the start of its line, so that the parse of equal lines
-can be shared; `File.span` turns them into places in the file.
+can be shared; `File.span` turns them into ranges of the file.
 """
 
 from __future__ import annotations
@@ -130,6 +130,6 @@ class File(msgspec.Struct, frozen=True):
     separators: tuple[int, ...]
 
     def span(self, line: Line, piece: Piece) -> Span:
-        """Return the place of a piece of a line; at least one character wide if there is one."""
+        """Return the range of a piece of a line; at least one character wide if there is one."""
         start = line.start + piece.start
         return Span(self.source, start, max(start + len(piece.text), start))

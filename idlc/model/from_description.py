@@ -207,7 +207,7 @@ class _ProgramSources:
         return Source(f"{name} ({self._program})", text) if text is not None else None
 
     def names(self, _package: str) -> Iterable[str]:
-        """Return nothing: nobody could follow a hint at another name."""
+        """Return nothing: hints at other names are for people who write files."""
         return ()
 
     def packages(self) -> Iterable[str]:

@@ -464,7 +464,7 @@ class _UnknownTypes:
             if other in self._interfaces or (self._hints >= 0 and self._library.source(other)):
                 return f"`{target.name}` is {noun}; only messages can be the type of a field"
         return (
-            (None if qualified else self._elsewhere(target.name))
+            (None if qualified else self._in_other_package(target.name))
             or self._misnamed(target)
             or _of_others(target)
             or self._near(target)
@@ -485,7 +485,7 @@ class _UnknownTypes:
         candidates = {*own, *self._library.names(target.package), *_PRIMITIVES}
         return did_you_mean(target.name, candidates)
 
-    def _elsewhere(self, name: str) -> str | None:
+    def _in_other_package(self, name: str) -> str | None:
         """Return a hint at a basic type, or at a package that has a message of just this name."""
         if self._hints < 0:
             return None

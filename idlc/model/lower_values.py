@@ -87,7 +87,7 @@ class _Ends:
     def __init__(self, text: str, quote: str) -> None:
         self._text = text
         self._quote = quote
-        #: place -> the closing quote, the place after the last escaped one, the place before that
+        #: offset -> the closing quote, the offset after the last escaped one, the offset before it
         self._ends: dict[int, tuple[int, int, int]] = {}
 
     def after(self, start: int) -> int:
@@ -219,7 +219,7 @@ def _text(type_: ir.String, text: str) -> Text | Fault:
     except EscapeError as error:
         offset = text.find(raw)
         start, end = error.start + offset, error.end + offset
-        if offset < 0:  # quotes were un-escaped, so places differ
+        if offset < 0:  # quotes were un-escaped, so offsets differ
             start, end = 0, len(text)
         message = f"ROS 2's tools fail on {error}"
         return Fault(codes.BAD_ESCAPE, message, start, end, BACKSLASH_HINT)

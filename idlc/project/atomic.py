@@ -19,6 +19,7 @@ from idlc.project.files import is_folder, reason
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Edit, Report
+    from idlc.project.root import Root
 
 _WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
 
@@ -190,7 +191,9 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     return True
 
 
-def edit(edits: Iterable[Edit], report: Report, tidied: Callable[[str, str, str], str]) -> int:
+def edit(
+    edits: Iterable[Edit], root: Root, report: Report, tidied: Callable[[str, str, str], str]
+) -> int:
     """Make edits in the files that they are for; return how many were made.
 
     `tidied` returns what to write, of a file's name, its text and the text after the edits.
@@ -202,6 +205,6 @@ def edit(edits: Iterable[Edit], report: Report, tidied: Callable[[str, str, str]
     for name, own in by_path.items():
         old = own[0].span.source.text
         text, number = apply(old, own)
-        if rewrite(Path(name), name, old, tidied(name, old, text), report):
+        if rewrite(Path(root.path(name)), name, old, tidied(name, old, text), report):
             done += number
     return done

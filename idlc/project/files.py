@@ -10,9 +10,7 @@ import errno
 import os
 import stat
 import sys
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics import codes
@@ -39,11 +37,6 @@ _READING = os.O_RDONLY | getattr(os, "O_BINARY", 0)
 _BYTE_ORDER_MARKS = ((b"\xff\xfe", "UTF-16"), (b"\xfe\xff", "UTF-16"))
 
 
-def absolute(path: str | Path) -> Path:
-    """Return a path from the root, without `..` and with links as they are."""
-    return Path(os.path.abspath(path))  # noqa: PTH100 - resolve() would follow links
-
-
 def is_file(path: str | Path) -> bool:
     """Return whether a path leads to a regular file; a path that cannot be looked at does not."""
     return os.path.isfile(path)  # noqa: PTH113 - Path.is_file() raises
@@ -52,18 +45,6 @@ def is_file(path: str | Path) -> bool:
 def is_folder(path: Path) -> bool:
     """Return whether a path leads to a folder; a path that cannot be looked at does not."""
     return os.path.isdir(path)  # noqa: PTH112 - Path.is_dir() raises
-
-
-def shown(path: Path) -> str:
-    """Return a path as a person knows it: relative to the working folder where that is below."""
-    try:
-        here = Path.cwd()
-        below, whole = f"{here}{os.sep}", str(path)
-        if whole.startswith(below):  # as `relative_to` says, in a fraction of the time
-            return whole[len(below) :].replace(os.sep, "/")
-        return path.relative_to(here).as_posix()
-    except (ValueError, OSError):
-        return path.as_posix()
 
 
 def reason(error: OSError | ValueError) -> str:
@@ -92,7 +73,7 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
     except (OSError, ValueError) as error:
         report.add(unreadable(name, error))
         return None
-    report.add(_too_large(name))
+    report.add(too_large(name))
     return None
 
 
@@ -111,52 +92,13 @@ def content(path: str | Path, size: int, most: int = sys.maxsize) -> bytes:
         os.close(handle)
 
 
-def _too_large(name: str) -> Diagnostic:
+def too_large(name: str) -> Diagnostic:
+    """Return the problem with a file of more than `MAX_SIZE` bytes."""
     return codes.TOO_LARGE.of(
         name,
         f"`{name}` is larger than {MAX_SIZE >> 20} MiB, which no interface file is",
         hint="is it another kind of file with this extension?",
     )
-
-
-class Unsaved:
-    """Texts that count instead of what files hold, by absolute path: what an editor has open."""
-
-    def __init__(self, texts: Mapping[Path, bytes] = MappingProxyType({})) -> None:
-        self._texts = texts
-
-    def read_bytes(self, path: Path, name: str, report: Report) -> bytes | None:
-        """Return what counts as a file's bytes; report as the function of this name does."""
-        data = self._texts.get(absolute(path)) if self._texts else None
-        if data is None:
-            return read_bytes(path, name, report)
-        if len(data) > MAX_SIZE:
-            report.add(_too_large(name))
-            return None
-        return data
-
-    def read_source(self, path: Path, name: str, report: Report) -> Source | None:
-        """Return what counts as a file's text; report what stands in the way."""
-        data = self.read_bytes(path, name, report)
-        return None if data is None else decode(data, name, report)
-
-    def is_file(self, path: str | Path) -> bool:
-        """Return whether there is such a file, on disk or only in the editor."""
-        return is_file(path) or (bool(self._texts) and absolute(path) in self._texts)
-
-    def has(self, path: Path) -> bool:
-        """Return whether another text counts than that of an absolute path's file."""
-        return path in self._texts
-
-    def new_below(self, folder: Path) -> Iterator[Path]:
-        """Yield what lies below an absolute folder in the editor only."""
-        for path in self._texts:
-            if path.is_relative_to(folder) and not is_file(path):
-                yield path
-
-
-#: What counts where no editor has anything open.
-NOTHING_OPEN = Unsaved()
 
 
 def unreadable(name: str, error: OSError | ValueError) -> Diagnostic:

@@ -17,20 +17,13 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import closest
-from idlc.project.files import (
-    NOTHING_OPEN,
-    Unsaved,
-    absolute,
-    is_file,
-    is_folder,
-    kind_of,
-    unreadable,
-)
-from idlc.project.package_xml import MANIFEST, manifest
+from idlc.project.files import is_file, is_folder, kind_of, unreadable
+from idlc.project.root import MANIFEST
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
     from idlc.model.ir import Kind
+    from idlc.project.root import Root
 
 
 class Exclusion(msgspec.Struct, frozen=True):
@@ -118,7 +111,7 @@ NOTHING = Exclusions()
 
 
 class InterfaceFile(msgspec.Struct, frozen=True):
-    """An interface file.
+    """An interface file: its absolute path, and that by which messages call it.
 
     `given` is the path on the command line that led to it, `root` the folder that holds the
     msg/, srv/ and action/ folders, or the file's own.
@@ -137,17 +130,17 @@ class InterfaceFile(msgspec.Struct, frozen=True):
         return f"{self.kind}/{self.name}.{self.kind}"
 
 
-def is_path(text: str) -> bool:
+def is_path(text: str, root: Root) -> bool:
     """Return whether a word on the command line means a path rather than a type or package."""
     named = _NAME.fullmatch(text) and Path(text).suffix not in KINDS
-    return not named or os.path.lexists(text)
+    return not named or os.path.lexists(root.path(text))
 
 
 class Found(msgspec.Struct, frozen=True):
     """What paths mean: interface files, each once, sorted, and the folders of packages.
 
-    `empty` are the given folders without interface files, `folders` all that were looked into,
-    with their status from before that.
+    `empty` are the given folders without interface files, `folders` all that were looked into, by
+    absolute path, with their status from before that.
     """
 
     files: tuple[InterfaceFile, ...]
@@ -157,17 +150,19 @@ class Found(msgspec.Struct, frozen=True):
 
 
 def find(
-    paths: Iterable[str], report: Report, exclude: Exclusions = NOTHING
+    paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING
 ) -> tuple[InterfaceFile, ...]:
     """Return the interface files that paths mean; reports IDL606 for a path that means none."""
-    found = look(paths, report, exclude)
-    report.extend(nothing_in(given, exclude) for given in found.empty)
+    found = look(paths, root, report, exclude)
+    report.extend(nothing_in(given, root, exclude) for given in found.empty)
     return found.files
 
 
-def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> Diagnostic:
+def nothing_in(
+    given: str, root: Root, exclude: Exclusions = NOTHING, *, also: str = ""
+) -> Diagnostic:
     """Return the problem with a folder without interface files; `also` is what else is missing."""
-    if exclude is not NOTHING and look((given,), Report()).files:
+    if exclude is not NOTHING and look((given,), root, Report()).files:
         message = f"every interface file in `{given}` is excluded"
         return codes.NO_INTERFACES.of(given, message, hint="see `exclude` in [tool.idlc]")
     return codes.NO_INTERFACES.of(
@@ -177,25 +172,19 @@ def nothing_in(given: str, exclude: Exclusions = NOTHING, *, also: str = "") -> 
     )
 
 
-def look(
-    paths: Iterable[str],
-    report: Report,
-    exclude: Exclusions = NOTHING,
-    unsaved: Unsaved = NOTHING_OPEN,
-) -> Found:
+def look(paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING) -> Found:
     """Return what paths mean; a folder means everything below it.
 
     Reports IDL601, IDL602, IDL605 and IDL622.
     """
-    manifest.cache_clear()
     found: dict[str, InterfaceFile] = {}
     packages: dict[Path, None] = {}
     empty: dict[str, None] = {}
     folders: dict[Path, os.stat_result] = {}
     for given in paths:
-        seen = not is_folder(Path(given))
-        for path in _under(given, report, unsaved, folders):
-            whole = os.path.abspath(path)  # noqa: PTH100 - resolve() would follow links
+        seen = not is_folder(Path(root.path(given)))
+        for path in _under(given, root, report, folders):
+            whole = os.path.normpath(root.path(path))
             if exclude.has(whole):
                 continue
             if path.name == MANIFEST:
@@ -204,7 +193,7 @@ def look(
                 report.add(_unread(path))
             else:
                 seen = True
-                found.setdefault(whole, _interface(path, whole, given))
+                found.setdefault(whole, _interface(path, whole, given, root))
         if not seen:
             empty.setdefault(given)
     files = sorted(found.values(), key=lambda file: (file.shown, file.given))
@@ -212,23 +201,23 @@ def look(
 
 
 def _under(
-    given: str, report: Report, unsaved: Unsaved, folders: dict[Path, os.stat_result]
+    given: str, root: Root, report: Report, folders: dict[Path, os.stat_result]
 ) -> Iterator[Path]:
     """Yield the interface and package.xml files that one path means; note folders as `walk`."""
     path = Path(given)
-    if path.suffix in KINDS and unsaved.is_file(path) and not path.exists():
+    if path.suffix in KINDS and root.is_file(path) and not Path(root.path(path)).exists():
         yield path
         return
     try:
-        mode = path.stat().st_mode
+        mode = os.stat(root.path(path)).st_mode  # noqa: PTH116 - no Path is needed
     except (OSError, ValueError) as error:
         problem = unreadable(given, error)
-        report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path)))
+        report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path, root)))
         return
     if stat.S_ISDIR(mode):
-        yield from walk(path, report, folders)
-        whole = absolute(path)
-        for new in unsaved.new_below(whole):
+        yield from walk(path, root, report, folders)
+        whole = root.absolute(path)
+        for new in root.unsaved_below(whole):
             inside = new.relative_to(whole)
             if _is_wanted(new.name) and not _is_closed(whole, inside.parts[:-1]):
                 yield path / inside
@@ -248,10 +237,11 @@ def _unread(path: Path) -> Diagnostic:
     return codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint)
 
 
-def _interface(path: Path, whole: str, given: str) -> InterfaceFile:
+def _interface(path: Path, whole: str, given: str, root: Root) -> InterfaceFile:
     kind = KINDS[path.suffix]
-    root = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
-    return InterfaceFile(path, path.as_posix(), kind, path.stem, given, root)
+    package = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
+    place = Path(root.path(path))
+    return InterfaceFile(place, path.as_posix(), kind, path.stem, given, package)
 
 
 @lru_cache(maxsize=1024)
@@ -261,9 +251,9 @@ def root_of(folder: str) -> Path:
     return here.parent if here.name in KIND_FOLDERS else here
 
 
-def _similar(path: Path) -> str | None:
+def _similar(path: Path, root: Root) -> str | None:
     try:
-        names = sorted(entry.name for entry in path.parent.iterdir())
+        names = sorted(entry.name for entry in Path(root.path(path.parent)).iterdir())
     except (OSError, ValueError):
         return None
     close = closest(path.name, names)
@@ -271,11 +261,12 @@ def _similar(path: Path) -> str | None:
 
 
 def walk(
-    folder: Path, report: Report, folders: dict[Path, os.stat_result] | None = None
+    folder: Path, root: Root, report: Report, folders: dict[Path, os.stat_result] | None = None
 ) -> Iterator[Path]:
     """Yield each interface file and package.xml below a folder, in no particular order.
 
-    `folders` gets the status of each folder from before it was listed.
+    Paths begin as the folder's does. `folders` gets the status of each folder from before it was
+    listed.
     Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
 
     Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
@@ -286,10 +277,10 @@ def walk(
     while waiting:
         here = waiting.pop()
         try:
-            status = here.stat()
+            status = os.stat(place := root.path(here))  # noqa: PTH116 - no Path is needed
             if folders is not None:
-                folders[here] = status
-            entries = sorted(os.scandir(here), key=lambda entry: entry.name)
+                folders[root.absolute(here)] = status
+            entries = sorted(os.scandir(place), key=lambda entry: entry.name)
         except OSError as error:
             report.add(unreadable(here.as_posix(), error))
             continue
@@ -336,9 +327,9 @@ _NO_FILE = (0, 0, 0, 0)
 _UNKNOWN = (-1, 0, 0, 0)
 
 
-def snapshot(paths: Iterable[str], include: Iterable[str]) -> dict[str, Stamp]:
+def snapshot(paths: Iterable[str], include: Iterable[str], root: Root) -> dict[str, Stamp]:
     """Return the stamp of each input file, of its package.xml and of files along -I."""
-    files = [file.path for file in look((*paths, *include), Report()).files]
+    files = [file.path for file in look((*paths, *include), root, Report()).files]
     manifests = {path.parent.parent / MANIFEST for path in files}
     return stamps((*files, *sorted(manifests)))
 
@@ -349,7 +340,7 @@ def stamps(paths: Iterable[Path]) -> dict[str, Stamp]:
 
 
 class Picture:
-    """What folders were before they were listed, and files when they were read.
+    """What folders were before they were listed, and files when they were read: absolute paths.
 
     That began at a time in nanoseconds.
     """
@@ -358,7 +349,7 @@ class Picture:
         self, folders: Mapping[Path, os.stat_result], files: Iterable[Path], begun: int
     ) -> None:
         now = time.time_ns()
-        self._stamps = {absolute(path): _stamp_of(status) for path, status in folders.items()}
+        self._stamps = {path: _stamp_of(status) for path, status in folders.items()}
         for path in files:
             stamp = _stamp(path)
             # what changed since then was perhaps read before that

@@ -20,9 +20,9 @@ import msgspec
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
-from idlc.project.files import absolute, reason
+from idlc.project.files import reason
 from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, look
-from idlc.project.package_xml import MANIFEST
+from idlc.project.root import MANIFEST, Root
 
 #: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
 MOST = 128 << 20
@@ -75,22 +75,26 @@ class GitError(Exception):
 
 
 class Revision(NamedTuple):
-    """A revision's interface files below `root`, laid out as in the repository at `top`.
+    """A revision's interface files below `folder`, laid out as in the repository at `top`.
 
-    `submodules` are the paths of those that it has, of which nothing is below `root`. `skipped` are
-    the paths that git does not check out, as in a sparse checkout.
+    `submodules` are the paths of those that it has, of which nothing is below `folder`. `skipped`
+    are the paths that git does not check out, as in a sparse checkout. Paths of the working tree
+    are seen from `root`.
     """
 
     name: str
     top: Path
-    root: Path
+    folder: Path
+    root: Root
     submodules: tuple[str, ...] = ()
     skipped: frozenset[str] = frozenset()
 
     def counterpart(self, path: str) -> str | None:
         """Return where a path of the working tree is in the revision; `None` outside of it."""
         try:
-            return (self.root / absolute(path).resolve().relative_to(self.top)).as_posix()
+            return (
+                self.folder / self.root.absolute(path).resolve().relative_to(self.top)
+            ).as_posix()
         except ValueError:
             return None
 
@@ -100,7 +104,7 @@ class Revision(NamedTuple):
         """Return the interface files that paths of the working tree meant; there may be none."""
         there = [place for path in paths if (place := self.counterpart(path))]
         places = [place for place in there if Path(place).exists()]
-        found = look(places, report, exclude.seen_from(self.root, self.top)).files
+        found = look(places, self.root, report, exclude.seen_from(self.folder, self.top)).files
         return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
 
     def holds(self, path: Path) -> bool:
@@ -112,38 +116,38 @@ class Revision(NamedTuple):
         places = [Path(place) for path in paths if (place := self.counterpart(path))]
         for name in self.submodules:
             now = self.top / name
-            is_meant = any((self.root / name).is_relative_to(place) for place in places)
+            is_meant = any((self.folder / name).is_relative_to(place) for place in places)
             # a folder that is empty was not checked out
             if is_meant and not os.path.lexists(now / ".git") and not _is_empty(now):
                 yield name
 
     def is_skipped(self, shown: str) -> bool:
         """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
-        path = PurePath(shown.removeprefix(self._shown(self.root)[:-1]))
+        path = PurePath(shown.removeprefix(self._shown(self.folder)[:-1]))
         names = (one.as_posix() for one in (path, *path.parents))
         return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
 
     def _shown(self, path: Path) -> str:
         """Return how a file of the revision is called in messages."""
-        return f"git:{self.name}:{path.relative_to(self.root).as_posix()}"
+        return f"git:{self.name}:{path.relative_to(self.folder).as_posix()}"
 
 
 @contextmanager
-def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | None]:
+def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Revision | None]:
     """Provide the revision `name` of the repository that holds `path`, `None` after IDL630.
 
     Nothing in the repository is touched.
     """
     with TemporaryDirectory(prefix="idlc-") as place:
-        root = Path(place).resolve()
-        (root / ".git").mkdir()  # what is above is not part of the repository
+        folder = Path(place).resolve()
+        (folder / ".git").mkdir()  # what is above is not part of the repository
         hint, top = "", Path()
         try:
-            top = _repository(path)
+            top = _repository(root.absolute(path))
             hint = _NAMES
             identity = _commit(name, top)
             hint = _DAMAGED
-            entries = _extract(top, identity, root)
+            entries = _extract(top, identity, folder)
             submodules = tuple(one.path for one in entries if one.mode == _SUBMODULE)
             skipped = _skipped(top, entries)
         except GitError as error:
@@ -154,7 +158,7 @@ def checked_out(name: str, path: str, report: Report) -> Iterator[Revision | Non
             report.add(codes.NO_SUCH_REVISION.of(path, message, hint=said or None))
             revision = None
         else:
-            revision = Revision(name, top, root, submodules, skipped)
+            revision = Revision(name, top, folder, root, submodules, skipped)
         yield revision
 
 
@@ -168,19 +172,19 @@ def _completing(top: Path) -> str:
     return ""
 
 
-def is_revision(name: str, path: str) -> bool:
+def is_revision(name: str, path: str, root: Root) -> bool:
     """Return whether a name means a revision of the repository that holds `path`, and no file."""
-    return not os.path.lexists(name) and commit(name, path) is not None
+    return not os.path.lexists(root.path(name)) and commit(name, root.absolute(path)) is not None
 
 
-def commit(name: str, path: str) -> str | None:
+def commit(name: str, path: Path) -> str | None:
     """Return which commit a name means in the repository that holds `path`, if it means one."""
     with suppress(GitError):
         return _commit(name, _repository(path))
     return None
 
 
-def places(path: str) -> tuple[Path, ...]:
+def places(path: Path) -> tuple[Path, ...]:
     """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
     with suppress(GitError):
         top = _repository(path)
@@ -189,11 +193,10 @@ def places(path: str) -> tuple[Path, ...]:
     return ()
 
 
-def setting(name: str) -> str:
-    """Return one of the user's settings of git, on one line; empty if there is none."""
+def setting(name: str, folder: Path) -> str:
+    """Return a setting of git that holds in a folder, on one line; empty if there is none."""
     with suppress(GitError):
-        here = absolute(".")
-        found = _git(_top(here) or here, ["config", "--get", name])
+        found = _git(_top(folder) or folder, ["config", "--get", name])
         return one_line(found.decode("utf-8", errors="replace").strip())
     return ""
 
@@ -207,9 +210,9 @@ def _top(path: Path) -> Path | None:
     return next((one for one in (real, *real.parents) if os.path.lexists(one / ".git")), None)
 
 
-def _repository(path: str) -> Path:
+def _repository(path: Path) -> Path:
     """Return the top of the working tree that holds a path."""
-    top = _top(absolute(path))
+    top = _top(path)
     if top is None:
         raise GitError("not in a git repository")
     other = os.fsdecode(_git(top, ["rev-parse", "--show-toplevel"]).rstrip(b"\r\n"))
@@ -243,14 +246,19 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
     Without words of its own, `otherwise` is the reason.
     """
     options = [word for pair in _SETTINGS.items() for word in ("-c", "=".join(pair))]
-    command = [_program(), *options, "-C", str(top), *words]
+    command = [_program(), *options, *words]
     kept = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
     try:
         with TemporaryFile() as asked, TemporaryFile() as said:
             asked.write(given)
             asked.seek(0)
             with subprocess.Popen(  # noqa: S603 - no shell, and no option can be smuggled in
-                command, stdin=asked, stdout=subprocess.PIPE, stderr=said, env=kept | _ENVIRONMENT
+                command,
+                cwd=top,
+                stdin=asked,
+                stdout=subprocess.PIPE,
+                stderr=said,
+                env=kept | _ENVIRONMENT,
             ) as process:
                 assert process.stdout is not None
                 timer = Timer(PATIENCE, process.kill)

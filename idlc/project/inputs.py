@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
 import msgspec
@@ -12,24 +12,24 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model.ir import TypeName
-from idlc.project import lock
-from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, decode, is_file, is_folder, shown
+from idlc.project.files import decode, is_folder
 from idlc.project.find import InterfaceFile, find, look
-from idlc.project.lock import digest, load_lock, meaning
-from idlc.project.package_xml import declared_name, manifest
+from idlc.project.lock import digest, meaning
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
 from idlc.project.settings import Scope, load_settings, scope
 
 
-def by_home(files: Iterable[InterfaceFile]) -> dict[Path, list[InterfaceFile]]:
+def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:
     """Return files by the folder that stands for their package."""
     found: dict[Path, list[InterfaceFile]] = {}
     for file in files:
-        declared = manifest(file.root)
+        declared = root.manifest(file.root)
         found.setdefault(declared.parent if declared else file.root, []).append(file)
     return found
 
 
-def several(homes: Mapping[Path, list[InterfaceFile]]) -> list[Path]:
+def several(homes: Mapping[Path, list[InterfaceFile]], root: Root) -> list[Path]:
     """Return the folders of packages if the files below them are no single package.
 
     Files without a package.xml that were given by several paths are one.
@@ -38,7 +38,7 @@ def several(homes: Mapping[Path, list[InterfaceFile]]) -> list[Path]:
     for home, files in homes.items():
         for file in files:
             given.setdefault(file.given, set()).add(home)
-    declared = [home for home in homes if manifest(home)]
+    declared = [home for home in homes if root.manifest(home)]
     if len(declared) > 1 or any(len(found) > 1 for found in given.values()):
         return sorted(homes)
     return []
@@ -52,11 +52,11 @@ def name_of(
     It is what the nearest package.xml says, else what [tool.idlc] compiles the files into, else
     what an idlc.lock nearby says of them, else the folder's name.
     """
-    declared = manifest(home)
+    declared = scope.root.manifest(home)
     if declared:
-        name = declared_name(declared, shown(declared), report, scope.unsaved)
+        name = declared_name(declared, scope.root, report)
         return name or home.name, ""
-    name = _by_settings(home, scope) or _by_lock(home, digests)
+    name = _by_settings(home, scope) or _by_lock(home, scope.root, digests)
     if name:
         return name, ""
     note = f"no package.xml: `{home.name}` is taken for the package's name; --package sets another"
@@ -65,36 +65,29 @@ def name_of(
 
 def _by_settings(home: Path, scope: Scope) -> str | None:
     """Return the name of `out` in [tool.idlc] if the package there is this one."""
-    if not scope.out or not any(home.is_relative_to(absolute(path)) for path in scope.paths):
+    root = scope.root
+    if not scope.out or not any(home.is_relative_to(root.absolute(path)) for path in scope.paths):
         return None
-    homes = by_home(look(scope.paths, Report(), scope.exclude).files)
-    return None if several(homes) or any(map(manifest, homes)) else absolute(scope.out).name
+    homes = by_home(look(scope.paths, root, Report(), scope.exclude).files, root)
+    if several(homes, root) or any(map(root.manifest, homes)):
+        return None
+    return root.absolute(scope.out).name
 
 
-def places(home: Path) -> tuple[Path, ...]:
+def places(home: Path, root: Root) -> tuple[Path, ...]:
     """Return the folders in which an output of a package is looked for."""
-    return tuple(dict.fromkeys((home, home.parent, Path.cwd())))
+    return tuple(dict.fromkeys((home, home.parent, root.base)))
 
 
-def _by_lock(home: Path, digests: Callable[[], Mapping[str, str]]) -> str | None:
+def _by_lock(home: Path, root: Root, digests: Callable[[], Mapping[str, str]]) -> str | None:
     """Return the one name that locks nearby give to a package with these files."""
     names = {
         known.package
-        for place in places(home)
-        for known in locks(place)
+        for place in places(home, root)
+        for known in root.locks(place)
         if digests().keys() <= known.inputs.keys() and digests().items() & known.inputs.items()
     }
     return names.pop() if len(names) == 1 else None
-
-
-@lru_cache(maxsize=64)
-def locks(place: Path) -> tuple[lock.Lock, ...]:
-    """Return the locks of the generated packages in a folder."""
-    try:
-        folders = [one for one in place.iterdir() if is_file(one / lock.FILE)]
-    except OSError:
-        return ()
-    return tuple(filter(None, (load_lock(folder, "", Report()) for folder in folders)))
 
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
@@ -150,10 +143,9 @@ class Inputs(msgspec.Struct, frozen=True):
             return {o.file.key: meaning(o.data.decode(), self.package) for o in self.files}
         return {one.file.key: digest(one.data) for one in self.files}
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether a folder was given, so that what is not in it does not exist."""
-        return any(is_folder(Path(one.file.given)) for one in self.files)
+    def is_whole(self, root: Root) -> bool:
+        """Return whether a folder was given, so that what is not in it does not exist."""
+        return any(is_folder(Path(root.path(one.file.given))) for one in self.files)
 
     @property
     def names(self) -> frozenset[TypeName]:
@@ -166,8 +158,8 @@ def load(
     package: str,
     files: Iterable[InterfaceFile],
     home: Path,
+    root: Root,
     report: Report,
-    unsaved: Unsaved = NOTHING_OPEN,
 ) -> Inputs:
     """Read a package's files; report IDL609 for each that is there twice."""
     loaded: dict[str, Input] = {}
@@ -182,7 +174,7 @@ def load(
                     "out with --exclude, or `exclude` in [tool.idlc]",
                 )
             )
-        elif (data := unsaved.read_bytes(file.path, file.shown, report)) is not None:
+        elif (data := root.read_bytes(file.path, file.shown, report)) is not None:
             loaded[file.key] = Input(file, data)
     roots = dict.fromkeys(one.file.root for one in loaded.values())
     return Inputs(package, tuple(loaded[key] for key in sorted(loaded)), tuple(roots), home)
@@ -196,16 +188,16 @@ def packages(
     `empty` are the folders of packages that may be without interfaces.
     """
     files = tuple(files)
-    locks.cache_clear()
+    root = scope.root
     if scope.package is not None and files:
-        home = min(by_home(files))
-        return (load(scope.package, files, home, report, scope.unsaved),)
-    homes = by_home(files)
-    read = [load("", own, home, report, scope.unsaved) for home, own in homes.items()]
+        home = min(by_home(files, root))
+        return (load(scope.package, files, home, root, report),)
+    homes = by_home(files, root)
+    read = [load("", own, home, root, report) for home, own in homes.items()]
     found = [_named(one, scope, report) for one in read]
     others = (home for home in sorted(set(empty)) if not homes.keys() & {home, *home.parents})
     found += [_named(Inputs("", (), (home,), home), scope, report) for home in others]
-    return without_duplicates(found, report)
+    return without_duplicates(found, root, report)
 
 
 def _named(given: Inputs, scope: Scope, report: Report) -> Inputs:
@@ -215,7 +207,7 @@ def _named(given: Inputs, scope: Scope, report: Report) -> Inputs:
     return msgspec.structs.replace(given, package=name)
 
 
-def without_duplicates(found: Iterable[Inputs], report: Report) -> tuple[Inputs, ...]:
+def without_duplicates(found: Iterable[Inputs], root: Root, report: Report) -> tuple[Inputs, ...]:
     """Return packages, the first of each name; report IDL631 for the others."""
     first: dict[str, Inputs] = {}
     for one in found:
@@ -223,39 +215,39 @@ def without_duplicates(found: Iterable[Inputs], report: Report) -> tuple[Inputs,
         if other is not one:
             report.add(
                 codes.DUPLICATE_PACKAGE.of(
-                    shown(one.home),
-                    f"package `{one.package}` is in `{shown(other.home)}` as well",
+                    root.shown(one.home),
+                    f"package `{one.package}` is in `{root.shown(other.home)}` as well",
                     hint="remove one, or put a file COLCON_IGNORE into its folder",
                 )
             )
     return tuple(first.values())
 
 
-def near() -> Mapping[str, Sequence[Path]]:
+def near(root: Root) -> Mapping[str, Sequence[Path]]:
     """Return the folders of the packages that pyproject.toml names, or of the one around."""
-    declared = manifest(absolute("."))
+    declared = root.manifest(root.base)
     around = (str(declared.parent),) if declared else ()
-    return _packages(load_settings(Report()).paths or around)
+    return _packages(load_settings(root, Report()).paths or around, root)
 
 
-def below() -> Mapping[str, Sequence[Path]]:
-    """Return the folders of all packages below the working folder; this looks at every folder."""
-    return _packages((".",))
+def below(root: Root) -> Mapping[str, Sequence[Path]]:
+    """Return the folders of all packages below the base; this looks at every folder."""
+    return _packages((".",), root)
 
 
-def names() -> list[str]:
-    """Return what is in the working folder."""
+def names(root: Root) -> list[str]:
+    """Return what is in the base."""
     try:
-        return sorted(path.name for path in Path.cwd().iterdir())
+        return sorted(path.name for path in root.base.iterdir())
     except OSError:
         return []
 
 
-def _packages(paths: Sequence[str]) -> dict[str, tuple[Path, ...]]:
+def _packages(paths: Sequence[str], root: Root) -> dict[str, tuple[Path, ...]]:
     """Return folders by package; problems of files are reported when they are compiled."""
     ignored = Report()
-    where = scope(load_settings(ignored))
+    where = scope(load_settings(root, ignored))
     found: dict[str, tuple[Path, ...]] = {}
-    for one in packages(find(paths, ignored, where.exclude), where, ignored):
+    for one in packages(find(paths, root, ignored, where.exclude), where, ignored):
         found.setdefault(one.package, one.folders)
     return found

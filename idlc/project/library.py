@@ -16,14 +16,15 @@ from idlc.diagnostics.text import closest, did_you_mean, including
 from idlc.model import catalog, derive, ir
 from idlc.model.distros import DEFAULT, Distro
 from idlc.project import inputs, prefixes
-from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, is_file, is_folder, shown
+from idlc.project.files import is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS, NOTHING, Exclusions, root_of, walk
-from idlc.project.package_xml import declared_name, manifest
+from idlc.project.package_xml import declared_name
 from idlc.project.prefixes import installed
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
+    from idlc.project.root import Root
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -31,8 +32,9 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 class Folder:
     """One -I folder: a package, a folder of packages, a source tree or an install prefix."""
 
-    def __init__(self, path: str | Path) -> None:
-        self._path = absolute(path)
+    def __init__(self, path: str | Path, root: Root) -> None:
+        self._path = root.absolute(path)
+        self._root = root
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield each folder that may hold the package's msg/, srv/ and action/ folders."""
@@ -52,11 +54,11 @@ class Folder:
         """Every package at any depth, by name; made only when the direct look-up fails."""
         ignored = Report()
         found: dict[str, list[Path]] = {}
-        files = (path for path in walk(self._path, ignored) if path.suffix in KINDS)
-        for root in sorted({root_of(str(file.parent)) for file in files}):
-            declared = manifest(root)
-            name = declared_name(declared, "", ignored) if declared else None
-            found.setdefault(name or root.name, []).append(root)
+        files = (path for path in walk(self._path, self._root, ignored) if path.suffix in KINDS)
+        for folder in sorted({root_of(str(file.parent)) for file in files}):
+            declared = self._root.manifest(folder)
+            name = declared_name(declared, self._root, ignored) if declared else None
+            found.setdefault(name or folder.name, []).append(folder)
         return found
 
 
@@ -95,7 +97,7 @@ def _has_interfaces(root: Path) -> bool:
 
 
 class Library:
-    """Interfaces of all packages that can be found, as `link.Library`.
+    """Interfaces of all packages that can be found from a root, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
     a single file finds its neighbours, unless they are excluded. `texts` come before all others.
@@ -105,25 +107,25 @@ class Library:
     def __init__(
         self,
         folders: Sequence[str],
+        root: Root,
         report: Report,
         *,
         own: Mapping[str, Sequence[Path]] | None = None,
         exclude: Exclusions = NOTHING,
         distro: Distro = DEFAULT,
         texts: Mapping[ir.TypeName, Source] = MappingProxyType({}),
-        unsaved: Unsaved = NOTHING_OPEN,
     ) -> None:
         self.distro = distro
         self.texts = texts
-        places = [Folder(path) for path in folders]
-        self._missing = [path for path in folders if not is_folder(Path(path))]
+        places = [Folder(path, root) for path in folders]
+        self._missing = [path for path in folders if not is_folder(Path(root.path(path)))]
         self._places: tuple[Folder | Prefix, ...] = (
             *places,
             *(Prefix(path, distro) for path in prefixes.ament_prefixes()),
         )
         self._own = own or {}
         self._exclude = exclude
-        self._unsaved = unsaved
+        self._root = root
         self._known: dict[str, list[Path]] = {}
         self._sources: dict[ir.TypeName, tuple[Source | None, Report]] = {}
         self._packages: list[str] | None = None
@@ -153,7 +155,7 @@ class Library:
         places = self._roots(name.package)
         paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
         exclude = self._excluded(name.package)
-        found = (one for one in paths if self._unsaved.is_file(one) and not exclude.has(one))
+        found = (one for one in paths if self._root.is_file(one) and not exclude.has(one))
         return next(map(Path, found), None)
 
     def _excluded(self, package: str) -> Exclusions:
@@ -175,7 +177,7 @@ class Library:
         path = self.path(name)
         if path is None:
             return self._built_in(name), problems
-        return self._unsaved.read_source(path, shown(path), problems), problems
+        return self._root.read_source(path, self._root.shown(path), problems), problems
 
     def _built_in(self, name: ir.TypeName) -> Source | None:
         # generated code is the same for all: it has events where ROS 2 has none, too
@@ -229,11 +231,11 @@ class Library:
 
     def nearby(self, package: str) -> str | None:
         """Return what finds a package that lies beside one of those being compiled."""
-        for root in (root for roots in self._own.values() for root in roots):
-            declared = manifest(root)
-            beside = (declared.parent if declared else root).parent
+        for own in (folder for folders in self._own.values() for folder in folders):
+            declared = self._root.manifest(own)
+            beside = (declared.parent if declared else own).parent
             if _NAME.fullmatch(package) and _has_interfaces(beside / package):
-                folder = os.path.relpath(beside)
+                folder = self._root.relative(beside)
                 return f"it is in `{Path(folder, package).as_posix()}`: {including(folder)}"
         return None
 
@@ -249,7 +251,7 @@ class Library:
         )
 
     def _files(self, folder: Path) -> list[Path]:
-        new = [path for path in self._unsaved.new_below(folder) if path.parent == folder]
+        new = [path for path in self._root.unsaved_below(folder) if path.parent == folder]
         try:
             return new + [path for path in folder.iterdir() if is_file(path)]
         except OSError:
@@ -276,14 +278,14 @@ class Meant(NamedTuple):
 
 
 def packages(scope: Scope, report: Report) -> list[Package]:
-    """Return all packages that are known here, those below the working folder included."""
+    """Return all packages that are known here, those below the base included."""
     library = _wide(scope, report)
-    return [_package(name, library) for name in library.packages()]
+    return [_package(name, library, scope.root) for name in library.packages()]
 
 
-def _package(name: str, library: Library) -> Package:
+def _package(name: str, library: Library, root: Root) -> Package:
     home = library.home(name)
-    return Package(name, len(library.interfaces(name)), shown(home) if home else None)
+    return Package(name, len(library.interfaces(name)), root.shown(home) if home else None)
 
 
 def interfaces(wanted: Sequence[str], scope: Scope, report: Report) -> list[str]:
@@ -301,12 +303,14 @@ def interfaces(wanted: Sequence[str], scope: Scope, report: Report) -> list[str]
 
 
 def _near(scope: Scope, report: Report) -> Library:
-    return Library(scope.include, report, own=inputs.near(), distro=scope.distro)
+    return Library(
+        scope.include, scope.root, report, own=inputs.near(scope.root), distro=scope.distro
+    )
 
 
 def _wide(scope: Scope, report: Report) -> Library:
-    own = {**inputs.below(), **inputs.near()}
-    return Library(scope.include, report, own=own, distro=scope.distro)
+    own = {**inputs.below(scope.root), **inputs.near(scope.root)}
+    return Library(scope.include, scope.root, report, own=own, distro=scope.distro)
 
 
 def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Meant, ...]]:
@@ -322,7 +326,7 @@ def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Mea
         meant = _meant(text, library)
     if len(meant) == 1 or text in library.packages():
         return library, meant
-    report.add(_several(text, meant) if meant else _nothing(text, library))
+    report.add(_several(text, meant) if meant else _nothing(text, library, scope.root))
     return library, ()
 
 
@@ -363,20 +367,20 @@ def _several(text: str, meant: Sequence[Meant]) -> Diagnostic:
     return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}")
 
 
-def _nothing(text: str, library: Library) -> Diagnostic:
+def _nothing(text: str, library: Library, root: Root) -> Diagnostic:
     if not _DIVIDER.search(text):
         message = f"`{text}` is no file or folder, and no type or package that is known here"
     else:
         message = f"no such type: `{text}`"
-    hint = _similar(_DIVIDER.split(text), library) or "`idlc list` shows what is known here"
+    hint = _similar(_DIVIDER.split(text), library, root) or "`idlc list` shows what is known here"
     return codes.NO_SUCH_TYPE.of("", message, hint=hint)
 
 
-def _similar(parts: Sequence[str], library: Library) -> str | None:
+def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
     """Return the hint that names what is nearest to a type's or package's name."""
     if len(parts) == 1:
         named = {one.name: str(one) for one in _all(library)}
-        near = closest(parts[0], [*inputs.names(), *named, *library.packages()])
+        near = closest(parts[0], [*inputs.names(root), *named, *library.packages()])
         return f"did you mean `{named.get(near, near)}`?" if near else None
     package = closest(parts[0], library.packages()) or ""
     named = {one.name: str(one) for one in library.interfaces(package)}

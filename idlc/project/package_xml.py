@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -17,10 +16,11 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.project.edits import Edited, Outcome, Refused
-from idlc.project.files import NOTHING_OPEN, Unsaved, is_file, read_bytes, read_source
+from idlc.project.files import read_bytes
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
+    from idlc.project.root import Root
 
 
 class Statement(msgspec.Struct, frozen=True):
@@ -215,26 +215,10 @@ def _placed(elements: Iterable[Element], source: Source, data: bytes) -> Iterato
         yield Statement(element.tag, element.text, span, element.attributes)
 
 
-MANIFEST = "package.xml"
-
-
-@lru_cache(maxsize=1024)
-def manifest(folder: Path) -> Path | None:
-    """Return the nearest package.xml at or above an absolute folder, within its repository."""
-    for here in map(str, (folder, *folder.parents)):
-        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
-        if is_file(path):
-            return Path(path)
-        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
-            break
-    return None
-
-
-def declared_name(
-    path: Path, name: str, report: Report, unsaved: Unsaved = NOTHING_OPEN
-) -> str | None:
+def declared_name(path: Path, root: Root, report: Report) -> str | None:
     """Return the package name in a package.xml; report IDL610 and return `None` without one."""
-    data = unsaved.read_bytes(path, name, report)
+    name = root.shown(path)
+    data = root.read_bytes(path, name, report)
     if data is None:
         return None
     try:
@@ -277,9 +261,9 @@ def _broken(data: bytes, name: str, error: NotXmlError) -> Diagnostic:
     return codes.BAD_PACKAGE_XML.at(Span(source, start, start + 1), message, hint=hint)
 
 
-def read_statements(path: Path, name: str, report: Report) -> tuple[Statement, ...]:
+def read_statements(path: Path, name: str, root: Root, report: Report) -> tuple[Statement, ...]:
     """Return what a package.xml says, in order; empty for a file that cannot be read as XML."""
-    source = read_source(path, name, report)
+    source = root.read_source(path, name, report)
     return () if source is None else statements(source)
 
 

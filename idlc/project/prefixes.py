@@ -12,8 +12,9 @@ from typing import NamedTuple
 from idlc.diagnostics.report import Report, first_few
 from idlc.model import distros
 from idlc.model.names import is_package_name
-from idlc.project.files import is_file, is_folder, read_bytes, shown
+from idlc.project.files import is_file, is_folder, read_bytes
 from idlc.project.package_xml import declared_version
+from idlc.project.root import Root
 
 #: Where a prefix lists what is installed in it, by kind and name.
 INDEX = "share/ament_index/resource_index"
@@ -124,20 +125,21 @@ class InstalledPackage(NamedTuple):
 
     prefix: Path
     package: str
+    root: Root
 
     @property
     def share(self) -> str:
         """The folder of its interfaces."""
-        return shown(self.prefix / "share" / self.package)
+        return self.root.shown(self.prefix / "share" / self.package)
 
     def library(self, name: str) -> str:
         """Return the path of one of its libraries, as people know it."""
-        return shown(self.prefix / "lib" / name)
+        return self.root.shown(self.prefix / "lib" / name)
 
     def content(self, name: str) -> bytes | None:
         """Return the content of one of its libraries, `None` where there is none to be read."""
         path = self.prefix / "lib" / name
-        return read_bytes(path, shown(path), Report()) if is_file(path) else None
+        return read_bytes(path, self.root.shown(path), Report()) if is_file(path) else None
 
 
 def prefixes(folder: Path) -> list[Path]:
@@ -151,11 +153,11 @@ def prefixes(folder: Path) -> list[Path]:
     return [path for path in inner if is_folder(path / INDEX)]
 
 
-def installed_packages(prefix: Path) -> Iterator[InstalledPackage]:
+def installed_packages(prefix: Path, root: Root) -> Iterator[InstalledPackage]:
     """Yield the packages of a prefix that are registered as packages with interfaces."""
     for name in _registered(prefix, "rosidl_interfaces"):
         if is_file(prefix / INDEX / "packages" / name):
-            yield InstalledPackage(prefix, name)
+            yield InstalledPackage(prefix, name, root)
 
 
 def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
@@ -167,7 +169,7 @@ def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
             yield name, "has interfaces and is not a package there: `ros2 interface list` fails"
             continue
         path = prefix / INDEX / "rosidl_interfaces" / name
-        listed = (read_bytes(path, shown(path), Report()) or b"").decode("utf-8", "replace")
+        listed = (read_bytes(path, path.as_posix(), Report()) or b"").decode("utf-8", "replace")
         share = prefix / "share" / name
         missing = [line for line in listed.split() if not is_file(share / line)]
         if missing:

@@ -5,12 +5,9 @@ Paths in it are relative to the file's folder. A mistake is reported as IDL611.
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
@@ -24,12 +21,13 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, listed, unknown_distro
-from idlc.project.files import NOTHING_OPEN, Unsaved, decode, shown
+from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
 from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
+    from idlc.project.root import Root
 
 Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
@@ -145,10 +143,13 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
 class Config(msgspec.Struct, frozen=True):
     """The settings found; what is absent is empty or `None`. Paths are as one would type them.
 
+    They are those that hold in the base of `root`.
+
     `tables` holds the tables of single commands; `source` is the file, `folder` where it lies;
     `exclude` is relative to that.
     """
 
+    root: Root
     paths: tuple[str, ...] = ()
     out: str | None = None
     package: str | None = None
@@ -162,27 +163,27 @@ class Config(msgspec.Struct, frozen=True):
     folder: Path | None = None
 
 
-def load_settings(report: Report, unsaved: Unsaved = NOTHING_OPEN) -> Config:
-    """Return the settings that hold in the working folder."""
-    for folder in (here := Path.cwd(), *here.parents):
+def load_settings(root: Root, report: Report) -> Config:
+    """Return the settings that hold in the base of a root."""
+    for folder in (root.base, *root.base.parents):
         path = folder / SETTINGS_FILE
-        if unsaved.is_file(path):
-            return _read(path, report, unsaved)
-    return Config()
+        if root.is_file(path):
+            return _read(path, root, report)
+    return Config(root)
 
 
-def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
-    name = shown(path)
-    data = unsaved.read_bytes(path, name, report)
+def _read(path: Path, root: Root, report: Report) -> Config:
+    name = root.shown(path)
+    data = root.read_bytes(path, name, report)
     if data is None or b"idlc" not in data:
-        return Config()
+        return Config(root)
     source = decode(data, name, report)
     if source is None:
-        return Config()
+        return Config(root)
     if _has_costly_keys(source):
         whole = Span(source, 0, len(source.text))
         report.add(codes.BAD_CONFIG.at(whole, "a line has too many dots"))
-        return Config()
+        return Config(root)
     if sys.version_info >= (3, 11):
         import tomllib
     else:
@@ -191,10 +192,10 @@ def _read(path: Path, report: Report, unsaved: Unsaved) -> Config:
         document: dict[str, Any] = tomllib.loads(source.text)
     except tomllib.TOMLDecodeError as error:
         report.add(_broken(source, str(error)))
-        return Config()
+        return Config(root)
     tool = document.get("tool", {})
     table = tool.get("idlc", {}) if isinstance(tool, dict) else {}
-    return _checked(table, source, path.parent, report)
+    return _checked(table, source, path.parent, root, report)
 
 
 def _has_costly_keys(source: Source) -> bool:
@@ -214,25 +215,26 @@ def _broken(source: Source, message: str) -> Diagnostic:
     )
 
 
-def _checked(table: object, source: Source, folder: Path, report: Report) -> Config:
+def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
     """Return the settings in a table; report each that is unknown or of the wrong type."""
     place = Place(source, "tool.idlc", "[tool.idlc]")
     if not isinstance(table, dict):
         place.wrong("idlc", "`tool.idlc` must be a table", report)
-        return Config()
+        return Config(root)
     found = read_table(table, Settings, place, report)
     assert found is not None
     for path in found.paths:
         place.no_url("paths", path, report)
     return Config(
-        paths=tuple(_typed(folder, path) for path in found.paths),
-        out=_typed(folder, found.out) if found.out else None,
+        root,
+        paths=tuple(_typed(folder, path, root) for path in found.paths),
+        out=_typed(folder, found.out, root) if found.out else None,
         package=found.package or None,
-        include=tuple(_typed(folder, path) for path in found.include),
+        include=tuple(_typed(folder, path, root) for path in found.include),
         exclude=found.exclude,
         vendor_deps=found.vendor_deps,
         distro=_distros(found.distro, place, report),
-        templates=_typed(folder, found.templates) if found.templates else None,
+        templates=_typed(folder, found.templates, root) if found.templates else None,
         tables={"breaking": found.breaking, "check": found.check},
         source=source,
         folder=folder,
@@ -249,11 +251,11 @@ def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tupl
     return tuple(name for name in names if name in BY_NAME)
 
 
-def _typed(folder: Path, path: str) -> str:
-    """Return a path in the file as one would type it in the working folder."""
+def _typed(folder: Path, path: str, root: Root) -> str:
+    """Return a path in the file as one would type it in the base."""
     whole = folder / path
     try:
-        return Path(os.path.relpath(whole)).as_posix() if folder != Path.cwd() else path
+        return Path(root.relative(whole)).as_posix() if folder != root.base else path
     except ValueError:
         return whole.as_posix()
 
@@ -273,18 +275,18 @@ def command_table(
 class Scope(msgspec.Struct, frozen=True):
     """The package's name if it was given, folders with other packages, files that are left out.
 
-    `out` is the folder that [tool.idlc] compiles `paths` into; its name may be the package's.
-    `distros` are the distributions of ROS 2 that files are read for, one except for `check`;
-    none means the one that is installed. `unsaved` counts instead of what files hold.
+    Paths are seen from `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its name
+    may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
+    except for `check`; none means the one that is installed.
     """
 
+    root: Root
     package: str | None = None
     include: tuple[str, ...] = ()
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
     distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros_scope(()))
-    unsaved: Unsaved = NOTHING_OPEN
 
     @property
     def distro(self) -> Distro:
@@ -300,10 +302,11 @@ def scope(
     distro: str | None = None,
 ) -> Scope:
     """Return what was typed, with what pyproject.toml says; `distro` is a list with commas."""
-    left_out = [exclusion(exclude, Path.cwd())] if exclude else []
+    left_out = [exclusion(exclude, settings.root.base)] if exclude else []
     if settings.exclude and settings.folder is not None:
         left_out.append(exclusion(settings.exclude, settings.folder))
     return Scope(
+        settings.root,
         package or settings.package,
         (*include, *settings.include),
         Exclusions(tuple(left_out)),
@@ -321,20 +324,3 @@ def _distros_scope(names: Sequence[str]) -> tuple[Distro, ...]:
 def _installed() -> Distro:
     """Return the distribution that is installed here, or the default for an unknown one."""
     return BY_NAME.get(distribution().name, DEFAULT)
-
-
-@contextmanager
-def working_in(folder: Path) -> Iterator[None]:
-    """Work in a folder, as after `cd`; one that is gone raises OSError.
-
-    If the folder from before is gone, which a server may outlive, the process stays in this one.
-    """
-    before = folder
-    with contextlib.suppress(OSError):
-        before = Path.cwd()
-    os.chdir(folder)
-    try:
-        yield
-    finally:
-        with contextlib.suppress(OSError):
-            os.chdir(before)

@@ -8,19 +8,19 @@ from pathlib import Path
 
 from idlc.project.files import is_file, is_folder
 from idlc.project.find import KIND_FOLDERS, KINDS
-from idlc.project.package_xml import MANIFEST
+from idlc.project.root import MANIFEST, Root
 from idlc.recordings.containers.bag import COMPRESSED, METADATA, SUFFIXES
 
 #: Cannot be read, which opening it reports.
 ROS_1 = ".bag"
 
 
-def is_recording(word: str) -> bool:
+def is_recording(word: str, root: Root) -> bool:
     """Return whether a path means a recording: an .mcap or .db3 file, or the folder of a bag.
 
     A folder is that of a bag if it has a metadata.yaml, or recordings and no interfaces.
     """
-    path = Path(word)
+    path = Path(root.path(word))
     if path.name.endswith((*SUFFIXES, *COMPRESSED, ROS_1)):
         return not is_folder(path) or _is_bag(path)
     return is_folder(path) and _is_bag(path)
@@ -46,18 +46,18 @@ def is_there(word: str) -> bool:
     return "://" in word or is_file(word) or is_folder(Path(word))
 
 
-def divided(words: Iterable[str]) -> tuple[list[str], list[str]]:
+def split_recordings(words: Iterable[str], root: Root) -> tuple[list[str], list[str]]:
     """Return the words that mean recordings, and the others."""
     recordings: list[str] = []
     others: list[str] = []
     for word in words:
-        (recordings if is_recording(word) else others).append(word)
+        (recordings if is_recording(word, root) else others).append(word)
     return recordings, others
 
 
-def files(words: Iterable[str]) -> list[Path]:
+def files(words: Iterable[str], root: Root) -> list[Path]:
     """Return the files of the recordings among words."""
-    paths = [Path(word) for word in words if is_recording(word)]
+    paths = [Path(root.path(word)) for word in words if is_recording(word, root)]
     return [file for path in paths for file in (path.iterdir() if is_folder(path) else [path])]
 
 
@@ -68,13 +68,15 @@ def expanded(word: str) -> list[str]:
     return [word]
 
 
-def recordings_of(against: str, paths: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def recordings_of(
+    against: str, paths: tuple[str, ...], root: Root
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the recordings that --against means, which may be a pattern, and the other paths.
 
     A shell that expands the pattern itself leaves all but the first among the paths.
     """
     matches = expanded(against)
-    if not divided(matches)[0]:
+    if not split_recordings(matches, root)[0]:
         return (), paths
-    more, others = divided(paths)
+    more, others = split_recordings(paths, root)
     return tuple(dict.fromkeys((*matches, *more))), tuple(others)

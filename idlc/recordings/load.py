@@ -22,13 +22,14 @@ from idlc.model.python_names import class_
 from idlc.project.cache import cache_folder
 from idlc.project.find import is_path
 from idlc.project.library import resolve
+from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.templates import RenderedFile
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types
-from idlc.recordings.versions import read, versions
+from idlc.recordings.versions import read_topics, versions
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -96,10 +97,10 @@ def asked_models(
     what: str, include: tuple[str, ...], distro: str | None, report: Report
 ) -> tuple[Models, list[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
-    where = scope(Config(), None, include, distro=distro)
-    if is_recording(what):
+    where = scope(Config(Root.here()), None, include, distro=distro)
+    if is_recording(what, where.root):
         return _of_recording(what, where, report)
-    if is_path(what):
+    if is_path(what, where.root):
         packages = requested_packages([what], [], "", where, report)
         library = library_for(packages, where, report)
         names = [name for package in packages for name in package.names]
@@ -125,7 +126,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
-    recording = read(path, report)
+    recording = read_topics(path, report)
     groups = versions(recording.topics) if recording else []
     if len(groups) != 1:
         from idlc.recordings.packages import check_versions
@@ -157,7 +158,7 @@ def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
 
 
 def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
-    where, report = Scope(include=include), Report()
+    where, report = Scope(Root.here(), include=include), Report()
     (version,) = versions([recorded(topic, topic.name)])
     types = recorded_types(version, LocalTypes(where, report), where, report)
     return types, report
@@ -243,7 +244,7 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """
     schema, key = topic.schema, ""
     if schema and not schema.is_blank:
-        converts = Scope(include=include).distro.converts_values
+        converts = Scope(Root.here(), include=include).distro.converts_values
         texts = [topic.type, schema.encoding, schema.text, topic.hash or ""]
         key = _key(texts, converts=converts)
     if not (key and is_stored(key)):

@@ -16,21 +16,20 @@ from idlc.diagnostics.text import including
 from idlc.generate.requested import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
-from idlc.project.files import absolute
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_types
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-from idlc.recordings.versions import Version, contradictions, read, topics_of, versions
+from idlc.recordings.versions import Version, contradictions, read_topics, topics_of, versions
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:
     """Report problems in the type definitions stored in recordings."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read(path, report, look=True)
+        recording = read_topics(path, report, check=True)
         groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
@@ -75,7 +74,7 @@ def recorded_models(
     """Yield the models of recordings, without faulty interfaces, and the names of their types."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read(path, report)
+        recording = read_topics(path, report)
         for version in versions(recording.topics) if recording else ():
             types = recorded_types(version, local, scope, report)
             for model in types.models.values():
@@ -110,7 +109,7 @@ def recorded_packages(
     if not whole:
         _note_hidden(names, types.library, report)
     packages = [borrowed(mine, types.library) for _, mine in sorted(names.items())]
-    home = absolute(paths[0])
+    home = scope.root.absolute(paths[0])
     return [msgspec.structs.replace(package, home=home) for package in packages], types.texts
 
 

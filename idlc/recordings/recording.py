@@ -239,7 +239,7 @@ class Part(Selection):
             yield from file.messages(self.ids, self.pieces, self.window)
 
 
-def divided(
+def parts_of(
     container: Container, topic: Topic, window: Window, size: int, include: tuple[str, ...] = ()
 ) -> Iterator[Part]:
     """Yield the parts of a topic, each of about `size` bytes of a file."""
@@ -393,4 +393,4 @@ class RecordedTopic(Selection):
 
         They can be pickled, and read in other processes and on other machines that see the file.
         """
-        return list(divided(self._container, self.topic, self._window, size, self.include))
+        return list(parts_of(self._container, self.topic, self._window, size, self.include))

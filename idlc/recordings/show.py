@@ -11,7 +11,7 @@ from idlc.documents.show import shown
 from idlc.project.settings import Scope
 from idlc.recordings.definitions import Recorded
 from idlc.recordings.types import LocalTypes, recorded_types
-from idlc.recordings.versions import read, topics_of, versions
+from idlc.recordings.versions import read_topics, topics_of, versions
 
 
 class TopicFacts(NamedTuple):
@@ -32,7 +32,7 @@ class TopicFacts(NamedTuple):
 
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
-    recording = read(path, report, look=True)
+    recording = read_topics(path, report, check=True)
     report.notes += [topic.message for topic in recording.unread] if recording else []
     local = LocalTypes(scope, report)
     facts = []

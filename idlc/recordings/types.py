@@ -43,8 +43,10 @@ class LocalTypes:
     """The types that are defined locally, without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
-        self.near = inputs.near()
-        self.library = Library(scope.include, report, own=self.near, distro=scope.distro)
+        self.near = inputs.near(scope.root)
+        self.library = Library(
+            scope.include, scope.root, report, own=self.near, distro=scope.distro
+        )
         self._compiler = Compiler(self.library)
         self._hashes: dict[ir.TypeName, str | None] = {}
 
@@ -115,7 +117,12 @@ class RecordedTypes:
         texts = {name: source for name, source in version.texts.items() if name not in broken}
         texts |= _empty_ones(version.topics, texts, local)
         self.library = Library(
-            scope.include, Report(), own=local.near, distro=scope.distro, texts=texts
+            scope.include,
+            scope.root,
+            Report(),
+            own=local.near,
+            distro=scope.distro,
+            texts=texts,
         )
         self.topics = tuple(_typed(version.topics, texts, local, report))
         self._compiler = Compiler(self.library)

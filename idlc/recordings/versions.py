@@ -43,10 +43,10 @@ class Version(msgspec.Struct):
     texts: dict[ir.TypeName, Source]
 
 
-def read(path: str, report: Report, *, look: bool = False) -> RecordingTopics | None:
+def read_topics(path: str, report: Report, *, check: bool = False) -> RecordingTopics | None:
     """Return the topics of a recording; report IDL651 and return `None` for other files.
 
-    With `look`, topics that cannot be read are in `unread`.
+    With `check`, topics that cannot be read are in `unread`.
     """
     if not is_there(path):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
@@ -56,7 +56,7 @@ def read(path: str, report: Report, *, look: bool = False) -> RecordingTopics | 
             report.notes += container.notes
             cache: TextCache = {}
             topics = tuple(recorded(topic, path, cache) for topic in container.topics)
-            return RecordingTopics(path, topics, tuple(container.unread()) if look else ())
+            return RecordingTopics(path, topics, tuple(container.unread()) if check else ())
     except RecordingError as error:
         report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
         return None
@@ -69,7 +69,7 @@ def topics_of(
 
     Reports IDL655 for a topic that is in none of them.
     """
-    recordings = [read(path, report) for path in paths]
+    recordings = [read_topics(path, report) for path in paths]
     if None in recordings:
         return None
     topics = [topic for recording in recordings if recording for topic in recording.topics]

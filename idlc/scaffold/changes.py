@@ -14,12 +14,12 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean
 from idlc.model import ir
 from idlc.project.edits import Edited, Outcome
-from idlc.project.files import absolute, shown
 from idlc.project.library import Library
-from idlc.project.package_xml import declared_name, manifest
+from idlc.project.package_xml import declared_name
+from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import keep
-from idlc.scaffold.project import Done, Project
+from idlc.scaffold.project import FileOutcome, Project
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.roles.role import Endpoint, Role
 from idlc.scaffold.templates import (
@@ -34,8 +34,9 @@ from idlc.scaffold.templates import (
 
 
 class Settings(NamedTuple):
-    """The options of every scaffold command."""
+    """The options of every scaffold command, and the folder that it works in."""
 
+    root: Root
     dry_run: bool = False
     force: bool = False
     include: tuple[str, ...] = ()
@@ -50,7 +51,7 @@ class Result(NamedTuple):
     """
 
     folder: str
-    done: tuple[Done, ...]
+    done: tuple[FileOutcome, ...]
     diff: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     following: tuple[str, ...] = ()
@@ -58,10 +59,10 @@ class Result(NamedTuple):
 
 def templates(settings: Settings, report: Report) -> Templates:
     """Return idlc's templates, where templates in the user's folder replace them."""
-    folder = settings.templates or load_settings(report).templates
+    folder = settings.templates or load_settings(settings.root, report).templates
     if folder is None:
         return Templates()
-    user_templates = Templates(read(folder, folders(), ENDING, report))
+    user_templates = Templates(read(folder, folders(), ENDING, settings.root, report))
     user_templates.check(report)
     return user_templates
 
@@ -79,23 +80,27 @@ def rendering(subject: str, report: Report) -> Iterator[None]:
 
 def find_package(settings: Settings, report: Report) -> tuple[Project, str] | None:
     """Return the package that the working folder belongs to, and its name."""
-    manifest.cache_clear()
-    path = manifest(absolute("."))
+    root = settings.root
+    path = root.manifest(root.base)
     if path is None:
         message = "this folder belongs to no package: there is no package.xml here or above"
         hint = "run `idlc scaffold package NAME`, then `cd NAME`"
         report.add(codes.NO_SUCH_PATH.of("package.xml", message, hint=hint))
         return None
-    name = declared_name(path, shown(path), report)
-    folder = shown(path.parent) if path.parent != absolute(".") else "."
-    return None if name is None else (Project(folder, report, force=settings.force), name)
+    name = declared_name(path, root, report)
+    folder = root.shown(path.parent) if path.parent != root.base else "."
+    return (
+        None
+        if name is None
+        else (Project(folder, settings.root, report, force=settings.force), name)
+    )
 
 
 def library_around(package: str, project: Project, settings: Settings, report: Report) -> Library:
     """Return a library with a package and the packages that it may use."""
-    distro = scope(load_settings(Report())).distro
+    distro = scope(load_settings(settings.root, Report())).distro
     own = {package: (project.path,)}
-    return Library(settings.include, report, own=own, distro=distro)
+    return Library(settings.include, settings.root, report, own=own, distro=distro)
 
 
 def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...]:
@@ -103,7 +108,7 @@ def generation(project: Project, own: str, settings: Settings) -> tuple[str, ...
     included = (word for folder in settings.include for word in ("-I", folder))
     if "[tool.idlc]" in (project.text("pyproject.toml") or ""):
         return ("gen", *included)
-    home = home_of(project.path, own).relative_to(project.path).as_posix()
+    home = home_of(project.path, own, settings.root).relative_to(project.path).as_posix()
     return ("gen", project.name, "-o", project.shown(home), *included)
 
 
@@ -167,18 +172,18 @@ class Listed(NamedTuple):
 
 def listed(settings: Settings, report: Report) -> list[Listed]:
     """Return the templates that a user can replace."""
-    folder = settings.templates or load_settings(report).templates
-    sources = read(folder, folders(), ENDING, report) if folder else {}
+    folder = settings.templates or load_settings(settings.root, report).templates
+    sources = read(folder, folders(), ENDING, settings.root, report) if folder else {}
     return [Listed(name, sources[name].path if name in sources else "") for name in names()]
 
 
 def copied(chosen: Sequence[str], settings: Settings, report: Report) -> Result | None:
     """Copy templates into the user's folder, to be changed there."""
-    set_already = settings.templates or load_settings(report).templates
+    set_already = settings.templates or load_settings(settings.root, report).templates
     if report.had_errors:
         return None
     folder = set_already or FOLDER
-    project = Project(folder, report, force=settings.force)
+    project = Project(folder, settings.root, report, force=settings.force)
     result = write(project, {name: copy(name) for name in chosen}, {}, settings, report)
     if result is None or set_already:
         return result

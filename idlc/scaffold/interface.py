@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from idlc.check.compiler import compile_package
-from idlc.check.package.cmake import calls, listing
+from idlc.check.package.cmake import calls, dependency_edit
 from idlc.check.package.facts import folders
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source
@@ -123,7 +123,9 @@ def add_cmake_dependencies(text: str, names: Sequence[str]) -> Outcome:
     if len(lists) != 1:
         why = f"there is no `set({_LIST} ...)`, or more than one"
         return Refused(why, " ".join(missing), WHERE)
-    return Edited(apply(text, (listing(lists[0], name, listed=True) for name in missing))[0])
+    return Edited(
+        apply(text, (dependency_edit(lists[0], name, listed=True) for name in missing))[0]
+    )
 
 
 CMAKE = "CMakeLists.txt"

@@ -206,13 +206,13 @@ def package(
     where files that stay as they are contradict them.
     """
     name = requested.name if folder in ("", ".") else f"{folder}/{requested.name}"
-    project = Project(name, report, force=settings.force)
+    project = Project(name, settings.root, report, force=settings.force)
     used = templates(settings, report)
     if report.had_errors:
         return None
     files: dict[str, str] = {}
     with rendering(requested.name, report):
-        available = catalog.packages(scope(load_settings(report)).distro)
+        available = catalog.packages(scope(load_settings(settings.root, report)).distro)
         depends = tuple(name for name in requested.depends if name in available)  # Humble lacks one
         files = package_files(requested._replace(depends=depends), used)
     if not any(project.names(kind) for kind in ir.KINDS):

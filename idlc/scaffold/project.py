@@ -15,12 +15,13 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.project import write
-from idlc.project.files import absolute, decode, read_bytes
+from idlc.project.files import decode, read_bytes
 from idlc.project.lock import Obstacle, Tree, is_same
+from idlc.project.root import Root
 from idlc.project.write import Change, Plan, difference
 
 
-class Done(NamedTuple):
+class FileOutcome(NamedTuple):
     """A file and its outcome: `created`, `edited`, `replaced` or `unchanged`."""
 
     path: str
@@ -30,9 +31,9 @@ class Done(NamedTuple):
 class Project:
     """A package's folder, existing or not; `name` is its name in reports."""
 
-    def __init__(self, name: str, report: Report, *, force: bool = False) -> None:
+    def __init__(self, name: str, root: Root, report: Report, *, force: bool = False) -> None:
         self.name = name
-        self.path: Path = absolute(name)
+        self.path: Path = root.absolute(name)
         self._report = report
         self._force = force
 
@@ -61,7 +62,7 @@ class Project:
 
     def plan(
         self, added: Mapping[str, str], edited: Mapping[str, str] | None = None
-    ) -> tuple[Plan, list[Done]] | None:
+    ) -> tuple[Plan, list[FileOutcome]] | None:
         """Return the changes that write files; `None` if something is in the way.
 
         `edited` texts replace what was read before; `added` ones only an equal file, unless the
@@ -69,7 +70,7 @@ class Project:
         """
         edited = edited or {}
         changes: list[Change] = []
-        done: list[Done] = []
+        done: list[FileOutcome] = []
         refused = False
         tree = Tree(self.path)
         for path, text in sorted({**added, **edited}.items()):
@@ -80,16 +81,16 @@ class Project:
                 self._in_the_way(path, old)
                 refused = True
             elif is_same(old, new):
-                done.append(Done(path, "unchanged"))
+                done.append(FileOutcome(path, "unchanged"))
             elif old is None:
                 changes.append(Change(path, None, new))
-                done.append(Done(path, "created"))
+                done.append(FileOutcome(path, "created"))
             elif path in edited:
                 changes.append(Change(path, old, new))
-                done.append(Done(path, "edited"))
+                done.append(FileOutcome(path, "edited"))
             elif self._force:
                 changes.append(Change(path, old, new, backup=True))
-                done.append(Done(path, "replaced"))
+                done.append(FileOutcome(path, "replaced"))
             else:
                 self._differs(path, old, new)
                 refused = True

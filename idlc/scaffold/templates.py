@@ -21,7 +21,8 @@ from idlc.diagnostics.codes import BROKEN_TEMPLATE
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean
-from idlc.project.files import absolute, is_folder, read_source
+from idlc.project.files import is_folder, read_source
+from idlc.project.root import Root
 from idlc.project.templates import environment
 
 #: Line ends as Jinja counts them.
@@ -300,12 +301,14 @@ def _sandbox(sources: Mapping[str, Source]) -> jinja2.Environment:
     )
 
 
-def read(folder: str, below: Iterable[str], ending: str, report: Report) -> dict[str, Source]:
+def read(
+    folder: str, below: Iterable[str], ending: str, root: Root, report: Report
+) -> dict[str, Source]:
     """Return the files with an ending in a folder and in some folders of it, by `folder/name`.
 
     Files that cannot be read are reported.
     """
-    path = absolute(folder)
+    path = root.absolute(folder)
     if not is_folder(path):
         message = f"no such folder: `{folder}`, which is to hold templates"
         hint = "`idlc scaffold templates --copy NAME` starts one"

@@ -1,1 +1,1 @@
-"""Size, alignment and the codec's plan: the only place that knows how bytes lie."""
+"""Size, alignment and the codec's plan: the only room that knows the layout of bytes."""

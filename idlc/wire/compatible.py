@@ -146,7 +146,7 @@ class _Follower:
         self._ends: dict[Hashable, set[_Offset]] = {}
 
     def follow(self, runs: _Runs, starts: Iterable[_Offset], *, at_end: bool) -> set[_Offset]:
-        """Return the places after two runs; raise _MisreadError if a value is misread.
+        """Return the offsets after two runs; raise _MisreadError if a value is misread.
 
         `at_end` means that nothing is read after them.
         """
@@ -182,7 +182,7 @@ class _Follower:
         raise _MisreadError
 
     def _read(self, old: Leaf, new: Leaf, start: int, *, at_end: bool) -> set[_Offset]:
-        """Return the places after one value that both versions read at the same position."""
+        """Return the offsets after one value that both versions read at the same position."""
         match old.type, new.type:
             case ir.Primitive(), ir.Primitive() if _primitive_alike(old.type.name, new.type.name):
                 return {_Offset((start + old.least) % 8)}
@@ -211,7 +211,7 @@ class _Follower:
     def _sequence(
         self, old: ir.Sequence, new: ir.Sequence, start: int, *, at_end: bool
     ) -> set[_Offset]:
-        """Return the places after any number of elements that the old bound allows."""
+        """Return the offsets after any number of elements that the old bound allows."""
         runs = self._elements(old.element, new.element)
         ends = {_Offset(start)}
         if at_end and all(leaf.type is None for leaf in runs.new):
@@ -239,7 +239,7 @@ class _Follower:
 
 
 def _behind(rest: Iterable[Leaf], place: _Offset, *, at_end: bool) -> _Offset:
-    """Return the place after old values that the new version does not read."""
+    """Return the offset after old values that the new version does not read."""
     at = place.at
     for leaf in rest:
         if leaf.size is None and not at_end:

@@ -94,7 +94,7 @@ def layout(message: ir.Message, messages: Messages) -> tuple[list[Placed], Exten
 
 
 class _Layouts:
-    """Lays structures out; each is laid out once for each alignment that it begins at."""
+    """Lays structures out, each once for each alignment at which it begins."""
 
     def __init__(self, messages: Messages) -> None:
         self._messages = messages

@@ -3,8 +3,7 @@
 import pytest
 
 from idlc.check.registry import IncrementalFindings
-from idlc.editor.workspace import Wishes, Workspace
-from idlc.project.files import NOTHING_OPEN
+from idlc.editor.workspace import EditorOptions, Workspace
 
 FILES = {
     "A.msg": "B b\n",
@@ -36,9 +35,8 @@ def folder(tmp_path):
 def test_only_what_depends_on_a_change_is_asked_about_again(
     folder, monkeypatch, changed, text, kept
 ):
-    workspace = Workspace(folder, Wishes())
-    workspace.load(NOTHING_OPEN)
-    workspace.state()
+    workspace = Workspace(folder, EditorOptions(), dict)
+    workspace.snapshot()
     seen = []
 
     def of(self, model):
@@ -46,16 +44,15 @@ def test_only_what_depends_on_a_change_is_asked_about_again(
         seen.append("".join(sorted(name.name for name in found)))
         return found
 
-    real = IncrementalFindings.of
-    monkeypatch.setattr(IncrementalFindings, "of", of)
-    assert workspace.change(folder / "msg" / changed, text.encode())
-    after = workspace.state()
+    real = IncrementalFindings.still_valid
+    monkeypatch.setattr(IncrementalFindings, "still_valid", of)
+    workspace.follow(folder / "msg" / changed, text.encode())
+    after = workspace.snapshot()
     assert set(seen) == {kept}
-    fresh = Workspace(folder, Wishes())
+    fresh = Workspace(folder, EditorOptions(), dict)
     (folder / "msg" / changed).write_text(text)
-    fresh.load(NOTHING_OPEN)
     told, expected = (
         [(one.code, one.message, one.where) for one in state.problems]
-        for state in (after, fresh.state())
+        for state in (after, fresh.snapshot())
     )
     assert told == expected

@@ -15,6 +15,7 @@ from idlc.generate.native.library import MACHINES, libraries
 from idlc.project.find import look
 from idlc.project.inputs import load
 from idlc.project.prefixes import Distribution
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 LIBRARY = "lib/libarm__rosidl_typesupport_cpp.so"
@@ -52,9 +53,10 @@ def said(capsys):
 
 def made(machine="x86_64", layout="jazzy"):
     """Return the content of the package's library for other machines and distributions."""
-    files = look(("arm",), Report()).files
-    given = load("arm", files, files[0].root, Report())
-    ((_, model),) = models_of((given,), Scope(), Report())
+    scope = Scope(Root.here())
+    files = look(("arm",), scope.root, Report()).files
+    given = load("arm", files, files[0].root, scope.root, Report())
+    ((_, model),) = models_of((given,), scope, Report())
     return libraries(model, MACHINES[machine], LAYOUTS[layout])[LIBRARY.removeprefix("lib/")]
 
 

@@ -27,6 +27,7 @@ from idlc.model.link import link
 from idlc.model.lower import lower
 from idlc.project import lock
 from idlc.project.library import Library
+from idlc.project.root import Root
 from tests.support.paths import SPEC
 
 HASHES = json.loads((SPEC / "distro_hashes.json").read_text("utf-8"))
@@ -146,7 +147,7 @@ def test_unconfirmed_hashes_are_marked():
 
 @pytest.mark.parametrize("distro", DISTROS, ids=lambda one: one.name)
 def test_every_catalogue_is_whole(distro):
-    library = Library([], Report(), distro=distro)
+    library = Library([], Root.here(), Report(), distro=distro)
     names = catalog.interfaces(distro)
     assert list(names) == sorted(set(names))
     for name in names:

@@ -116,8 +116,8 @@ def test_the_settings_of_a_repository_run_nothing(alone, url, capsys):
     shutil.copytree(changed("up"), "victim")
     mark = programs(alone / "victim/.git", url, worktree=alone / "victim")
     assert compare(capsys, "victim/p", "--against", "git:HEAD~1")[:2] == FAILED
-    assert revision.places("victim/p")
-    assert revision.setting("user.name") == ""
+    assert revision.places(Path("victim/p").absolute())
+    assert revision.setting("user.name", Path.cwd()) == ""
     assert not mark.exists()
 
 

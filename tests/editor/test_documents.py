@@ -9,9 +9,9 @@ import pytest
 from lsprotocol import types as lsp
 
 from idlc.cli.main import main
-from idlc.diagnostics.report import Report
 from idlc.editor.documents import Documents
 from idlc.editor.protocol.parts import DocumentItem
+from idlc.project.root import Root
 from tests.support.editor import at, between
 
 PULLS = lsp.ClientCapabilities(
@@ -312,9 +312,8 @@ def test_hints_name_settings_because_an_editor_has_no_options(editor, package):
 
 def test_the_text_that_counts_is_that_of_the_document_which_is_edited():
     """Of a file that is open by two spellings of its URI."""
-    documents = Documents()
+    documents = Documents(Root.here())
     for name in ("A", "%41"):
         documents.open(DocumentItem(f"file:///x/{name}.msg", "rosmsg", 1, f"# {name}\n"))
     path = Path("/x/A.msg")
-    report = Report()
-    assert documents.unsaved().read_bytes(path, "A.msg", report) == documents.at(path).data
+    assert documents.texts()[path] == documents.at(path).data

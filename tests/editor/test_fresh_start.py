@@ -1,5 +1,6 @@
 """What a server knows follows from the disk and the open documents, not from the way there."""
 
+import io
 import shutil
 import tempfile
 from pathlib import Path
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from idlc.editor.protocol.positions import Places
 from idlc.editor.publish import diagnostics
-from idlc.editor.server import Session
+from idlc.editor.server import Server
 
 #: Pieces of text that are put together and cut up, so that names clash, appear and vanish.
 PIECES = [
@@ -66,17 +67,17 @@ STEPS = st.one_of(
 
 
 class Client:
-    """A session, and the texts that its editor shows."""
+    """A server, and the texts that its editor shows."""
 
     def __init__(self, top, folders, encoding="utf-16"):
         self.top = top
         self.folders = list(folders)
         self.encoding = encoding
         self.texts = {}
-        self.session = Session(lambda *_: None, lambda *_: None)
+        self.server = Server(io.BytesIO(), io.BytesIO())
         client = {"general": {"positionEncodings": [encoding]}}
         roots = [self.folder(one) for one in folders]
-        self.session.answer("initialize", {"capabilities": client, "workspaceFolders": roots})
+        self.server.answer("initialize", {"capabilities": client, "workspaceFolders": roots})
 
     def folder(self, name):
         return {"uri": (self.top / name).as_uri(), "name": name}
@@ -85,7 +86,7 @@ class Client:
         return (self.top / name).as_uri()
 
     def tell(self, method, **params):
-        self.session.take(method, params)
+        self.server.take(method, params)
 
     def open(self, name, text):
         self.texts[name] = text
@@ -107,7 +108,7 @@ class Client:
 
     def problems(self):
         """Return the problems by document, in no particular order."""
-        found = diagnostics(self.session.workbench.world)
+        found = diagnostics(self.server.state)
         return {uri: sorted(map(repr, some)) for uri, some in found.items()}
 
 
@@ -199,7 +200,7 @@ def test_any_edits_end_where_a_fresh_start_begins(steps, encoding, folders):
         fresh = Client(top, client.folders, encoding)
         for name, text in client.texts.items():
             fresh.open(name, text)
-        texts = {one.uri: one.text for one in client.session.workbench.world.documents}
+        texts = {one.uri: one.text for one in client.server.state.documents}
         assert texts == {client.uri(name): text for name, text in client.texts.items()}
         assert client.problems() == fresh.problems()
     finally:

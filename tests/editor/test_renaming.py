@@ -12,8 +12,7 @@ from lsprotocol import types as lsp
 
 from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
 from idlc.editor.protocol.framing import RequestError
-from idlc.editor.workspace import Wishes, Workspace
-from idlc.project.files import Unsaved
+from idlc.editor.workspace import EditorOptions, Workspace
 from tests.editors.scenario import RENAMED, RENAMING, write
 from tests.support.simulated import BEHAVIOURS, Server, Simulated, path_of
 
@@ -506,15 +505,14 @@ class Sequence:
         named = set(re.findall(r'"(msg/\w+\.msg)"', texts["base/CMakeLists.txt"]))
         there = {one.removeprefix("base/") for one in texts if one.startswith("base/msg/")}
         assert named == there, step
-        overlaid = Unsaved({path: text.encode() for path, text in self.client.texts.items()})
-        workspace = Workspace(self.folder, Wishes())
-        workspace.load(overlaid)
-        state = workspace.state()
+        overlaid = {path: text.encode() for path, text in self.client.texts.items()}
+        workspace = Workspace(self.folder, EditorOptions(), lambda: overlaid)
+        snapshot = workspace.snapshot()
         expected = set()
-        for one in state.problems:
+        for one in snapshot.problems:
             assert one.code != "IDL201", (step, one.message)
             line = one.span.source.position(one.span.start)[0] - 1 if one.span else 0
-            path = state.path_of(one.span.source) if one.span else state.folder / one.path
+            path = snapshot.path_of(one.span.source) if one.span else snapshot.folder / one.path
             expected.add((path.relative_to(self.folder).as_posix(), one.code, line))
         self.client.server.rest()
         assert self.client.problems() == expected, step

@@ -1,5 +1,6 @@
 """Whatever a client sends, the server lives on; it ends when the client does."""
 
+import io
 import json
 import os
 import random
@@ -268,23 +269,23 @@ def test_an_interrupt_ends_it_quietly():
 @pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.look"])
 def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
     from idlc.editor.publish import diagnostics
-    from idlc.editor.server import Session
+    from idlc.editor.server import Server
 
     def fail(*_):
         raise ZeroDivisionError("as the test asked for")
 
-    session = Session(lambda *_: None, lambda *_: None)
+    server = Server(io.BytesIO(), io.BytesIO())
     roots = [{"uri": workspace.as_uri(), "name": ""}]
-    session.answer("initialize", {"capabilities": {}, "workspaceFolders": roots})
+    server.answer("initialize", {"capabilities": {}, "workspaceFolders": roots})
     with monkeypatch.context() as patch:
         patch.setattr(where, fail)
-        ((uri, (found,)),) = diagnostics(session.workbench.world).items()
+        ((uri, (found,)),) = diagnostics(server.state).items()
         assert uri.startswith(workspace.as_uri())
         assert found.code == "IDL901"
         assert "ZeroDivisionError: as the test asked for" in found.message
     uri, message = opened(workspace, "flot64 x\n")
-    session.take(message["method"], message["params"])
-    (found,) = diagnostics(session.workbench.world)[uri]
+    server.take(message["method"], message["params"])
+    (found,) = diagnostics(server.state)[uri]
     assert found.code == "IDL201"
 
 

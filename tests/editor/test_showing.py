@@ -9,7 +9,8 @@ from lsprotocol import types as lsp
 from idlc.editor.features import lenses as features
 from idlc.editor.protocol.capabilities import TYPES
 from idlc.editor.protocol.parts import DocumentId, OfDocument
-from idlc.editor.workbench import Workbench
+from idlc.editor.publish import idle
+from idlc.editor.state import ServerState
 from tests.support.editor import at, between
 from tests.support.tools import tool
 
@@ -266,14 +267,14 @@ def test_without_watches_it_looks_while_nothing_is_said(package):
     asked = []
     client = {"workspace": {"codeLens": {"refreshSupport": True}}}
     said = {"capabilities": client, "workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]}
-    bench = Workbench(said, lambda *_: None, lambda method, *_: asked.append(method))
+    state = ServerState(said, lambda *_: None, lambda method, *_: asked.append(method))
     document = OfDocument(DocumentId((folder / "msg/New.msg").as_uri()))
-    bench.idle()
-    for lens in features.lenses(bench.world, document):
-        features.resolve(bench.world, lens)
-    bench.idle()
+    idle(state)
+    for lens in features.lenses(state, document):
+        features.resolve(state, lens)
+    idle(state)
     assert asked == []
     git(folder, "commit", "-qm", "second", "--allow-empty")
-    bench.idle()
-    bench.idle()
+    idle(state)
+    idle(state)
     assert asked == ["workspace/codeLens/refresh"]

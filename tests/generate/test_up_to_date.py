@@ -9,6 +9,7 @@ import pytest
 from idlc.diagnostics.report import Report
 from idlc.generate import target
 from idlc.generate.gen import GenOptions, gen
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 PACKAGE = Path(target.__file__).parents[1]
@@ -42,7 +43,9 @@ def test_a_change_anywhere_in_idlc_counts(folder, tmp_path, monkeypatch):
 def written(folder: Path, package: str) -> tuple[int, list[str]]:
     """Compile one of two packages; return how many files were written, and what was reported."""
     report = Report()
-    options = GenOptions((str(folder / package),), str(folder / "out" / package), Scope(package))
+    options = GenOptions(
+        (str(folder / package),), Scope(Root.here(), package), str(folder / "out" / package)
+    )
     done = gen(options, report)
     return sum(one.written for one in done), [found.code for found in report]
 

@@ -20,6 +20,7 @@ import idlc
 from idlc.cli.main import main
 from idlc.diagnostics.report import Report
 from idlc.generate.idl import idl
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic, open_recording
 from idlc.recordings.containers.messages import ALWAYS, Ranges
@@ -206,7 +207,7 @@ def test_bags(tmp_path, kinds):
 
 def definitions(style):
     """Return sound definitions of types of every shape, with all that they need."""
-    around = LocalTypes(Scope(), Report())
+    around = LocalTypes(Scope(Root.here()), Report())
     found = []
     for name in made.KINDS:
         text = made.definition(name)
@@ -222,13 +223,13 @@ def typed(around, name, encoding, text, hash_=None):
     """Return what a recording's topic of a type means."""
     topic = Topic("/x", name, 1, hash_, "cdr", Schema(name, encoding, text))
     (version,) = versions([recorded(topic, "demo")])
-    return recorded_types(version, around, Scope(), Report())
+    return recorded_types(version, around, Scope(Root.here()), Report())
 
 
 @pytest.mark.parametrize("style", ["ros2msg", "ros2idl"])
 def test_definitions(style, tmp_path):
     rng = random.Random(SEED)
-    around = LocalTypes(Scope(), Report())
+    around = LocalTypes(Scope(Root.here()), Report())
     sound = definitions(style)
     whole = 0
     for number in range(ALL * 3 // 20):

@@ -11,6 +11,7 @@ from idlc.model.ir import TypeName
 from idlc.project.find import find
 from idlc.project.library import Library
 from idlc.project.lock import meaning
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from tests.support.files import write
 
@@ -35,7 +36,7 @@ def manifest(path: str, name: str) -> None:
 
 def found(*paths: str) -> list[str]:
     report = Report()
-    files = find(paths, report)
+    files = find(paths, Root.here(), report)
     assert not report.had_errors, [one.message for one in report]
     return [file.shown for file in files]
 
@@ -77,12 +78,12 @@ def test_a_very_deep_folder_is_no_problem(monkeypatch):
     for _ in range(200):  # longer than a path may be
         Path("d" * 40).mkdir()
         monkeypatch.chdir("d" * 40)
-    assert find(["."], Report()) == ()
+    assert find(["."], Root.here(), Report()) == ()
 
 
 def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple[str, list[str]]:
     report = Report()
-    given = requested_packages(paths, (), out, Scope(package), report)
+    given = requested_packages(paths, (), out, Scope(Root.here(), package), report)
     return given[0].package if given else "", [found.code for found in report]
 
 
@@ -128,7 +129,9 @@ def test_entities_in_package_xml_are_not_expanded_without_bound():
 
 
 def library(*folders: str, **own: str) -> Library:
-    return Library(folders, Report(), own={name: [Path(root)] for name, root in own.items()})
+    return Library(
+        folders, Root.here(), Report(), own={name: [Path(root)] for name, root in own.items()}
+    )
 
 
 def path_of(places: Library, name: str) -> str | None:
@@ -176,7 +179,7 @@ def test_the_first_include_folder_wins_then_prefixes_then_the_catalogue(monkeypa
 
 def test_an_include_folder_that_is_missing_is_reported():
     report = Report()
-    Library(["missing"], report)
+    Library(["missing"], Root.here(), report)
     assert [found.code for found in report] == ["IDL602"]
 
 

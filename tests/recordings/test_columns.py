@@ -213,7 +213,7 @@ def test_a_terminal_sees_a_bar(recording):
             return True
 
     seen = Terminal()
-    with output.shown(seen) as tell:
+    with output.progress_bar(seen) as tell:
         tell("/imu", 5, 20)
         tell("/imu\x1b", 20, 20)
     assert "5 of 20  /imu" in seen.getvalue()

@@ -15,6 +15,7 @@ from idlc.language.parse import parse, parse_any
 from idlc.model import catalog, ir
 from idlc.model.link import link
 from idlc.model.lower import lower
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import recorded, type_name
@@ -125,9 +126,9 @@ def test_the_first_of_two_definitions_counts_and_that_is_told():
 
 
 def types_of(*topics):
-    report = Report()
+    report, scope = Report(), Scope(Root.here())
     (version,) = versions(topics)
-    return recorded_types(version, LocalTypes(Scope(), Report()), Scope(), report), report
+    return recorded_types(version, LocalTypes(scope, Report()), scope, report), report
 
 
 def test_what_rosbags_writes_has_its_hash():

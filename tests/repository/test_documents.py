@@ -14,6 +14,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.compare.packages import Allowance
 from idlc.diagnostics.codes import CODES
+from idlc.project.root import Root
 from idlc.project.settings import Config
 from tests.support import command_line_page, programs, refresh
 from tests.support.paths import DOCS, ROOT
@@ -82,7 +83,7 @@ def test_these_are_the_settings(name, complaints):
 
 def test_the_defaults_of_settings():
     for key, (_, default) in table("tool.idlc").items():
-        value = getattr(Config(), key.replace("-", "_"))
+        value = getattr(Config(Root.here()), key.replace("-", "_"))
         assert default == ("false" if value is False else "none")
         assert not value
     (listed,) = re.findall(r"Only if it is selected idlc gives (.*?)\.\n", SETTINGS, re.DOTALL)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from idlc.diagnostics.report import Report
 from idlc.documents.query import describe
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 
 INSTALLED = [
@@ -21,6 +22,6 @@ def test_descriptions_are_those_installed():
     for path in INSTALLED:
         name = f"{path.parent.parent.name}/{path.parent.name}/{path.stem}"
         report = Report()
-        found = describe(name, Scope(), report)
+        found = describe(name, Scope(Root.here()), report)
         assert not report.had_errors, [one.message for one in report]
         assert json.dumps(found, indent=2) == path.read_text(encoding="utf-8"), name

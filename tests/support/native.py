@@ -8,6 +8,7 @@ from idlc.diagnostics.report import Report
 from idlc.generate.native.library import MACHINES, libraries
 from idlc.project.find import look
 from idlc.project.inputs import packages
+from idlc.project.root import Root
 from idlc.project.settings import Scope
 from tests.support.installed import installed_layout
 from tests.support.paths import PROGRAMS
@@ -30,8 +31,8 @@ def built(folder, machine="x86_64"):
 def model_of(folder):
     """Return the model of the package in a folder; what it refers to is found in the wheels."""
     report = Report()
-    scope = Scope()
-    found = packages(look((str(folder),), report, scope.exclude).files, scope, report)
+    scope = Scope(Root.here())
+    found = packages(look((str(folder),), scope.root, report, scope.exclude).files, scope, report)
     ((_, model),) = models_of(found, scope, report)
     assert not report.had_errors, list(report)
     return model

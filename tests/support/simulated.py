@@ -5,6 +5,7 @@ No edit is made to a range that does not hold the text which it is about.
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -15,7 +16,7 @@ from lsprotocol.converters import get_converter
 
 from idlc.editor.protocol.parts import Position
 from idlc.editor.protocol.positions import Places
-from idlc.editor.server import Session
+from idlc.editor.server import Server as LanguageServer
 
 INTERFACES = (".msg", ".srv", ".action")
 
@@ -66,7 +67,8 @@ class Server:
 
     def __init__(self, *folders: Path, capabilities: lsp.ClientCapabilities) -> None:
         self.told: list[tuple[Any, ...]] = []
-        self._session = Session(self._hear, self._hear)
+        self._server = LanguageServer(io.BytesIO(), io.BytesIO())
+        self._server.notify = self._server.ask = self._hear
         self._converter = get_converter()
         given = [lsp.WorkspaceFolder(uri=one.as_uri(), name=one.name) for one in folders]
         params = lsp.InitializeParams(capabilities=capabilities, workspace_folders=given)
@@ -83,31 +85,31 @@ class Server:
 
     def answer(self, method: str, params: object) -> Any:
         """Return the answer to a request as JSON; raises RequestError."""
-        answer = self._session.answer(method, self._converter.unstructure(params))
-        return json.loads(self._session.encode(answer))
+        answer = self._server.answer(method, self._converter.unstructure(params))
+        return json.loads(self._server.encode(answer))
 
     def applied(self) -> lsp.WorkspaceEdit:
         """Return the edit that the server asked for, which is one."""
         (edit,) = (given["edit"] for name, given, *_ in self.told if "applyEdit" in name)
-        given = json.loads(self._session.encode(edit))
+        given = json.loads(self._server.encode(edit))
         return self._converter.structure(given, lsp.WorkspaceEdit)
 
     def tell(self, method: str, params: object) -> None:
         """Send a notification."""
-        self._session.take(method, self._converter.unstructure(params))
-        self._session.settle()
+        self._server.take(method, self._converter.unstructure(params))
+        self._server.settle()
 
     def settle(self) -> None:
         """Let the server say what a loop does after messages."""
-        self._session.settle()
+        self._server.settle()
 
     def rest(self) -> None:
         """Send nothing for a while."""
-        self._session.prepare()
+        self._server.prepare()
 
     def idle(self) -> None:
         """Send nothing for longer."""
-        self._session.idle()
+        self._server.idle()
 
 
 class Simulated:

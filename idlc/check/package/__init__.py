@@ -1,1 +1,1 @@
-"""Rules on what surrounds interfaces: package.xml, setup.py, CMakeLists.txt."""
+"""Rules on the package of interfaces: package.xml, setup.py, CMakeLists.txt."""

@@ -79,7 +79,10 @@ def listed_dependencies(facts: Facts, model: Model, report: Report) -> None:
                 f"`{facts.cmake.path}` does not give `{package}` to `{GENERATE}`",
                 hint=f"add `{package}` {_where(named)}, and `find_package({package} REQUIRED)`",
             )
-            edits = (listing(target, package, listed=bool(words)), *_finding(commands, package))
+            edits = (
+                dependency_edit(target, package, listed=bool(words)),
+                *_find_package_edits(commands, package),
+            )
             report.add(msgspec.structs.replace(problem, edits=edits))
 
 
@@ -94,7 +97,7 @@ def _where(named: list[str]) -> str:
     return f"to `set({named[0]} ...)`" if named else "to its `DEPENDENCIES`"
 
 
-def listing(target: Call, package: str, *, listed: bool) -> Edit:
+def dependency_edit(target: Call, package: str, *, listed: bool) -> Edit:
     """Return the edit that adds a package to a list, in the layout of its last word.
 
     A command without such a list gets the keyword as well, unless it is `set()`.
@@ -109,7 +112,7 @@ def listing(target: Call, package: str, *, listed: bool) -> Edit:
     return _insert(last, f"{between}{package}" if listed else f"{between}{_KEYWORD} {package}")
 
 
-def _finding(commands: list[Call], package: str) -> tuple[Edit, ...]:
+def _find_package_edits(commands: list[Call], package: str) -> tuple[Edit, ...]:
     """Return the edit that finds a package, unless a loop or a command does so."""
     finding = [command for command in commands if command.name == "find_package" and command.words]
     if not finding or any(

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 from idlc.check.package.cmake import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.project import lock
-from idlc.project.files import NOTHING_OPEN, Unsaved, absolute, shown
-from idlc.project.find import CLOSING, KINDS, NOTHING, SKIPPED, Exclusions
+from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions
 from idlc.project.inputs import Inputs
 from idlc.project.lock import load_lock
-from idlc.project.package_xml import Facts, GeneratedOutput, manifest, statements
+from idlc.project.package_xml import Facts, GeneratedOutput, statements
+from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
     from idlc.diagnostics.source import Source
+    from idlc.project.root import Root
 
 #: Python packages of ROS 2 that have no interfaces.
 _LIBRARIES = frozenset(
@@ -29,48 +30,44 @@ _NATIVE = frozenset({".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp"})
 _NOT_NODES = frozenset({"test", "tests", "launch", "docs", "doc"})
 
 
-def facts(
-    package: Inputs,
-    ros_packages: Callable[[], Iterable[str]],
-    exclude: Exclusions = NOTHING,
-    unsaved: Unsaved = NOTHING_OPEN,
-) -> Facts | None:
+def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Scope) -> Facts | None:
     """Return the facts about a package; `None` without a package.xml.
 
     `ros_packages` returns the names of ROS packages; it is called only with Python code.
     """
-    path = manifest(next(iter(package.folders), package.home))
-    source = unsaved.read_source(path, shown(path), Report()) if path else None
+    root = scope.root
+    path = root.manifest(next(iter(package.folders), package.home))
+    source = root.read_source(path, root.shown(path), Report()) if path else None
     if path is None or source is None or not (declared := statements(source)):
         return None
     folder = path.parent
     files = list(_files(folder))
     locks = _locks(files)
     generated = {at.parent / path for at, lock in locks.items() for path in lock.outputs}
-    cmake = _optional(folder / "CMakeLists.txt", unsaved)
-    modules = dict(_modules(folder, files, generated, unsaved))
+    cmake = _optional(folder / "CMakeLists.txt", root)
+    modules = dict(_modules(folder, files, generated, root))
     return Facts(
         name=package.package,
         manifest=source,
         statements=declared,
         inputs=package.digests if locks else {},
         modules=modules,
-        setup_py=_optional(folder / "setup.py", unsaved),
-        setup_cfg=_optional(folder / "setup.cfg", unsaved),
-        pyproject=_optional(folder / "pyproject.toml", unsaved),
+        setup_py=_optional(folder / "setup.py", root),
+        setup_cfg=_optional(folder / "setup.cfg", root),
+        pyproject=_optional(folder / "pyproject.toml", root),
         cmake=cmake,
         generates=cmake is not None and _generates(cmake),
         native=any(file.suffix in _NATIVE for file in files),
-        whole=_whole(package, files, exclude),
+        whole=_whole(package, files, scope.exclude),
         marker=(folder / "resource" / package.package).is_file(),
         outputs=tuple(
-            GeneratedOutput(shown(at), record.package, record.inputs)
+            GeneratedOutput(root.shown(at), record.package, record.inputs)
             for at, record in locks.items()
         ),
         files={
             entry.file.key: place.relative_to(folder).as_posix()
             for entry in package.files
-            if (place := absolute(entry.file.path)).is_relative_to(folder)
+            if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
         folders=_by_name(folder, files),
         known=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
@@ -82,13 +79,13 @@ def folders(folder: Path) -> dict[str, bool]:
     return _by_name(folder, _files(folder))
 
 
-def home_of(folder: Path, package: str) -> Path:
+def home_of(folder: Path, package: str, root: Root) -> Path:
     """Return the folder from which setup.py takes a package, or an earlier `idlc gen`'s."""
     homes = (folder / package, folder / "src" / package)
     for home in homes:
         if (home / lock.FILE).is_file():
             return home
-    files = (_optional(folder / name, NOTHING_OPEN) for name in _SETUP_FILES)
+    files = (_optional(folder / name, root) for name in _SETUP_FILES)
     setup, cfg, pyproject = files
     if setup is not None:
         from idlc.check.package.python_packages import layout
@@ -157,7 +154,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _modules(
-    folder: Path, files: Iterable[Path], generated: Container[Path], unsaved: Unsaved
+    folder: Path, files: Iterable[Path], generated: Container[Path], root: Root
 ) -> Iterator[tuple[str, Source]]:
     """Yield a package's own Python files by their dotted names, without tests and the like.
 
@@ -166,10 +163,10 @@ def _modules(
     for file in files:
         parts = file.relative_to(folder).parts
         ours = file.suffix == ".py" and len(parts) > 1 and parts[0] not in _NOT_NODES
-        if ours and file not in generated and (source := _optional(file, unsaved)):
+        if ours and file not in generated and (source := _optional(file, root)):
             yield ".".join((*parts[:-1], file.stem)), source
 
 
-def _optional(path: Path, unsaved: Unsaved) -> Source | None:
+def _optional(path: Path, root: Root) -> Source | None:
     """Return a file's text, `None` if it is missing or no text, which others report."""
-    return unsaved.read_source(path, shown(path), Report()) if unsaved.is_file(path) else None
+    return root.read_source(path, root.shown(path), Report()) if root.is_file(path) else None

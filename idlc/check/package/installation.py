@@ -225,7 +225,7 @@ def _with_packages(
     root = view.roots.get("", "")
     where = f"'{root}', " if root not in ("", ".") else ""
     if problem.span and problem.span.source is not setup.source:
-        return msgspec.structs.replace(problem, hint=_elsewhere(problem.span, view, root))
+        return msgspec.structs.replace(problem, hint=_config_hint(problem.span, view, root))
     find, imports = imported(setup, "setuptools", "find_packages")
     call = f"{find}({where}exclude=['test'])"
     hint = f"write `packages={call}`"
@@ -258,7 +258,7 @@ def _with_packages(
     )
 
 
-def _elsewhere(place: Span, view: Layout, root: str) -> str:
+def _config_hint(place: Span, view: Layout, root: str) -> str:
     """Return the hint for packages that setup.cfg or pyproject.toml lists."""
     if view.installed and view.installed.finders:
         return "make its `where`, `include` and `exclude` match these packages"

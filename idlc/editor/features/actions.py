@@ -18,8 +18,8 @@ from idlc.editor.features.rename import can_move_files
 from idlc.editor.protocol.capabilities import RENAME_FILE, UPDATE_KIND
 from idlc.editor.protocol.parts import AskedActions, Part, Range
 from idlc.editor.publish import Shown, problems, shown
-from idlc.editor.workspace import State
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
+from idlc.editor.workspace import Snapshot
 
 _FIX, _FIX_ALL, _UPDATE = "quickfix", "source.fixAll.idlc", UPDATE_KIND
 #: Hints that name what should stand there instead.
@@ -45,35 +45,35 @@ class Guilty(NamedTuple):
     """A problem of a document."""
 
     problem: Diagnostic
-    state: State
+    snapshot: Snapshot
     path: Path
-    world: World
+    state: ServerState
 
     @property
     def shown(self) -> Shown:
         """The problem as the client has it."""
-        return shown(self.problem, self.state, self.world)
+        return shown(self.problem, self.snapshot, self.state)
 
     def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> Action:
         """Return an action on this problem."""
-        change = workspace_edit(edits, self.state, self.world)
+        change = workspace_edit(edits, self.snapshot, self.state)
         return Action(title, _FIX, change, (self.shown,), best)
 
 
-def actions(world: World, asked: AskedActions) -> list[Action]:
+def actions(state: ServerState, asked: AskedActions) -> list[Action]:
     """Return what can be done about the problems in a range, and about all of a document."""
-    world.projects.notice_changes()  # or edits may be of older files
-    path = world.path(asked.text_document.uri)
-    all_ = [Guilty(one, state, at, world) for at, one, state in problems(world) if at == path]
+    state.notice_changes()  # or edits may be of older files
+    path = state.path(asked.text_document.uri)
+    all_ = [Guilty(one, snapshot, at, state) for at, one, snapshot in problems(state) if at == path]
     found: list[Action] = []
     if _wanted(_FIX, asked.context.only):
         for one in all_:
             if _touch(one.shown.range, asked.range):
                 found += _about(one)
     if _wanted(_FIX_ALL, asked.context.only) and path is not None:
-        found += _everything(all_, asked.text_document.uri, world)
+        found += _everything(all_, asked.text_document.uri, state)
     if _wanted(_UPDATE, asked.context.only):
-        command = commands.command(world, asked.text_document.uri)
+        command = commands.command(state, asked.text_document.uri)
         found += [Action(str(command["title"]), _UPDATE, command=command)] if command else []
     return found
 
@@ -98,7 +98,7 @@ def _about(one: Guilty) -> Iterator[Action]:
         for title, edit in _offers(problem.hint or "", problem.span):
             if _helps(one, edit):
                 yield one.action(title, [edit], best=best)
-    if can_move_files(one.world) and (moved := _moved(one)):
+    if can_move_files(one.state) and (moved := _moved(one)):
         yield moved
     remark = _remark(one) if problem.severity is Severity.WARNING else None
     if remark is not None and _helps(one, remark):
@@ -111,7 +111,7 @@ def _moved(one: Guilty) -> Action | None:
     if hint is None or os.path.lexists(one.path.with_name(hint[1])):
         return None
     title = f"Rename the file to `{hint[1]}`"
-    arguments = [one.world.uri(one.path), hint[2]]
+    arguments = [one.state.uri(one.path), hint[2]]
     command: dict[str, object] = {"title": title, "command": RENAME_FILE, "arguments": arguments}
     return Action(title, _FIX, diagnostics=(one.shown,), command=command)
 
@@ -153,12 +153,12 @@ def _instead(span: Span, word: str) -> Edit:
 
 def _helps(one: Guilty, edit: Edit) -> bool:
     """Return whether there is less wrong after an edit, as a check of the new text says."""
-    project = one.world.projects.of(one.path)
+    workspace = one.state.workspace_of(one.path)
     text, _ = apply(edit.span.source.text, [edit])
-    after = project.workspace.state_with(one.path, text) if project else None
+    after = workspace.snapshot_with(one.path, text) if workspace else None
     if after is None:
         return False
-    before = _count(one.state.problems)
+    before = _count(one.snapshot.problems)
     return _count(after.problems) < before
 
 
@@ -170,9 +170,9 @@ def _count(found: Iterable[Diagnostic]) -> tuple[int, int]:
 
 def _remark(one: Guilty) -> Edit | None:
     """Return the edit that adds a remark to the line of a problem, or to the head of its file."""
-    if one.path not in one.state.interfaces:
+    if one.path not in one.snapshot.interfaces:
         return None
-    source = one.state.interfaces[one.path][1]
+    source = one.snapshot.interfaces[one.path][1]
     code, span = one.problem.code, one.problem.span
     if span is None or not span.text:
         return Edit(Span(source, 0, 0), f"# idlc: ignore[{code}] TODO: say why\n")
@@ -189,19 +189,19 @@ def _remark(one: Guilty) -> Edit | None:
     return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
 
 
-def _everything(all_: list[Guilty], uri: str, world: World) -> Iterator[Action]:
+def _everything(all_: list[Guilty], uri: str, state: ServerState) -> Iterator[Action]:
     """Yield the action that makes every fix of a document, as `idlc check --fix` does."""
     fixed = [one for one in all_ if one.problem.edits]
     edits = [
         edit
         for one in fixed
         for edit in one.problem.edits
-        if one.state.path_of(edit.span.source) == one.path
+        if one.snapshot.path_of(edit.span.source) == one.path
     ]
     if not edits:
         return
     old = edits[0].span.source
     new = tidied(old.path, old.text, apply(old.text, edits)[0])
-    change = of_documents({uri: differences(old.text, new, world.encoding)}, world)
+    change = of_documents({uri: differences(old.text, new, state.encoding)}, state)
     title = "Fix all that can be fixed without harm"
     yield Action(title, _FIX_ALL, change, tuple(one.shown for one in fixed))

@@ -11,7 +11,7 @@ from idlc.editor.protocol import capabilities
 from idlc.editor.protocol.capabilities import UPDATE_GENERATED
 from idlc.editor.protocol.framing import INVALID_PARAMS, REQUEST_FAILED, RequestError
 from idlc.editor.protocol.parts import Command
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -25,35 +25,37 @@ NAMED = 5
 _ERROR, _INFO = 1, 3
 
 
-def command(world: World, uri: str) -> dict[str, object] | None:
+def command(state: ServerState, uri: str) -> dict[str, object] | None:
     """Return the command for a document whose generated package is out of date."""
-    found = _generated(world, uri)
+    found = _generated(state, uri)
     if found is None or not found[0].is_needed(*found[1]):
         return None
     title = f"Update the generated package in {found[0].options.out}"
     return {"title": title, "command": UPDATE_GENERATED, "arguments": [uri]}
 
 
-def _generated(world: World, uri: str) -> tuple[Run, tuple[str, Mapping[str, str], str]] | None:
+def _generated(
+    state: ServerState, uri: str
+) -> tuple[Run, tuple[str, Mapping[str, str], str]] | None:
     """Return the run that a document is an input of, and all inputs of its package."""
     from idlc.generate.gen import run_for
 
-    path = world.path(uri)
-    project = world.projects.of(path) if path else None
-    if path is None or project is None:
+    path = state.path(uri)
+    workspace = state.workspace_of(path) if path else None
+    if path is None or workspace is None:
         return None
-    inputs = project.workspace.inputs(path)
+    inputs = workspace.inputs(path)
     run = run_for(path, inputs[0])
     return (run, inputs) if run else None
 
 
-def update(world: World, uri: str) -> None:
+def update(state: ServerState, uri: str) -> None:
     """Do what `idlc gen` does, and say what that was; raises RequestError."""
-    found = _generated(world, uri)
+    found = _generated(state, uri)
     if found is None:
         raise RequestError(REQUEST_FAILED, "[tool.idlc] does not say where to generate it")
     run, (package, _, _) = found
-    unsaved = sorted(f"`{one.name}`" for one in _unsaved(world, package))
+    unsaved = sorted(f"`{one.name}`" for one in _unsaved(state, package))
     if unsaved:
         names = first_few(unsaved, NAMED)
         raise RequestError(REQUEST_FAILED, f"save first, what is on disk is compiled: {names}")
@@ -62,16 +64,16 @@ def update(world: World, uri: str) -> None:
         done = run.make(report)
     except OSError as error:
         raise RequestError(REQUEST_FAILED, f"nothing was generated: {error}") from error
-    world.projects.forget()
+    state.forget()
     failed = report.had_errors
     message = _failure(report) if failed else _success(done)
-    world.tell("window/showMessage", {"type": _ERROR if failed else _INFO, "message": message})
+    state.notify("window/showMessage", {"type": _ERROR if failed else _INFO, "message": message})
 
 
-def _unsaved(world: World, package: str) -> Iterator[Path]:
+def _unsaved(state: ServerState, package: str) -> Iterator[Path]:
     """Yield the files of a package that hold another text than their documents."""
-    for one in world.documents:
-        known = world.known(one.uri)
+    for one in state.documents:
+        known = state.known(one.uri)
         if known and one.path and known.interface.name.package == package and not one.is_on_disk():
             yield one.path
 
@@ -92,34 +94,34 @@ def _done(one: Generated) -> str:
     return f"{one.package}: {', '.join(done) or 'unchanged'} in {one.out}"
 
 
-def execute(world: World, asked: Command) -> None:
+def execute(state: ServerState, asked: Command) -> None:
     """Carry a command out."""
     match asked.command, *asked.arguments:
         case capabilities.ADD_DEPENDENCY, str(uri), str(package):
-            _declare(world, uri, package)
+            _declare(state, uri, package)
         case capabilities.RENAME_FILE, str(uri), str(new):
-            _rename(world, uri, new)
+            _rename(state, uri, new)
         case capabilities.UPDATE_GENERATED, str(uri):
-            update(world, uri)
+            update(state, uri)
         case _:
             raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}` for these")
 
 
-def _rename(world: World, uri: str, new: str) -> None:
-    world.projects.forget()
-    known = world.known(uri)
-    edit = rename.rename_interface(known, uri, new, known, world) if known else None
+def _rename(state: ServerState, uri: str, new: str) -> None:
+    state.forget()
+    known = state.known(uri)
+    edit = rename.rename_interface(known, uri, new, known, state) if known else None
     if edit is not None:
-        world.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
+        state.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
 
 
-def _declare(world: World, uri: str, package: str) -> None:
-    world.projects.notice_changes()  # or the edit may be of an older package.xml
-    known = world.known(uri)
-    path = world.path(uri)
-    project = world.projects.of(path) if path else None
-    edit = project.workspace.dependency(path, package) if project and path else None
+def _declare(state: ServerState, uri: str, package: str) -> None:
+    state.notice_changes()  # or the edit may be of an older package.xml
+    known = state.known(uri)
+    path = state.path(uri)
+    workspace = state.workspace_of(path) if path else None
+    edit = workspace.dependency(path, package) if workspace and path else None
     if known is not None and edit is not None:
-        change = workspace_edit([edit], known.state, world)
+        change = workspace_edit([edit], known.snapshot, state)
         label = f"declare {package}"
-        world.ask("workspace/applyEdit", {"label": label, "edit": change})
+        state.ask("workspace/applyEdit", {"label": label, "edit": change})

@@ -17,11 +17,11 @@ from idlc.diagnostics.report import Severity
 from idlc.diagnostics.terminal import counted
 from idlc.editor.documents import Document
 from idlc.editor.features.hover import code, shortened
-from idlc.editor.projects import Project
 from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
 from idlc.editor.protocol.parts import AtPosition, Markup, Part, Position, Range, TextEdit
 from idlc.editor.protocol.positions import in_lines, lines_of, units
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
+from idlc.editor.workspace import Workspace
 from idlc.language import tree
 from idlc.language.parse import parse_definition
 from idlc.model import ir, names
@@ -82,9 +82,9 @@ def units_for(name: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*([own] if own else []), *sorted(set(QUANTITIES.values())))))
 
 
-def command(uri: str, package: str, world: World) -> dict[str, object] | None:
+def command(uri: str, package: str, state: ServerState) -> dict[str, object] | None:
     """Return the command for a document, if the client can have its files edited."""
-    if not world.supports("workspace", "applyEdit"):
+    if not state.supports("workspace", "applyEdit"):
         return None
     title = f"Declare {package} in package.xml"
     return {"title": title, "command": ADD_DEPENDENCY, "arguments": [uri, package]}
@@ -122,7 +122,7 @@ class Typed(NamedTuple):
 
     document: Document
     path: Path
-    project: Project
+    workspace: Workspace
     line: int
     before: str
     encoding: str
@@ -131,7 +131,7 @@ class Typed(NamedTuple):
     def lacks(self, package: str) -> bool:
         """Return whether package.xml could declare a package, and does not."""
         if package not in self.undeclared:
-            edit = self.project.workspace.dependency(self.path, package)
+            edit = self.workspace.dependency(self.path, package)
             self.undeclared[package] = edit is not None
         return self.undeclared[package]
 
@@ -147,27 +147,27 @@ class Typed(NamedTuple):
         return TextEdit(Range(Position(self.line, start), Position(self.line, end)), text)
 
 
-def complete(world: World, asked: AtPosition) -> Items:
+def complete(state: ServerState, asked: AtPosition) -> Items:
     """Return what may come next at a position."""
-    document = world.documents.get(asked.text_document.uri)
+    document = state.documents.get(asked.text_document.uri)
     path = document.path if document else None
-    project = world.projects.of(path) if path else None
-    if document is None or path is None or project is None:
+    workspace = state.workspace_of(path) if path else None
+    if document is None or path is None or workspace is None:
         return Items(False, ())
     lines = lines_of(document.text)
-    line, at = in_lines(lines, asked.position, world.encoding)
-    typed = Typed(document, path, project, line, lines[line][:at], world.encoding, {})
-    items = tuple(_items(typed, world))
+    line, at = in_lines(lines, asked.position, state.encoding)
+    typed = Typed(document, path, workspace, line, lines[line][:at], state.encoding, {})
+    items = tuple(_items(typed, state))
     starts = {one.text_edit.range.start.character for one in items}
     words = {start: typed.after(start).lower() for start in starts}
     return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, words)))
 
 
-def resolve(world: World, item: dict[str, object]) -> dict[str, object]:
+def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
     """Return an item with the text of its type as documentation, if it stands for a type."""
     match item.get("data"):
-        case [str(uri), str(package), str(name)] if known := world.known(uri):
-            source = known.state.source(ir.TypeName(package, "msg", name))
+        case [str(uri), str(package), str(name)] if known := state.known(uri):
+            source = known.snapshot.source(ir.TypeName(package, "msg", name))
             lines = source.text.splitlines() if source else []
             return {**item, "documentation": Markup(code(shortened(lines)))} if lines else item
         case _:
@@ -180,13 +180,13 @@ def _fits(item: Item, words: Mapping[int, str]) -> bool:
     return all(one in letters for one in words[item.text_edit.range.start.character])
 
 
-def _items(typed: Typed, world: World) -> Iterator[Item]:
+def _items(typed: Typed, state: ServerState) -> Iterator[Item]:
     code, sign, comment = typed.before.partition("#")
     words = code.removeprefix("@optional").lstrip().split(maxsplit=2)
     if sign:
         yield from _in_comment(typed, comment, words)
     elif not words or (len(words) == 1 and not code.endswith((" ", "\t"))):
-        yield from _types(typed, words[0] if words else "", world)
+        yield from _types(typed, words[0] if words else "", state)
     elif "=" in code and re.fullmatch(r"\S+\s+[A-Z]\w*\s*=.*", code.lstrip()):
         word = code.partition("=")[2].lstrip()
         if "[" not in words[0] and ("<=" not in words[0] or "=" in words[-1]):
@@ -197,7 +197,7 @@ def _items(typed: Typed, world: World) -> Iterator[Item]:
         yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
 
 
-def _types(typed: Typed, word: str, world: World) -> Iterator[Item]:
+def _types(typed: Typed, word: str, state: ServerState) -> Iterator[Item]:
     """Yield what may begin a line, or go on with its first word."""
     if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
         for size in BOUNDS:
@@ -206,10 +206,10 @@ def _types(typed: Typed, word: str, world: World) -> Iterator[Item]:
     if word and not (word[0].isalpha() and word.isascii()):
         return
     package, slash, _ = word.partition("/")
-    workspace = typed.project.workspace
+    workspace = typed.workspace
     if slash:
         for one in workspace.names(package):
-            yield _type(typed, word, f"{package}/{one}", package, "0", world)
+            yield _type(typed, word, f"{package}/{one}", package, "0", state)
         return
     name = workspace.name_of(typed.path)
     own = name.package
@@ -218,33 +218,39 @@ def _types(typed: Typed, word: str, world: World) -> Iterator[Item]:
         yield Item(one, _KEYWORD, typed.replacing(len(word), one), size, f"1{one}")
     for one in workspace.names(own):
         if name != (own, "msg", one):
-            yield _type(typed, word, one, own, "0", world)
+            yield _type(typed, word, one, own, "0", state)
     for one in workspace.packages():
         edit = typed.replacing(len(word), f"{one}/")
         yield Item(f"{one}/", _MODULE, edit, sort_text=f"3{one}", command=_AGAIN)
     if word:
-        yield from _elsewhere(typed, word, own, world)
+        yield from _elsewhere(typed, word, own, state)
     if not typed.before and name.kind != "msg":
         yield Item("---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4")
 
 
-def _elsewhere(typed: Typed, word: str, own: str, world: World) -> Iterator[Item]:
+def _elsewhere(typed: Typed, word: str, own: str, state: ServerState) -> Iterator[Item]:
     """Yield messages of other packages by their names alone."""
     count = 0
-    for package in typed.project.workspace.packages():
-        for name in typed.project.workspace.names(package) if package != own else ():
+    for package in typed.workspace.packages():
+        for name in typed.workspace.names(package) if package != own else ():
             if name.lower().startswith(word.lower()):
-                yield _type(typed, word, f"{package}/{name}", package, "2", world, name)
+                yield _type(typed, word, f"{package}/{name}", package, "2", state, name)
                 count += 1
         if count >= MOST:
             return
 
 
 def _type(
-    typed: Typed, word: str, text: str, package: str, rank: str, world: World, looked_for: str = ""
+    typed: Typed,
+    word: str,
+    text: str,
+    package: str,
+    rank: str,
+    state: ServerState,
+    looked_for: str = "",
 ) -> Item:
     """Return a message; if its package is not declared yet, package.xml is edited afterwards."""
-    missing = world.supports("workspace", "applyEdit") and typed.lacks(package)
+    missing = state.supports("workspace", "applyEdit") and typed.lacks(package)
     return Item(
         text,
         _STRUCT,
@@ -252,7 +258,7 @@ def _type(
         sort_text=rank + text,
         filter_text=looked_for,
         detail=package,
-        command=command(typed.document.uri, package, world) if missing else None,
+        command=command(typed.document.uri, package, state) if missing else None,
         data=(typed.document.uri, package, text.rpartition("/")[2]),
     )
 

@@ -8,25 +8,25 @@ import msgspec
 
 from idlc.editor.protocol.parts import AskedWorkspace, OfDocument
 from idlc.editor.publish import Shown, diagnostics
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
 
 
-def document(world: World, asked: OfDocument) -> dict[str, object]:
+def document(state: ServerState, asked: OfDocument) -> dict[str, object]:
     """Return the problems of a document.
 
     All of them each time: Neovim forgets them with a document that it reads again, but not that
     they were told.
     """
-    return _report(diagnostics(world).get(asked.text_document.uri, []), None)
+    return _report(diagnostics(state).get(asked.text_document.uri, []), None)
 
 
-def workspace(world: World, asked: AskedWorkspace) -> dict[str, object]:
+def workspace(state: ServerState, asked: AskedWorkspace) -> dict[str, object]:
     """Return the problems of every document that has any, or had some when it was told."""
-    found = diagnostics(world)
+    found = diagnostics(state)
     before = {one.uri: one.value for one in asked.previous_result_ids}
     items = []
     for uri in sorted({*found, *before}):
-        opened = world.documents.get(uri)
+        opened = state.documents.get(uri)
         report = _report(found.get(uri, []), before.get(uri))
         items.append({"uri": uri, "version": opened.version if opened else None, **report})
     return {"items": items}

@@ -6,10 +6,11 @@ import re
 from collections.abc import Iterator
 
 from idlc.documents.show import outline
+from idlc.editor.documents import is_built_in
 from idlc.editor.elements import Element, section_names, spot
 from idlc.editor.protocol.parts import AtPosition, Markup, Part, Range
-from idlc.editor.workspace import State
-from idlc.editor.world import World, is_built_in
+from idlc.editor.state import ServerState
+from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
 from idlc.model.ir import is_range, spell, spell_value
 from idlc.model.link import Model
@@ -26,35 +27,35 @@ class Hover(Part, frozen=True):
     range: Range | None = None
 
 
-def hover(world: World, asked: AtPosition) -> Hover | None:
+def hover(state: ServerState, asked: AtPosition) -> Hover | None:
     """Return what is known of what stands at a position; of the file itself between definitions."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return None
-    found = spot(world, known, asked.position)
-    state = known.state
+    found = spot(state, known, asked.position)
+    snapshot = known.snapshot
     if found is None or found.part == "comment":
-        return Hover(Markup("\n\n".join(_interface(known.interface, state))))
+        return Hover(Markup("\n\n".join(_interface(known.interface, snapshot))))
     element = found.element
     if found.part == "type" and element.target is not None:
         there = next(
             (
                 one.interfaces[element.target]
-                for one in state.models.values()
+                for one in snapshot.models.values()
                 if element.target in one.interfaces
             ),
             None,
         )
         if there is None:
             return None
-        return Hover(Markup("\n\n".join(_interface(there, state))), world.range(found.span))
+        return Hover(Markup("\n\n".join(_interface(there, snapshot))), state.range(found.span))
     if element.meaning is None:
         return None
-    text = "\n\n".join(filter(None, _definition(element, known.interface, state)))
-    return Hover(Markup(text), world.range(found.span))
+    text = "\n\n".join(filter(None, _definition(element, known.interface, snapshot)))
+    return Hover(Markup(text), state.range(found.span))
 
 
-def _definition(element: Element, interface: ir.Interface, state: State) -> Iterator[str]:
+def _definition(element: Element, interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
     one = element.meaning
     assert one is not None
     if isinstance(one, ir.Constant):
@@ -68,7 +69,7 @@ def _definition(element: Element, interface: ir.Interface, state: State) -> Iter
     facts += _limits(one.type, has_range=says_range)
     if isinstance(one, ir.Field):
         facts += [f"default: `{spell_value(one.default.value)}`"] if one.default else []
-        placed = placed_fields(element.message, interface, state)
+        placed = placed_fields(element.message, interface, snapshot)
         facts += [_bytes(each) for each in placed[0] if each.field is one] if placed else []
     yield "  \n".join(facts)
 
@@ -91,17 +92,17 @@ def _bytes(placed: Placed) -> str:
 
 
 def placed_fields(
-    message: ir.Message, interface: ir.Interface, state: State
+    message: ir.Message, interface: ir.Interface, snapshot: Snapshot
 ) -> tuple[list[Placed], Extent] | None:
     """Return where the fields of a section stand in its bytes, `None` if there are errors."""
-    model = state.model_of(interface)
+    model = snapshot.model_of(interface)
     return layout(message, model.messages) if model else None
 
 
-def _interface(interface: ir.Interface, state: State) -> Iterator[str]:
+def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
     """Yield what an interface is."""
     yield f"**{interface.name}**"
-    model = state.model_of(interface)
+    model = snapshot.model_of(interface)
     if model is None:
         yield prose(derive.sections(interface)[0].comment)
         return

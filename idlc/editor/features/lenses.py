@@ -11,8 +11,8 @@ from idlc.diagnostics.report import first_few
 from idlc.diagnostics.terminal import counted
 from idlc.editor.elements import elements
 from idlc.editor.protocol.parts import Action, Lens, OfDocument, OfRange, Part, Position, Range
-from idlc.editor.users import users
-from idlc.editor.world import Known, World
+from idlc.editor.state import Known, ServerState
+from idlc.editor.usages import users
 from idlc.model import derive, ir
 from idlc.model.ir import spell_value
 from idlc.wire.layout import layout
@@ -30,14 +30,14 @@ class Hint(Part, frozen=True):
     padding_left: bool
 
 
-def hints(world: World, asked: OfRange) -> list[Hint]:
+def hints(state: ServerState, asked: OfRange) -> list[Hint]:
     """Return the hints in a range; none where the file has errors."""
-    known = world.known(asked.text_document.uri) if world.settings.inlay_hints else None
-    model = known.state.model_of(known.interface) if known else None
+    known = state.known(asked.text_document.uri) if state.settings.inlay_hints else None
+    model = known.snapshot.model_of(known.interface) if known else None
     if known is None or model is None:
         return []
-    low = world.offset(known.source, asked.range.start)
-    high = world.offset(known.source, asked.range.end)
+    low = state.offset(known.source, asked.range.start)
+    high = state.offset(known.source, asked.range.end)
     found = []
     placed = {}
     for one in elements(known.source, known.interface):
@@ -51,7 +51,7 @@ def hints(world: World, asked: OfRange) -> list[Hint]:
         if here is not None:
             text = f"@{here.offset}, {here.size} B"
             tip = f"{here.size.in_bytes} at offset {here.offset} of the message, header not counted"
-            found.append(Hint(world.range(one.name).end, text, tip, True))
+            found.append(Hint(state.range(one.name).end, text, tip, True))
     return found
 
 
@@ -63,34 +63,34 @@ MOST_DEFAULTS = 5
 MOST_LETTERS = 40
 
 
-def lenses(world: World, asked: OfDocument) -> list[Lens]:
+def lenses(state: ServerState, asked: OfDocument) -> list[Lens]:
     """Return the lenses of a file; what they say is found out when they are shown."""
-    known = world.known(asked.text_document.uri) if world.settings.code_lens else None
+    known = state.known(asked.text_document.uri) if state.settings.code_lens else None
     if known is None:
         return []
-    kinds = [_HASH] if known.state.library.distro.has_hashes else []
+    kinds = [_HASH] if known.snapshot.library.distro.has_hashes else []
     kinds += [_USERS] if known.interface.name.kind == "msg" else []
-    kinds += [_BREAKS] if _earlier(known, world) else []
+    kinds += [_BREAKS] if _earlier(known, state) else []
     found = [Lens(_TOP, data=[asked.text_document.uri, kind]) for kind in kinds]
-    return [*found, *(_defaults(known, world) if world.settings.default_lens else ())]
+    return [*found, *(_defaults(known, state) if state.settings.default_lens else ())]
 
 
-def resolve(world: World, asked: Lens) -> Lens:
+def resolve(state: ServerState, asked: Lens) -> Lens:
     """Return a lens with what it says."""
     if asked.command is not None:
         return asked
     uri, kind = asked.data
-    return Lens(asked.range, Action(_text(world, uri, kind), ""), asked.data)
+    return Lens(asked.range, Action(_text(state, uri, kind), ""), asked.data)
 
 
-def _defaults(known: Known, world: World) -> Iterator[Lens]:
+def _defaults(known: Known, state: ServerState) -> Iterator[Lens]:
     """Yield a lens above the first default of each section, which tells all of them."""
     for section in derive.sections(known.interface):
         given = [one for one in section.fields if one.default and one.name_span]
         if given:
             texts = (_default(one, section) for one in given)
             assert given[0].name_span is not None
-            place = world.range(given[0].name_span).start
+            place = state.range(given[0].name_span).start
             says = Action(f"defaults: {first_few(texts, MOST_DEFAULTS)}", "")
             yield Lens(Range(Position(place.line, 0), Position(place.line, 0)), says)
 
@@ -106,36 +106,36 @@ def _default(field: ir.Field, section: ir.Message) -> str:
     return f"{field.name} {text if len(text) <= MOST_LETTERS else text[:MOST_LETTERS] + '…'}"
 
 
-def _text(world: World, uri: str, kind: str) -> str:
-    known = world.known(uri)
+def _text(state: ServerState, uri: str, kind: str) -> str:
+    known = state.known(uri)
     if known is None:
         return ""
     name = known.interface.name
     if kind == _USERS:
-        return counted(len(list(users(name, known.state, world))), "use")
+        return counted(len(list(users(name, known.snapshot, state))), "use")
     if kind == _BREAKS:
-        return _what_breaks(known, world)
-    model = known.state.model_of(known.interface)
+        return _what_breaks(known, state)
+    model = known.snapshot.model_of(known.interface)
     return model.describer.hash(str(name)) if model else "no type hash: there are errors"
 
 
-def _earlier(known: Known, world: World) -> Earlier | None:
+def _earlier(known: Known, state: ServerState) -> Earlier | None:
     """Return what a file's folder is compared with, if settings name something."""
-    project = world.projects.of(known.state.path_of(known.source))
-    found = project.workspace.earlier(world.settings.against) if project else None
+    workspace = state.workspace_of(known.snapshot.path_of(known.source))
+    found = workspace.earlier(state.settings.against) if workspace else None
     return found if found and found.name else None
 
 
-def _what_breaks(known: Known, world: World) -> str:
+def _what_breaks(known: Known, state: ServerState) -> str:
     """Return what the changes of a file break against the version of the settings."""
-    interface, earlier = known.interface, _earlier(known, world)
-    project = world.projects.of(known.state.path_of(known.source))
-    if earlier is None or project is None:
+    interface, earlier = known.interface, _earlier(known, state)
+    workspace = state.workspace_of(known.snapshot.path_of(known.source))
+    if earlier is None or workspace is None:
         return ""
-    world.follow_git(project.folder, earlier.repository)
-    side = project.workspace.before(world.settings.against)
+    state.follow_git(workspace.folder, earlier.repository)
+    side = workspace.before(state.settings.against)
     before = side.models.get(interface.name.package)
-    after = known.state.model_of(interface)
+    after = known.snapshot.model_of(interface)
     if after is None:
         return ""
     if interface.name in side.broken:
@@ -150,7 +150,10 @@ def _what_breaks(known: Known, world: World) -> str:
     if not broken:
         return f"breaks nothing against {earlier.name}"
     count = len(
-        {state.path_of(span.source) for state, span in users(interface.name, known.state, world)}
+        {
+            snapshot.path_of(span.source)
+            for snapshot, span in users(interface.name, known.snapshot, state)
+        }
     )
     levels = ", ".join(level for level in LEVELS if level in broken)
     return f"breaks: {levels} for {counted(count, 'user')} against {earlier.name}"

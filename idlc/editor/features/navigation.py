@@ -20,58 +20,60 @@ from idlc.editor.protocol.parts import (
     Position,
     Range,
 )
-from idlc.editor.users import states, text_of, users, uses
-from idlc.editor.workspace import State
-from idlc.editor.world import Known, World
+from idlc.editor.state import Known, ServerState
+from idlc.editor.usages import snapshots, text_of, users, uses
+from idlc.editor.workspace import Snapshot
 from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME
 from idlc.project.files import is_file
-from idlc.project.package_xml import MANIFEST, manifest, statements
+from idlc.project.package_xml import statements
 from idlc.project.prefixes import ament_prefixes
-from idlc.project.settings import working_in
+from idlc.project.root import MANIFEST, Root
 
 _TOP = Range(Position(0, 0), Position(0, 0))
 
 
-def named_package(world: World, asked: AtPosition) -> str | None:
+def named_package(state: ServerState, asked: AtPosition) -> str | None:
     """Return the package that is named at a position of a package.xml."""
-    path = world.path(asked.text_document.uri)
-    source = _source(path, world) if path and path.name == MANIFEST else None
+    path = state.path(asked.text_document.uri)
+    source = _source(path, state) if path and path.name == MANIFEST else None
     if source is None:
         return None
-    offset = world.offset(source, asked.position)
+    offset = state.offset(source, asked.position)
     return next((name for name, at in _packages(source) if at.start <= offset <= at.end), None)
 
 
-def manifest_definition(package: str, world: World) -> Location | None:
+def manifest_definition(package: str, state: ServerState) -> Location | None:
     """Return the package.xml of a package, or what is built in of it."""
-    for state in states(world):
-        if path := _file(package, state):
-            return Location(world.uri(path), _TOP)
-    for state in states(world):
-        for name in state.library.interfaces(package)[:1]:
-            if source := state.source(name):
-                return world.location(Span(source, 0, 0), state)
+    for snapshot in snapshots(state):
+        if path := _file(package, snapshot):
+            return Location(state.uri(path), _TOP)
+    for snapshot in snapshots(state):
+        for name in snapshot.library.interfaces(package)[:1]:
+            if source := snapshot.source(name):
+                return state.location(Span(source, 0, 0), snapshot)
     return None
 
 
-def manifest_references(package: str, asked: AskedReferences, world: World) -> list[Location]:
+def manifest_references(package: str, asked: AskedReferences, state: ServerState) -> list[Location]:
     """Return where a package's messages are used, and where other packages declare it."""
     found = [
-        world.location(at, state) for state, at, used in uses(world) if used.package == package
+        state.location(at, snapshot)
+        for snapshot, at, used in uses(state)
+        if used.package == package
     ]
-    for path in dict.fromkeys(_manifests(world)):
-        source = _source(path, world)
+    for path in dict.fromkeys(_manifests(state)):
+        source = _source(path, state)
         for name, at in _packages(source) if source else ():
             is_own = source is not None and source.text[: at.start].rstrip().endswith("<name>")
             if name == package and (asked.context.include_declaration or not is_own):
-                found.append(Location(world.uri(path), world.range(at)))
+                found.append(Location(state.uri(path), state.range(at)))
     return found
 
 
-def _source(path: Path, world: World) -> Source | None:
+def _source(path: Path, state: ServerState) -> Source | None:
     """Return the text of a package.xml, as an editor has it if it is open."""
-    return world.documents.unsaved().read_source(path, str(path), Report())
+    return Root(path.parent, state.documents.texts()).read_source(path, str(path), Report())
 
 
 def _packages(source: Source) -> Iterator[tuple[str, Span]]:
@@ -83,21 +85,20 @@ def _packages(source: Source) -> Iterator[tuple[str, Span]]:
                 yield one.text, Span(source, start, start + len(one.text))
 
 
-def _manifests(world: World) -> Iterator[Path]:
+def _manifests(state: ServerState) -> Iterator[Path]:
     """Yield the package.xml files of the packages in all folders."""
-    for state in states(world):
-        for path in state.interfaces:
-            if declared := manifest(path.parent.parent):
+    for snapshot in snapshots(state):
+        for path in snapshot.interfaces:
+            if declared := snapshot.root.manifest(path.parent.parent):
                 yield declared
 
 
-def _file(package: str, state: State) -> Path | None:
+def _file(package: str, snapshot: Snapshot) -> Path | None:
     """Return the package.xml of a package that is in a folder, beside it, or installed."""
-    with working_in(state.folder):
-        home = state.library.home(package)
-        declared = manifest(home) if home else None
+    home = snapshot.library.home(package)
+    declared = snapshot.root.manifest(home) if home else None
     installed = (prefix / "share" / package / MANIFEST for prefix in ament_prefixes())
-    found = (declared and state.folder / declared, *installed)
+    found = (declared and snapshot.folder / declared, *installed)
     return next((one for one in found if one and is_file(one)), None)
 
 
@@ -119,12 +120,12 @@ class Thing(NamedTuple):
     element: Element | None
 
 
-def thing(world: World, asked: AtPosition) -> Thing | None:
+def thing(state: ServerState, asked: AtPosition) -> Thing | None:
     """Return what a position is about; between definitions, that is the file's interface."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return None
-    found = spot(world, known, asked.position)
+    found = spot(state, known, asked.position)
     if found is None or found.part == "comment":
         return Thing(known, known.interface.name, None)
     if found.part == "type":
@@ -133,52 +134,52 @@ def thing(world: World, asked: AtPosition) -> Thing | None:
     return Thing(known, known.interface.name, found.element)
 
 
-def definition(world: World, asked: AtPosition) -> Location | None:
+def definition(state: ServerState, asked: AtPosition) -> Location | None:
     """Return where the thing at a position is defined."""
-    if package := named_package(world, asked):
-        return manifest_definition(package, world)
-    found = thing(world, asked)
+    if package := named_package(state, asked):
+        return manifest_definition(package, state)
+    found = thing(state, asked)
     if found is None:
         return None
     if found.element is not None:
-        return world.location(found.element.name, found.known.state)
-    return top(found.name, found.known.state, world)
+        return state.location(found.element.name, found.known.snapshot)
+    return top(found.name, found.known.snapshot, state)
 
 
-def type_definition(world: World, asked: AtPosition) -> Location | None:
+def type_definition(state: ServerState, asked: AtPosition) -> Location | None:
     """Return where the type of the field at a position is defined."""
-    found = thing(world, asked)
+    found = thing(state, asked)
     if found is None:
         return None
     target = found.element.target if found.element else found.name
-    return top(target, found.known.state, world) if target else None
+    return top(target, found.known.snapshot, state) if target else None
 
 
-def top(name: ir.TypeName, state: State, world: World) -> Location | None:
+def top(name: ir.TypeName, snapshot: Snapshot, state: ServerState) -> Location | None:
     """Return the beginning of the file of an interface."""
-    source = text_of(name, state)
-    return world.location(Span(source, 0, 0), state) if source else None
+    source = text_of(name, snapshot)
+    return state.location(Span(source, 0, 0), snapshot) if source else None
 
 
-def references(world: World, asked: AskedReferences) -> list[Location]:
+def references(state: ServerState, asked: AskedReferences) -> list[Location]:
     """Return where the thing at a position is used, in all folders, and where it is defined."""
-    if package := named_package(world, asked):
-        return manifest_references(package, asked, world)
-    found = thing(world, asked)
+    if package := named_package(state, asked):
+        return manifest_references(package, asked, state)
+    found = thing(state, asked)
     if found is None:
         return []
     if found.element is not None:
         spans = list(mentions(found.element, found.known))
         if not asked.context.include_declaration:
             del spans[0]
-        return [world.location(span, found.known.state) for span in spans]
-    first = top(found.name, found.known.state, world)
+        return [state.location(span, found.known.snapshot) for span in spans]
+    first = top(found.name, found.known.snapshot, state)
     declared = [first] if first and asked.context.include_declaration else []
-    state, path = found.known.state, found.known.state.path_of(found.known.source)
-    used = [world.location(span, one) for one, span in users(found.name, state, world)]
-    project = world.projects.of(path)
-    span = project.workspace.declaration(path, found.name.package) if project else None
-    used += [world.location(span, state)] if span else []
+    snapshot, path = found.known.snapshot, found.known.snapshot.path_of(found.known.source)
+    used = [state.location(span, one) for one, span in users(found.name, snapshot, state)]
+    workspace = state.workspace_of(path)
+    span = workspace.declaration(path, found.name.package) if workspace else None
+    used += [state.location(span, snapshot)] if span else []
     return list(dict.fromkeys((*declared, *used)))
 
 
@@ -209,23 +210,23 @@ def comments(known: Known) -> Iterator[Span]:
                 yield Span(known.source, start, start + len(line.comment))
 
 
-def highlights(world: World, asked: AtPosition) -> list[Highlight]:
+def highlights(state: ServerState, asked: AtPosition) -> list[Highlight]:
     """Return the places of the document that are about the thing at a position."""
-    found = thing(world, asked)
+    found = thing(state, asked)
     if found is None:
         return []
     if found.element is not None:
         first, *others = mentions(found.element, found.known)
-        places = [Highlight(world.range(span), _READ) for span in others]
-        return [Highlight(world.range(first), _WRITE), *places]
+        places = [Highlight(state.range(span), _READ) for span in others]
+        return [Highlight(state.range(first), _WRITE), *places]
     return [
-        Highlight(world.range(one.type), _READ)
+        Highlight(state.range(one.type), _READ)
         for one in elements(found.known.source, found.known.interface)
         if one.target == found.name
     ]
 
 
-def built_in_text(_world: World, asked: AskedContent) -> dict[str, str]:
+def built_in_text(_state: ServerState, asked: AskedContent) -> dict[str, str]:
     """Return the text of `idlc:/jazzy/std_msgs/msg/Header.msg`."""
     scheme, _, path = asked.uri.partition(":")
     distro, _, name = path.strip("/").partition("/")

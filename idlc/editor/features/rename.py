@@ -11,7 +11,7 @@ import msgspec
 
 from idlc.check.package.cmake import calls
 from idlc.compare.changes import LEVELS, Change
-from idlc.compare.packages import called, compare
+from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
@@ -28,10 +28,11 @@ from idlc.editor.protocol.parts import (
     Range,
     TextEdit,
 )
-from idlc.editor.users import states, users, uses
-from idlc.editor.world import Known, Renaming, World
+from idlc.editor.state import Known, Renaming, ServerState
+from idlc.editor.usages import snapshots, users, uses
 from idlc.model import ir, names
 from idlc.project.files import is_file
+from idlc.project.root import Root
 
 #: The file that lists the interface files of a package.
 BUILD = "CMakeLists.txt"
@@ -67,19 +68,19 @@ class Move(Part, frozen=True, tag="rename", tag_field="kind"):
     annotation_id: str | None = None
 
 
-def prepare(world: World, asked: AtPosition) -> Renamed | None:
+def prepare(state: ServerState, asked: AtPosition) -> Renamed | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
-    world.projects.notice_changes()  # of which a client may not have told yet
-    known = world.known(asked.text_document.uri)
-    found = spot(world, known, asked.position) if known else None
+    state.notice_changes()  # of which a client may not have told yet
+    known = state.known(asked.text_document.uri)
+    found = spot(state, known, asked.position) if known else None
     if known is None or found is None:
         return None
     if found.part == "name" and found.element.meaning is not None:
-        return Renamed(world.range(found.span), found.span.text)
+        return Renamed(state.range(found.span), found.span.text)
     target = found.element.target
-    if found.part == "type" and target is not None and _home(target, known, world):
+    if found.part == "type" and target is not None and _home(target, known, state):
         span = _last(found.element.type)
-        return Renamed(world.range(span), span.text)
+        return Renamed(state.range(span), span.text)
     return None
 
 
@@ -88,39 +89,41 @@ def _last(span: Span) -> Span:
     return span.at(span.text.rfind("/") + 1, len(span.text))
 
 
-def can_move_files(world: World) -> bool:
+def can_move_files(state: ServerState) -> bool:
     """Return whether the client renames files where an edit says so."""
-    return world.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
+    return state.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
 
 
-def _home(name: ir.TypeName, asking: Known, world: World) -> Known | None:
+def _home(name: ir.TypeName, asking: Known, state: ServerState) -> Known | None:
     """Return the interface that a file means by a name, if it is one of the workspace's.
 
     Where its folder knows it from elsewhere, as what is installed, another folder may have it.
     """
-    for state in sorted(states(world), key=lambda one: one is not asking.state):
-        for interface, source in state.interfaces.values():
+    for snapshot in sorted(snapshots(state), key=lambda one: one is not asking.snapshot):
+        for interface, source in snapshot.interfaces.values():
             if interface.name == name:
-                return Known(state, interface, source)
+                return Known(snapshot, interface, source)
     return None
 
 
-def rename(world: World, asked: AskedRename) -> dict[str, object] | None:
+def rename(state: ServerState, asked: AskedRename) -> dict[str, object] | None:
     """Return the edits that rename what stands at a position, and say what they break."""
-    world.projects.forget()
-    known = world.known(asked.text_document.uri)
-    found = spot(world, known, asked.position) if known else None
-    if known is None or found is None or prepare(world, asked) is None:
+    state.forget()
+    known = state.known(asked.text_document.uri)
+    found = spot(state, known, asked.position) if known else None
+    if known is None or found is None or prepare(state, asked) is None:
         raise RequestError(REQUEST_FAILED, "there is no name of this workspace here")
     if found.part == "type":
         target = found.element.target
-        home = _home(target, known, world) if target else None
+        home = _home(target, known, state) if target else None
         assert home is not None
-        return rename_interface(home, asked.text_document.uri, asked.new_name, known, world)
-    return _rename_definition(found.element, known, asked.new_name, world)
+        return rename_interface(home, asked.text_document.uri, asked.new_name, known, state)
+    return _rename_definition(found.element, known, asked.new_name, state)
 
 
-def _rename_definition(element: Element, known: Known, new: str, world: World) -> dict[str, object]:
+def _rename_definition(
+    element: Element, known: Known, new: str, state: ServerState
+) -> dict[str, object]:
     is_constant = isinstance(element.meaning, ir.Constant)
     valid = names.is_constant_name(new) if is_constant else names.is_field_name(new)
     if not valid:
@@ -130,35 +133,35 @@ def _rename_definition(element: Element, known: Known, new: str, world: World) -
     if any(one.name == new and one is not element.meaning for one in others):
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, known)]
-    uri = world.uri(known.state.path_of(known.source))
-    changed = {uri: [TextEdit(world.range(one.span), one.text) for one in edits]}
-    changes = _changes(known, apply(known.source.text, edits)[0], world)
+    uri = state.uri(known.snapshot.path_of(known.source))
+    changed = {uri: [TextEdit(state.range(one.span), one.text) for one in edits]}
+    changes = _changes(known, apply(known.source.text, edits)[0], state)
     title = f"Rename {element.body.name.text} to {new}"
-    return _answer(changed, None, title, changes, known, world)
+    return _answer(changed, None, title, changes, known, state)
 
 
-def _changes(known: Known, text: str, world: World) -> Iterable[Change] | None:
+def _changes(known: Known, text: str, state: ServerState) -> Iterable[Change] | None:
     """Return what another text for a file breaks, `None` if one of the versions has errors."""
-    path = known.state.path_of(known.source)
-    project = world.projects.of(path)
-    after = project.workspace.state_with(path, text) if project else None
+    path = known.snapshot.path_of(known.source)
+    workspace = state.workspace_of(path)
+    after = workspace.snapshot_with(path, text) if workspace else None
     interface = after.interfaces[path][0] if after and path in after.interfaces else None
     if after is None or interface is None:
         return None
-    old, new = known.state.model_of(known.interface), after.model_of(interface)
+    old, new = known.snapshot.model_of(known.interface), after.model_of(interface)
     name = {interface.name}
     return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
 def rename_interface(
-    home: Known, uri: str, new: str, asking: Known, world: World
+    home: Known, uri: str, new: str, asking: Known, state: ServerState
 ) -> dict[str, object] | None:
     """Return the edits for another name of an interface, with the renaming of its file.
 
     It was asked for in the document `uri`, which `asking` is about.
     """
     old = home.interface.name
-    path = home.state.path_of(home.source)
+    path = home.snapshot.path_of(home.source)
     if not names.is_message_name(new):
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {names.MESSAGE_HINT}")
     target = path.with_name(f"{new}.{old.kind}")
@@ -166,52 +169,52 @@ def rename_interface(
         raise RequestError(REQUEST_FAILED, f"no file can have a name of {len(target.name)} letters")
     if new == old.name:
         return None
-    if os.path.lexists(target) or world.documents.at(target):
+    if os.path.lexists(target) or state.documents.at(target):
         raise RequestError(REQUEST_FAILED, f"there is a `{target.name}` already")
     if not is_file(path):
         raise RequestError(REQUEST_FAILED, f"save `{path.name}` first: there is no file to rename")
-    if not can_move_files(world):
+    if not can_move_files(state):
         raise RequestError(REQUEST_FAILED, _CANNOT_MOVE)
     report = Report()
-    edits = _edits_of_users(home, new, report, world)
+    edits = _edits_of_users(home, new, report, state)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    here = world.path(uri)
-    used = users(old, home.state, world)
-    spans = (_last(one) for state, one in used if state.path_of(one.source) == here)
+    here = state.path(uri)
+    used = users(old, home.snapshot, state)
+    spans = (_last(one) for snapshot, one in used if snapshot.path_of(one.source) == here)
     own = dict.fromkeys(Edit(Span(asking.source, one.start, one.end), new) for one in spans)
-    world.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
-    move = Move(world.uri(path), uris.from_path(target))
+    state.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
+    move = Move(state.uri(path), uris.from_path(target))
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
-    changes = [called(home.interface, renamed)]
-    return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, world)
+    changes = [renamed_interface(home.interface, renamed)]
+    return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, state)
 
 
-def files(world: World, asked: AskedFileRenames) -> dict[str, object] | None:
+def files(state: ServerState, asked: AskedFileRenames) -> dict[str, object] | None:
     """Return the edits that follow from interface files getting other names.
 
     Some clients also ask this about a file that an answer of `rename` has them move. Documents
     that are open have the edits of that answer by then. What else it edits may be in buffers that
     the client does not tell of, so it is not edited again.
     """
-    world.projects.forget()
+    state.forget()
     edits: dict[str, list[TextEdit]] = {}
     report = Report()
     for one in {each.old_uri: each for each in asked.files}.values():
         old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
-        known = world.known(one.old_uri)
+        known = state.known(one.old_uri)
         if not (old and new and known and _is_other_name(old, new)):
             continue
-        is_own = world.renaming is not None and _is_under_way(world.renaming, old, new, world)
-        found = _edits_of_users(known, new.stem, report, world)
+        is_own = state.renaming is not None and _is_under_way(state.renaming, old, new, state)
+        found = _edits_of_users(known, new.stem, report, state)
         for uri, some in found.items():
-            if not is_own or world.documents.get(uri):
+            if not is_own or state.documents.get(uri):
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
-        world.tell(
+        state.notify(
             "window/showMessage", {"type": 2, "message": f"{BUILD} is left: {problem.message}"}
         )
-    return of_documents(edits, world) if edits else None
+    return of_documents(edits, state) if edits else None
 
 
 def _is_other_name(old: Path, new: Path) -> bool:
@@ -220,41 +223,41 @@ def _is_other_name(old: Path, new: Path) -> bool:
     return is_valid and old.parent == new.parent and old.suffix == new.suffix
 
 
-def _is_under_way(renaming: Renaming, old: Path, new: Path, world: World) -> bool:
+def _is_under_way(renaming: Renaming, old: Path, new: Path, state: ServerState) -> bool:
     """Return whether the client makes the edits of an answer, and now moves this file for it."""
     if (renaming.old, renaming.new) != (old, new):
         return False
-    known = world.known(renaming.uri)
+    known = state.known(renaming.uri)
     return known is not None and known.source.text == renaming.text
 
 
 def _edits_of_users(
-    known: Known, new: str, report: Report, world: World
+    known: Known, new: str, report: Report, state: ServerState
 ) -> dict[str, list[TextEdit]]:
     """Return the edits of all files that name an interface: its users, and CMakeLists.txt.
 
     Two folders may hold the same file, also by a link: it is edited once, where it is open.
     """
-    old, path = known.interface.name, known.state.path_of(known.source)
-    used = users(old, known.state, world)
-    places = [(state.path_of(span.source), _last(span)) for state, span in used]
-    places += [(Path(span.source.path), span) for span in _in_cmake(old, path, report, world)]
-    places.sort(key=lambda place: world.documents.at(place[0]) is None)
+    old, path = known.interface.name, known.snapshot.path_of(known.source)
+    used = users(old, known.snapshot, state)
+    places = [(snapshot.path_of(span.source), _last(span)) for snapshot, span in used]
+    places += [(Path(span.source.path), span) for span in _in_cmake(old, path, report, state)]
+    places.sort(key=lambda place: state.documents.at(place[0]) is None)
     edited: dict[Path, Path] = {}
     edits: dict[str, dict[TextEdit, None]] = {}
     for at, span in places:
         if edited.setdefault(at.resolve(), at) == at:
-            edits.setdefault(world.uri(at), {})[TextEdit(world.range(span), new)] = None
+            edits.setdefault(state.uri(at), {})[TextEdit(state.range(span), new)] = None
     return {uri: list(some) for uri, some in edits.items()}
 
 
-def _in_cmake(name: ir.TypeName, path: Path, report: Report, world: World) -> Iterator[Span]:
+def _in_cmake(name: ir.TypeName, path: Path, report: Report, state: ServerState) -> Iterator[Span]:
     """Yield where CMakeLists.txt of a package names an interface file."""
     cmake = path.parent.parent / BUILD
-    unsaved = world.documents.unsaved()
-    if not unsaved.is_file(cmake):
+    root = Root(cmake.parent, state.documents.texts())
+    if not root.is_file(cmake):
         return
-    source = unsaved.read_source(cmake, str(cmake), report)
+    source = root.read_source(cmake, str(cmake), report)
     pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?![.-]?\w)")
     for place in (place for one in calls(source) for place in one.places) if source else ():
         if match := pattern.search(place.text):
@@ -267,21 +270,21 @@ def _answer(
     title: str,
     changes: Iterable[Change] | None,
     known: Known,
-    world: World,
+    state: ServerState,
 ) -> dict[str, object]:
     """Return the edits, which say what they break before anybody makes them."""
-    what, is_broken = _what_breaks(changes, known, world)
+    what, is_broken = _what_breaks(changes, known, state)
     support = ("workspace", "workspaceEdit")
     if not (
-        world.supports(*support, "changeAnnotationSupport")
-        and world.supports(*support, "documentChanges")
+        state.supports(*support, "changeAnnotationSupport")
+        and state.supports(*support, "documentChanges")
     ):
-        world.tell("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
+        state.notify("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
         if move is None:
-            return of_documents(edits, world)
-        return {"documentChanges": [*(document_edit(*one, world) for one in edits.items()), move]}
+            return of_documents(edits, state)
+        return {"documentChanges": [*(document_edit(*one, state) for one in edits.items()), move]}
     marked = (
-        document_edit(uri, (Annotated(e.range, e.new_text, _ANNOTATION) for e in some), world)
+        document_edit(uri, (Annotated(e.range, e.new_text, _ANNOTATION) for e in some), state)
         for uri, some in edits.items()
     )
     moves = [msgspec.structs.replace(move, annotation_id=_ANNOTATION)] if move else []
@@ -289,7 +292,9 @@ def _answer(
     return {"documentChanges": [*marked, *moves], "changeAnnotations": {_ANNOTATION: note}}
 
 
-def _what_breaks(changes: Iterable[Change] | None, known: Known, world: World) -> tuple[str, bool]:
+def _what_breaks(
+    changes: Iterable[Change] | None, known: Known, state: ServerState
+) -> tuple[str, bool]:
     """Return what a rename breaks, in words, and whether it breaks something."""
     if changes is None:
         return "there are errors, so idlc cannot say what this breaks", True
@@ -299,13 +304,13 @@ def _what_breaks(changes: Iterable[Change] | None, known: Known, world: World) -
         return "breaks nothing that is sent", False
     name = known.interface.name
     holders: dict[ir.TypeName, set[ir.TypeName]] = {}
-    for state, span, target in uses(world):
-        holder = state.interfaces[state.path_of(span.source)][0].name
+    for snapshot, span, target in uses(state):
+        holder = snapshot.interfaces[snapshot.path_of(span.source)][0].name
         holders.setdefault(target, set()).add(holder)
     direct = sorted(map(str, holders.get(name, ())))
     what = f"breaks {levels} for whoever uses `{name}`"
     what += f": {first_few(direct, NAMED)}" if direct else ""
-    if "hash" in broken and known.state.library.distro.has_hashes:
+    if "hash" in broken and known.snapshot.library.distro.has_hashes:
         reached = {name}
         waiting = [name]
         while waiting:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from idlc.diagnostics.source import Span
+from idlc.editor.documents import is_built_in
 from idlc.editor.elements import Element, elements, section_names
 from idlc.editor.protocol.parts import AskedSymbols, AtPositions, Location, OfDocument, Part, Range
-from idlc.editor.users import states, text_of
-from idlc.editor.world import CONTENT, Known, World, is_built_in
+from idlc.editor.state import CONTENT, Known, ServerState
+from idlc.editor.usages import snapshots, text_of
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.ir import spell
@@ -39,23 +40,23 @@ class Found(Part, frozen=True):
     container_name: str
 
 
-def document(world: World, asked: OfDocument) -> list[Symbol]:
+def document(state: ServerState, asked: OfDocument) -> list[Symbol]:
     """Return the definitions of a file, by section where it has several."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return []
     found = list(elements(known.source, known.interface))
     names = section_names(known.interface)
     if not names:
-        return [_symbol(one, world) for one in found]
+        return [_symbol(one, state) for one in found]
     return [
         Symbol(
             name,
             "",
             _NAMESPACE,
-            world.range(span),
-            world.range(Span(span.source, span.start, span.start)),
-            tuple(_symbol(one, world) for one in found if span.start <= one.line.start < span.end),
+            state.range(span),
+            state.range(Span(span.source, span.start, span.start)),
+            tuple(_symbol(one, state) for one in found if span.start <= one.line.start < span.end),
         )
         for name, span in zip(names, sections(known), strict=False)
     ]
@@ -69,22 +70,22 @@ def sections(known: Known) -> list[Span]:
     return [Span(known.source, *place) for place in zip(starts, ends, strict=True)]
 
 
-def _symbol(one: Element, world: World) -> Symbol:
+def _symbol(one: Element, state: ServerState) -> Symbol:
     kind = _CONSTANT if isinstance(one.meaning, ir.Constant) else _FIELD
     type_ = one.body.type.whole.text
     if one.meaning is not None:
         type_ = spell(one.meaning.type)
     name = one.body.name.text or "?"
-    return Symbol(name, type_, kind, world.range(one.whole), world.range(one.name))
+    return Symbol(name, type_, kind, state.range(one.whole), state.range(one.name))
 
 
-def workspace(world: World, asked: AskedSymbols) -> list[Found]:
+def workspace(state: ServerState, asked: AskedSymbols) -> list[Found]:
     """Return the interfaces in whose full names the letters of a word occur in this order."""
     found: dict[Found, None] = {}
-    for state in states(world):
-        for interface, source in state.interfaces.values():
+    for snapshot in snapshots(state):
+        for interface, source in snapshot.interfaces.values():
             if _fits(asked.query.lower(), str(interface.name).lower()):
-                where = world.location(Span(source, 0, 0), state)
+                where = state.location(Span(source, 0, 0), snapshot)
                 kind = _KINDS[interface.name.kind]
                 found[Found(interface.name.name, kind, where, interface.name.package)] = None
     return list(found)[:MOST]
@@ -118,27 +119,27 @@ class Link(Part, frozen=True):
     tooltip: str
 
 
-def folds(world: World, asked: OfDocument) -> list[Fold]:
+def folds(state: ServerState, asked: OfDocument) -> list[Fold]:
     """Return the sections of a service or action, and comments of several lines."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return []
-    found = [Fold(first, last, "comment") for first, last in _comments(known, world)]
+    found = [Fold(first, last, "comment") for first, last in _comments(known, state)]
     parts = sections(known)
     for span in parts if len(parts) > 1 else ():
-        place = world.range(Span(span.source, span.start, span.start + len(span.text.rstrip())))
+        place = state.range(Span(span.source, span.start, span.start + len(span.text.rstrip())))
         if place.end.line > place.start.line:
             found.append(Fold(place.start.line, place.end.line, "region"))
     return found
 
 
-def _comments(known: Known, world: World) -> Iterator[tuple[int, int]]:
+def _comments(known: Known, state: ServerState) -> Iterator[tuple[int, int]]:
     """Yield the first and last line of each run of comment lines."""
     lines = []
     for section in parse(known.source).sections:
         for line in section.lines:
             if line.comment and not line.code.strip():
-                start = world.range(Span(known.source, line.start, line.start)).start
+                start = state.range(Span(known.source, line.start, line.start)).start
                 lines.append(start.line)
     while lines:
         first = last = lines.pop(0)
@@ -148,9 +149,9 @@ def _comments(known: Known, world: World) -> Iterator[tuple[int, int]]:
             yield first, last
 
 
-def selections(world: World, asked: AtPositions) -> list[Selection]:
+def selections(state: ServerState, asked: AtPositions) -> list[Selection]:
     """Return for each position what is around it: a part, its line, its section, the file."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return [Selection(Range(one, one)) for one in asked.positions]
     whole = Span(known.source, 0, len(known.source.text))
@@ -161,7 +162,7 @@ def selections(world: World, asked: AtPositions) -> list[Selection]:
         spans += [*parts, *([one.value] if one.value else []), one.comment]
     found = []
     for position in asked.positions:
-        offset = world.offset(known.source, position)
+        offset = state.offset(known.source, position)
         around = sorted(
             {(s.start, s.end) for s in spans if s.start <= offset <= s.end and s.end > s.start},
             key=lambda place: place[0] - place[1],
@@ -170,21 +171,21 @@ def selections(world: World, asked: AtPositions) -> list[Selection]:
         last = (0, len(known.source.text))
         for start, end in around:
             if last[0] <= start and end <= last[1]:
-                selected = Selection(world.range(Span(known.source, start, end)), selected)
+                selected = Selection(state.range(Span(known.source, start, end)), selected)
                 last = start, end
         found.append(selected or Selection(Range(position, position)))
     return found
 
 
-def links(world: World, asked: OfDocument) -> list[Link]:
+def links(state: ServerState, asked: OfDocument) -> list[Link]:
     """Return the types of a file that lead to other files."""
-    known = world.known(asked.text_document.uri)
-    shows_texts = world.supports("workspace", CONTENT)
+    known = state.known(asked.text_document.uri)
+    shows_texts = state.supports("workspace", CONTENT)
     found = []
     for one in elements(known.source, known.interface) if known else ():
-        source = text_of(one.target, known.state) if one.target and known else None
+        source = text_of(one.target, known.snapshot) if one.target and known else None
         # a file of the cache is only made when somebody goes there
         if source is not None and known and (shows_texts or not is_built_in(source)):
-            uri = world.location(Span(source, 0, 0), known.state).uri
-            found.append(Link(world.range(one.type), uri, f"open {one.target}"))
+            uri = state.location(Span(source, 0, 0), known.snapshot).uri
+            found.append(Link(state.range(one.type), uri, f"open {one.target}"))
     return found

@@ -18,8 +18,8 @@ from idlc.editor.features.navigation import comments
 from idlc.editor.features.structure import sections
 from idlc.editor.protocol.capabilities import MODIFIERS, TYPES
 from idlc.editor.protocol.parts import DocumentId, OfDocument, OfRange, Position, Range
-from idlc.editor.users import uses
-from idlc.editor.world import Known, World
+from idlc.editor.state import Known, ServerState
+from idlc.editor.usages import uses
 from idlc.language import tree
 from idlc.model import ir
 from idlc.model.lower_types import STRINGS
@@ -33,21 +33,21 @@ class Token(NamedTuple):
     modifiers: tuple[str, ...] = ()
 
 
-def document(world: World, asked: OfDocument) -> dict[str, list[int]]:
+def document(state: ServerState, asked: OfDocument) -> dict[str, list[int]]:
     """Return the tokens of a document."""
-    known = world.known(asked.text_document.uri)
-    return {"data": _encoded(_tokens(known), world) if known else []}
+    known = state.known(asked.text_document.uri)
+    return {"data": _encoded(_tokens(known), state) if known else []}
 
 
-def part(world: World, asked: OfRange) -> dict[str, list[int]]:
+def part(state: ServerState, asked: OfRange) -> dict[str, list[int]]:
     """Return the tokens that touch a range."""
-    known = world.known(asked.text_document.uri)
+    known = state.known(asked.text_document.uri)
     if known is None:
         return {"data": []}
-    low = world.offset(known.source, asked.range.start)
-    high = world.offset(known.source, asked.range.end)
+    low = state.offset(known.source, asked.range.start)
+    high = state.offset(known.source, asked.range.end)
     found = [one for one in _tokens(known) if one.span.start <= high and low <= one.span.end]
-    return {"data": _encoded(found, world)}
+    return {"data": _encoded(found, state)}
 
 
 def _tokens(known: Known) -> Iterator[Token]:
@@ -82,12 +82,12 @@ def _definition(one: Element) -> Iterator[Token]:
         yield Token(one.value, "string" if text else "number")
 
 
-def _encoded(found: Iterable[Token], world: World) -> list[int]:
+def _encoded(found: Iterable[Token], state: ServerState) -> list[int]:
     """Return tokens as the protocol has them: five numbers each, places from the one before."""
     data: list[int] = []
     last = Position(0, 0)
     for one in sorted(found, key=lambda token: token.span.start):
-        place = world.range(one.span)
+        place = state.range(one.span)
         start, end = place.start, place.end
         if end.line != start.line or end.character <= start.character:
             continue
@@ -103,18 +103,20 @@ def _encoded(found: Iterable[Token], world: World) -> list[int]:
 _WHOLE = Range(Position(0, 0), Position(maxsize, 0))
 
 
-def fingerprints(world: World, documents: Iterable[Document]) -> Iterator[tuple[Document, int]]:
+def fingerprints(
+    state: ServerState, documents: Iterable[Document]
+) -> Iterator[tuple[Document, int]]:
     """Yield each document with a number for their hints, lenses and tokens."""
-    counts = Counter(target for _, _, target in uses(world))
+    counts = Counter(target for _, _, target in uses(state))
     for one in documents:
         asked = DocumentId(one.uri)
         shown: list[object] = [
-            hints(world, OfRange(asked, _WHOLE)),
-            document(world, OfDocument(asked)),
-            lenses(world, OfDocument(asked)),
+            hints(state, OfRange(asked, _WHOLE)),
+            document(state, OfDocument(asked)),
+            lenses(state, OfDocument(asked)),
         ]
-        if known := world.known(one.uri):
-            model = known.state.model_of(known.interface)
+        if known := state.known(one.uri):
+            model = known.snapshot.model_of(known.interface)
             name = known.interface.name
             has_hash = model and model.distro.has_hashes
             # what the lenses say, without looking through all users for each document

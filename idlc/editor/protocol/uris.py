@@ -7,8 +7,6 @@ import re
 from pathlib import Path, PurePath
 from urllib.parse import quote, unquote, urlsplit
 
-from idlc.project.files import absolute
-
 #: Names that are no text are kept as Python keeps them.
 _ERRORS = "surrogateescape"
 
@@ -16,7 +14,8 @@ _ERRORS = "surrogateescape"
 def to_path(uri: str) -> Path | None:
     """Return the absolute path that a URI means, `None` for one that is no file's."""
     text = path_text(uri, on_windows=os.name == "nt")
-    return absolute(text) if text else None
+    # on Windows, a URI may lack the drive
+    return Path(os.path.abspath(text)) if text else None  # noqa: PTH100 - keeps links
 
 
 def path_text(uri: str, *, on_windows: bool) -> str:

@@ -170,7 +170,7 @@ MCAP_GROUP = 1 << 24
 NEAR = 1 << 15
 
 
-class Opened(NamedTuple):
+class LoadedChunk(NamedTuple):
     """A chunk whose records are in a buffer, from `start` to `stop`."""
 
     chunk: Chunk
@@ -211,7 +211,7 @@ def _read(
     buffer = np.empty(sum(head.size for _, head in group), np.uint8).data
     opened, offsets, at = [], [], 0
     for chunk, head in group:
-        entry = Opened(chunk, at, at := at + head.size)
+        entry = LoadedChunk(chunk, at, at := at + head.size)
         places = _indexed(source, entry, channels)
         _fill(source, entry, head, buffer, places, check)
         if places is None:
@@ -276,7 +276,12 @@ def _divided(source: Source, stretch: Chunk) -> Iterator[Chunk]:
 
 
 def _fill(
-    source: Source, opened: Opened, head: ChunkHead, buffer: memoryview, offsets: Any, check: bool
+    source: Source,
+    opened: LoadedChunk,
+    head: ChunkHead,
+    buffer: memoryview,
+    offsets: Any,
+    check: bool,
 ) -> None:
     """Read the records of a chunk into a buffer, or only those at `offsets` if that suffices."""
     target = buffer[opened.start : opened.stop]
@@ -307,7 +312,7 @@ def _read_some(read: Read, start: int, target: memoryview, offsets: Any) -> None
             read(start + stop, target[stop:end])
 
 
-def _indexed(source: Source, opened: Opened, channels: Collection[int]) -> Any:
+def _indexed(source: Source, opened: LoadedChunk, channels: Collection[int]) -> Any:
     """Return the offsets in the buffer of the messages of some channels; None without an index."""
     if opened.chunk.indexes is None:
         return None
@@ -341,7 +346,9 @@ def _entries(source: Source, channel: int, at: int) -> int:
     return entries
 
 
-def _walked(view: memoryview, opened: Opened, channels: Collection[int], room: Room) -> list[int]:
+def _walked(
+    view: memoryview, opened: LoadedChunk, channels: Collection[int], room: Room
+) -> list[int]:
     """Return the offsets of messages, by a walk from record to record."""
     unpack, ahead = MESSAGE_HEAD.unpack_from, MESSAGE_HEAD.size
     places, at, stop = [], opened.start, opened.stop
@@ -358,7 +365,7 @@ def _walked(view: memoryview, opened: Opened, channels: Collection[int], room: R
 
 
 def _messages(
-    buffer: memoryview, opened: list[Opened], offsets: list[Any], channels: Collection[int]
+    buffer: memoryview, opened: list[LoadedChunk], offsets: list[Any], channels: Collection[int]
 ) -> Ranges:
     """Return the messages at some offsets of a buffer; raise RecordingError for others."""
     array: Any = np.frombuffer(buffer, np.uint8)

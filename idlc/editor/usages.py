@@ -5,29 +5,31 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from idlc.diagnostics.source import Source, Span
-from idlc.editor.workspace import State
-from idlc.editor.world import World
+from idlc.editor.state import ServerState
+from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
 
 
-def states(world: World) -> Iterator[State]:
+def snapshots(state: ServerState) -> Iterator[Snapshot]:
     """Yield what is known of each folder that can be looked at."""
-    found = (project.state(world.documents) for project in world.projects.all())
-    return (state for state in found if state is not None)
+    found = (workspace.snapshot() for workspace in state.workspaces())
+    return (snapshot for snapshot in found if snapshot is not None)
 
 
-def uses(world: World) -> Iterator[tuple[State, Span, ir.TypeName]]:
+def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
     """Yield where fields name a message in their types, and which."""
-    for state in states(world):
-        for model in state.models.values():
+    for snapshot in snapshots(state):
+        for model in snapshot.models.values():
             for interface in model.own:
                 for section in derive.sections(interface):
                     for field, target in section.holders:
                         if field.type_span is not None:
-                            yield state, field.type_span, target
+                            yield snapshot, field.type_span, target
 
 
-def users(name: ir.TypeName, known: State, world: World) -> Iterator[tuple[State, Span]]:
+def users(
+    name: ir.TypeName, known: Snapshot, state: ServerState
+) -> Iterator[tuple[Snapshot, Span]]:
     """Yield where fields name the message that a folder knows by a name.
 
     Where another folder of the workspace has a message of its own by this name, that is meant.
@@ -35,20 +37,20 @@ def users(name: ir.TypeName, known: State, world: World) -> Iterator[tuple[State
     source = text_of(name, known)
     file = known.path_of(source).resolve() if source else None
     others = [
-        state
-        for state in states(world)
-        for path, (own, _) in state.interfaces.items()
+        snapshot
+        for snapshot in snapshots(state)
+        for path, (own, _) in snapshot.interfaces.items()
         if own.name == name and path.resolve() != file
     ]
-    for state, span, target in uses(world):
-        if target == name and not any(state is one for one in others):
-            yield state, span
+    for snapshot, span, target in uses(state):
+        if target == name and not any(snapshot is one for one in others):
+            yield snapshot, span
 
 
-def text_of(name: ir.TypeName, state: State) -> Source | None:
+def text_of(name: ir.TypeName, snapshot: Snapshot) -> Source | None:
     """Return the text that defines an interface."""
-    for model in state.models.values():
+    for model in snapshot.models.values():
         interface = model.interfaces.get(name)
         if interface is not None and interface.source is not None:
             return interface.source
-    return state.source(name)
+    return snapshot.source(name)

@@ -1,0 +1,140 @@
+"""The folder that paths are seen from, with the texts that an editor has open.
+
+It is passed to whatever reads files, so that nothing depends on the working folder of the process.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from idlc.diagnostics.report import Report
+from idlc.project import files, lock
+from idlc.project.files import is_file
+
+if TYPE_CHECKING:
+    from idlc.diagnostics.source import Source
+
+MANIFEST = "package.xml"
+
+
+class Root:
+    """A base folder, an absolute path, and texts by absolute path that count instead of files.
+
+    The package.xml around a folder and the locks in a folder are searched once and remembered, so
+    a root is for one run of a command, or for one load of a workspace.
+    """
+
+    def __init__(self, base: Path, texts: Mapping[Path, bytes] = MappingProxyType({})) -> None:
+        self.base = base
+        self._texts = texts
+        self._base = str(base)
+        self._above = f"{base}{os.sep}"
+        self._manifests: dict[Path, Path | None] = {}
+        self._locks: dict[Path, tuple[lock.Lock, ...]] = {}
+
+    @classmethod
+    def here(cls) -> Root:
+        """Return the root of a command: the working folder, with nothing open."""
+        return cls(Path.cwd())
+
+    @classmethod
+    def at(cls, folder: Path, texts: Mapping[Path, bytes] = MappingProxyType({})) -> Root:
+        """Return the root that a command has after `cd`; raises OSError if the folder is gone."""
+        base = folder.resolve(strict=True)
+        if not files.is_folder(base):
+            raise NotADirectoryError(str(folder))
+        return cls(base, texts)
+
+    def on_disk(self) -> Root:
+        """Return a root of the same folder in which nothing is open or remembered."""
+        return Root(self.base)
+
+    def path(self, path: str | Path) -> str:
+        """Return where to open a path; `..` after a link is left to the operating system."""
+        return os.path.join(self._base, path)  # noqa: PTH118 - a Path costs more than the look
+
+    def absolute(self, path: str | Path) -> Path:
+        """Return an absolute path without `..` and with links as they are."""
+        return Path(os.path.normpath(self.path(path)))
+
+    def shown(self, path: Path) -> str:
+        """Return a path as a person knows it: relative to the base where it is below that."""
+        whole = str(path)
+        if whole.startswith(self._above):  # as `relative_to` says, in a fraction of the time
+            return whole[len(self._above) :].replace(os.sep, "/")
+        try:
+            return path.relative_to(self.base).as_posix()
+        except ValueError:
+            return path.as_posix()
+
+    def relative(self, path: Path) -> str:
+        """Return a path as one would type it in the base, with `..` where it leads out of it.
+
+        Raises ValueError for a path on another drive.
+        """
+        return os.path.relpath(path, self._base)
+
+    def read_bytes(self, path: str | Path, name: str, report: Report) -> bytes | None:
+        """Return what counts as a file's bytes; report as `files.read_bytes` does."""
+        data = self._texts.get(self.absolute(path)) if self._texts else None
+        if data is None:
+            return files.read_bytes(Path(self.path(path)), name, report)
+        if len(data) > files.MAX_SIZE:
+            report.add(files.too_large(name))
+            return None
+        return data
+
+    def read_source(self, path: str | Path, name: str, report: Report) -> Source | None:
+        """Return what counts as a file's text; report what stands in the way."""
+        data = self.read_bytes(path, name, report)
+        return None if data is None else files.decode(data, name, report)
+
+    def is_file(self, path: str | Path) -> bool:
+        """Return whether there is such a file, on disk or only in the editor."""
+        return is_file(self.path(path)) or self.is_open(self.absolute(path))
+
+    def is_open(self, path: Path) -> bool:
+        """Return whether another text counts than that of an absolute path's file."""
+        return path in self._texts
+
+    def unsaved_below(self, folder: Path) -> Iterator[Path]:
+        """Yield what lies below an absolute folder in the editor only."""
+        for path in self._texts:
+            if path.is_relative_to(folder) and not is_file(path):
+                yield path
+
+    def manifest(self, folder: Path) -> Path | None:
+        """Return the nearest package.xml at or above an absolute folder, within its repository."""
+        if folder not in self._manifests:
+            self._manifests[folder] = _nearest_manifest(folder)
+        return self._manifests[folder]
+
+    def locks(self, folder: Path) -> tuple[lock.Lock, ...]:
+        """Return the locks of the generated packages in an absolute folder."""
+        if folder not in self._locks:
+            self._locks[folder] = tuple(_locks(folder))
+        return self._locks[folder]
+
+
+def _nearest_manifest(folder: Path) -> Path | None:
+    for here in map(str, (folder, *folder.parents)):
+        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
+        if is_file(path):
+            return Path(path)
+        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
+            break
+    return None
+
+
+def _locks(folder: Path) -> Iterator[lock.Lock]:
+    try:
+        packages = [entry for entry in folder.iterdir() if is_file(entry / lock.FILE)]
+    except OSError:
+        return
+    for package in packages:
+        if (found := lock.load_lock(package, "", Report())) is not None:
+            yield found
