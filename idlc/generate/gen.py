@@ -189,7 +189,7 @@ def named_packages(
             package = definition.interface.package
             names = library.interfaces(package) if whole else (definition.interface,)
             chosen.setdefault(package, set()).update(names)
-        libraries[package] = library
+            libraries[package] = library
     return [borrowed(types, libraries[package]) for package, types in sorted(chosen.items())]
 
 
