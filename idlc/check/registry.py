@@ -144,7 +144,8 @@ def advice() -> tuple[Rule, ...]:
 
 def package_advice() -> tuple[PackageRule, ...]:
     """Return the rules on the package of the interfaces: the tutorials' troubleshooting."""
-    from idlc.check.package import cmake, installation, manifest
+    from idlc.check.package import installation, manifest
+    from idlc.check.package.manifest import listed_dependencies
 
     return (
         PackageRule(manifest.declared_dependencies, (codes.MISSING_DEPENDENCY,)),
@@ -152,7 +153,7 @@ def package_advice() -> tuple[PackageRule, ...]:
         PackageRule(manifest.interface_group, (codes.NOT_IN_INTERFACE_GROUP,)),
         PackageRule(manifest.generators, (codes.NO_INTERFACE_GENERATORS,)),
         PackageRule(manifest.declared_imports, (codes.UNDECLARED_IMPORT,)),
-        PackageRule(cmake.listed_dependencies, (codes.MISSING_CMAKE_DEPENDENCY,)),
+        PackageRule(listed_dependencies, (codes.MISSING_CMAKE_DEPENDENCY,)),
         PackageRule(installation.installed, installation.CODES),
         PackageRule(installation.resource_marker, (codes.NO_RESOURCE_MARKER,)),
         PackageRule(installation.entry_points, (codes.BAD_ENTRY_POINT,)),

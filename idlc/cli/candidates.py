@@ -56,7 +56,7 @@ def types(
 def topics(word: str, paths: Sequence[str]) -> list[str]:
     """Return the topics of recordings that begin with a word."""
     from idlc.recordings.find import split_recordings
-    from idlc.recordings.versions import read_topics
+    from idlc.recordings.types import read_topics
 
     recordings = filter(
         None, (read_topics(path, Report()) for path in split_recordings(paths, Root.here())[0])

@@ -75,7 +75,7 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     from idlc.cli.output import progress_bar
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
-    from idlc.recordings.columns import ColumnsOptions, columns
+    from idlc.recordings.export import ColumnsOptions, columns
     from idlc.recordings.find import expanded, split_recordings
 
     report = Report()

@@ -32,7 +32,7 @@ def command(subject: str, package: str | None, include: tuple[str, ...], distro:
 
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.documents.query import describe
+    from idlc.documents.show import describe
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 

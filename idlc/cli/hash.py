@@ -42,7 +42,7 @@ def command(
     """
     from idlc.cli import output
     from idlc.diagnostics.report import Report
-    from idlc.documents.query import hashes
+    from idlc.documents.show import hashes
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
 

@@ -12,8 +12,8 @@ from idlc.cli import completion, options
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Report
+    from idlc.documents.show import TopicFacts
     from idlc.project.settings import Scope
-    from idlc.recordings.show import TopicFacts
 
 #: Characters of a hash that people compare.
 SHORT = len("RIHS01_") + 8
@@ -25,7 +25,7 @@ def show_recording(
 ) -> int:
     """Show the topics of a recording, or definitions of selected ones; return the exit status."""
     from idlc.cli import output
-    from idlc.recordings.show import definitions, topics
+    from idlc.documents.show import definitions, topics
 
     if selected:
         output.texts(definitions(path, selected, style, scope, report), style, sys.stdout)

@@ -15,8 +15,7 @@ from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
 from idlc.project.find import look, nothing_in
-from idlc.recordings.types import NAMED, LocalTypes, recorded_types
-from idlc.recordings.versions import topics_of, versions
+from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
 
 
 class RecordedVerdict(NamedTuple):

@@ -12,14 +12,14 @@ from idlc.check.package.facts import home_of
 from idlc.diagnostics.report import Report, first_few
 from idlc.diagnostics.source import Source
 from idlc.generate.package import Generated, generated, planned, up_to_date, with_needs
-from idlc.generate.requested import (
+from idlc.generate.target import (
+    Target,
     borrowed,
     completed,
     folder_targets,
     requested_packages,
     unread_idl,
 )
-from idlc.generate.target import Target
 from idlc.language.tree import OPTIONAL
 from idlc.model import ir
 from idlc.model.distros import Distro

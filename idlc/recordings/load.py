@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from idlc.check.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report, Severity
-from idlc.generate.requested import requested_packages
-from idlc.generate.target import last_change
+from idlc.generate.target import last_change, requested_packages
 from idlc.model import ir
 from idlc.model.python_names import class_
 from idlc.project.cache import cache_folder
@@ -28,8 +27,7 @@ from idlc.project.templates import RenderedFile
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
-from idlc.recordings.types import LocalTypes, RecordedTypes, recorded_types
-from idlc.recordings.versions import read_topics, versions
+from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
 from idlc.version import __version__
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Label, Report, Severity, first_few
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import including
-from idlc.generate.requested import borrowed
+from idlc.generate.target import borrowed
 from idlc.model import ir
 from idlc.project import inputs, prefixes
 from idlc.project.library import Library
@@ -22,7 +22,7 @@ from idlc.recordings.types import NAMED, LocalTypes, RecordedTypes, recorded_typ
 
 if TYPE_CHECKING:
     from idlc.model.link import Model
-from idlc.recordings.versions import Version, contradictions, read_topics, topics_of, versions
+from idlc.recordings.types import Version, contradictions, read_topics, topics_of, versions
 
 
 def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None:

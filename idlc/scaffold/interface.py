@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from idlc.check.compiler import compile_package
-from idlc.check.package.cmake import calls, dependency_edit
 from idlc.check.package.facts import folders
+from idlc.check.package.manifest import calls, dependency_edit
 from idlc.diagnostics.report import Report, apply
 from idlc.diagnostics.source import Source
 from idlc.model import catalog, derive, ir, names
@@ -15,6 +15,7 @@ from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused
 from idlc.scaffold import package
 from idlc.scaffold.changes import (
+    Project,
     Result,
     Settings,
     accepted,
@@ -26,8 +27,7 @@ from idlc.scaffold.changes import (
     templates,
     write,
 )
-from idlc.scaffold.edits import data_files
-from idlc.scaffold.project import Project
+from idlc.scaffold.edits import setup_py
 from idlc.scaffold.templates import Templates
 
 SEPARATOR = "---"
@@ -158,7 +158,7 @@ def interface_edits(
         edits[CMAKE] = add_cmake_dependencies(texts[CMAKE], needed)
         return edits
     if SETUP in texts:
-        wired = data_files.add_interfaces(texts[SETUP], model.package, keys, folders)
+        wired = setup_py.add_interfaces(texts[SETUP], model.package, keys, folders)
         edits[SETUP] = Edited(wired)
     return edits
 

@@ -17,8 +17,9 @@ from idlc.model.distros import BY_NAME, DEFAULT
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Script
 from idlc.project.prefixes import distribution, python_folders
-from idlc.scaffold import node_tests, spec
+from idlc.scaffold import spec
 from idlc.scaffold.changes import (
+    Project,
     Result,
     Settings,
     accepted,
@@ -31,10 +32,9 @@ from idlc.scaffold.changes import (
     type_name,
     write,
 )
-from idlc.scaffold.edits import data_files, launch_py, setup_py
-from idlc.scaffold.node import MAIN_MODULE, render
+from idlc.scaffold.edits import launch_py, setup_py
+from idlc.scaffold.node import MAIN_MODULE, render, render_test, test_packages
 from idlc.scaffold.package import package_view, rendered
-from idlc.scaffold.project import Project
 from idlc.scaffold.spec import Plan, plan
 from idlc.scaffold.templates import Templates
 
@@ -83,9 +83,9 @@ def node_entry(
     described = {name: texts[name] for name in setup_files if name in texts}
     if (own := tuple(keys)) and SETUP in described:
         text = described[SETUP]
-        described[SETUP] = data_files.add_interfaces(text, node.package, own, folders)
+        described[SETUP] = setup_py.add_interfaces(text, node.package, own, folders)
     path, outcome = setup_py.add_console_script(described, script)
-    tests = node_tests.packages(planned)
+    tests = test_packages(planned)
     manifest = package_xml.add_dependencies(
         texts.get(MANIFEST, ""), depends=planned.packages, tests=tests
     )
@@ -121,7 +121,7 @@ def with_launch_entry(
     edits = dict(entry.edits)
     before = edits.get(SETUP, Edited(texts.get(SETUP, "")))
     if SETUP in texts and isinstance(before, Edited):
-        edits[SETUP] = data_files.add_launch(before.text, node.package, path)
+        edits[SETUP] = setup_py.add_launch(before.text, node.package, path)
     return entry._replace(added={**entry.added, path: outcome.text}, edits=edits)
 
 
@@ -217,7 +217,7 @@ def _entry(planned: Plan, project: Project, used: Templates, *, launch: bool) ->
     own, name = planned.node.package, planned.node.name
     files = {
         f"{own}/{name}.py": render(planned, used),
-        f"test/test_{name}.py": node_tests.render(planned, used),
+        f"test/test_{name}.py": render_test(planned, used),
     }
     for path, text in files.items():
         compile(text, path, "exec", dont_inherit=True)

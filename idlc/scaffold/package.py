@@ -15,8 +15,7 @@ from idlc.model import catalog, ir
 from idlc.model.names import why_not_package
 from idlc.project.package_xml import statements
 from idlc.project.settings import load_settings, scope
-from idlc.scaffold.changes import Result, Settings, rendering, templates, write
-from idlc.scaffold.project import Project
+from idlc.scaffold.changes import Project, Result, Settings, rendering, templates, write
 from idlc.scaffold.templates import Templates
 
 VERSION = "0.1.0"

@@ -10,7 +10,7 @@ from idlc.model import ir, python_names
 from idlc.scaffold.layout import call
 
 WIDTH = 99
-INDENT = "    "
+INDENTATION = "    "
 #: Nested messages are spelled out as long as a message has at most so many values.
 LEAVES = 16
 _TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
@@ -83,7 +83,7 @@ class Line(NamedTuple):
     text: str
 
     def __str__(self) -> str:
-        return INDENT * self.depth + self.text
+        return INDENTATION * self.depth + self.text
 
 
 def constructed(
@@ -112,7 +112,7 @@ def assigned(message: ir.Message, page: Page, variable: str, depth: int) -> list
             lines = [*map(str, _construct(nested, page, head, 0, "", {}))]
         else:
             lines = [head + sample(message, field, page)]
-        if all(len(line) + depth * len(INDENT) <= WIDTH for line in lines):
+        if all(len(line) + depth * len(INDENTATION) <= WIDTH for line in lines):
             statements += [*_documented(message, field, page, depth), *lines]
     return statements
 
@@ -157,7 +157,7 @@ def _documented(message: ir.Message, field: ir.Field, page: Page, depth: int) ->
     text = " ".join(filter(None, (clean(line) for line in field.comment)))
     unit = f"[{clean(field.unit)}]" if field.unit else ""
     words = " ".join(filter(None, (text, unit)))
-    width = WIDTH - len(INDENT) * depth
+    width = WIDTH - len(INDENTATION) * depth
     return textwrap.wrap(words, width, initial_indent="# ", subsequent_indent="# ")
 
 

@@ -269,7 +269,6 @@ def test_an_interrupt_ends_it_quietly():
 @pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.look"])
 def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
     from idlc.editor.publish import diagnostics
-    from idlc.editor.server import Server
 
     def fail(*_):
         raise ZeroDivisionError("as the test asked for")

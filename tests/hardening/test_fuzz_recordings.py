@@ -26,8 +26,7 @@ from idlc.recordings.containers.container import Schema, Topic, open_recording
 from idlc.recordings.containers.messages import ALWAYS, Ranges
 from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
-from idlc.recordings.types import LocalTypes, recorded_types
-from idlc.recordings.versions import versions
+from idlc.recordings.types import LocalTypes, recorded_types, versions
 from tests.support import db3_mutations, definition_mutations, mcap_mutations
 from tests.support import recordings as made
 from tests.support.paths import ROOT

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from idlc.diagnostics.report import Report
-from idlc.generate.requested import requested_packages
+from idlc.generate.target import requested_packages
 from idlc.model.ir import TypeName
 from idlc.project.find import find
 from idlc.project.library import Library

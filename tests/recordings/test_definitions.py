@@ -19,8 +19,7 @@ from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
 from idlc.recordings.definitions import recorded, type_name
-from idlc.recordings.types import LocalTypes, recorded_types
-from idlc.recordings.versions import contradictions, versions
+from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import idlc
-from idlc.recordings.times import moment
+from idlc.recordings.recording import moment
 from tests.support import recordings as made
 
 START = 1_700_000_000_000_000_000

@@ -49,8 +49,7 @@ READS_ITS_OWN = {"idlc.language.grammar", "idlc.language.idl", "idlc.model.catal
 PRINTS = {
     "idlc.build": "a build that pip or colcon runs has no other way to say why it stops",
     "idlc.build.hooks": "the same",
-    "idlc.recordings.columns": "a table goes to standard output where `-o -` says so",
-    "idlc.recordings.export": "the same",
+    "idlc.recordings.export": "a table goes to standard output where `-o -` says so",
 }
 
 #: What runtime modules may import besides the standard library and each other, and only inside

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from idlc.diagnostics.report import Report
-from idlc.documents.query import describe
+from idlc.documents.show import describe
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 

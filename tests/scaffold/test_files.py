@@ -8,7 +8,7 @@ from catkin_pkg.package import parse_package_string
 from idlc.project import package_xml
 from idlc.project.edits import Edited, Outcome, Refused, Script
 from idlc.scaffold import interface
-from idlc.scaffold.edits import data_files, launch_py
+from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.edits.setup_py import add_console_script
 
 TALKING = launch_py.Started("demo", "talker")
@@ -235,12 +235,12 @@ def test_what_is_refused_outside_of_setup_py(files, path):
 
 def test_a_launch_file_is_installed_if_none_was():
     text = SETUP.replace("setup(", "setup(data_files=[('share/demo', ['package.xml'])], ")
-    after = text_of(data_files.add_launch(text, "demo", "launch/demo_launch.py"))
+    after = text_of(setup_py.add_launch(text, "demo", "launch/demo_launch.py"))
     assert "('share/demo/launch', ['launch/demo_launch.py'])]" in after
-    assert data_files.add_launch(after, "demo", "launch/demo_launch.py") == Edited(after)
-    assert data_files.add_launch(SETUP, "demo", "launch/demo_launch.py") == Edited(SETUP)
+    assert setup_py.add_launch(after, "demo", "launch/demo_launch.py") == Edited(after)
+    assert setup_py.add_launch(SETUP, "demo", "launch/demo_launch.py") == Edited(SETUP)
     computed = SETUP.replace("setup(", "setup(data_files=files(), ")
-    assert isinstance(data_files.add_launch(computed, "demo", "launch/demo_launch.py"), Refused)
+    assert isinstance(setup_py.add_launch(computed, "demo", "launch/demo_launch.py"), Refused)
 
 
 CLASSIC = """\

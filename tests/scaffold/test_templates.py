@@ -12,7 +12,7 @@ import pytest
 from idlc.cli.main import main
 from idlc.scaffold import templates
 from idlc.scaffold.node import NodeView
-from idlc.scaffold.node_tests import TestView as ViewOfTest
+from idlc.scaffold.node import TestView as ViewOfTest
 from idlc.scaffold.package import Package
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.roles.role import Part

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idlc.check.package.cmake import GENERATE, calls
+from idlc.check.package.manifest import GENERATE, calls
 from idlc.diagnostics.report import Report
 from idlc.project import lock
 from idlc.project.find import CLOSING, KINDS, SKIPPED, Exclusions

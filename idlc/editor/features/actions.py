@@ -12,7 +12,7 @@ from idlc.check.run import tidied
 from idlc.check.select import REMARK
 from idlc.diagnostics.report import Diagnostic, Edit, Severity, apply
 from idlc.diagnostics.source import Span
-from idlc.editor.edits import differences, of_documents, workspace_edit
+from idlc.editor.elements import differences, of_documents, workspace_edit
 from idlc.editor.features import commands
 from idlc.editor.features.rename import can_move_files
 from idlc.editor.protocol.capabilities import RENAME_FILE, UPDATE_KIND

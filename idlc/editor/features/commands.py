@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from idlc.diagnostics.report import Report, Severity, first_few
-from idlc.editor.edits import workspace_edit
+from idlc.editor.elements import workspace_edit
 from idlc.editor.features import rename
 from idlc.editor.protocol import capabilities
 from idlc.editor.protocol.capabilities import UPDATE_GENERATED

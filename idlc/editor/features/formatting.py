@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from idlc.check.format import laid_out
 from idlc.diagnostics.report import Report
-from idlc.editor.edits import differences
+from idlc.editor.elements import differences
 from idlc.editor.protocol.parts import AtPosition, OfDocument, OfRange, TextEdit
 from idlc.editor.state import ServerState
 

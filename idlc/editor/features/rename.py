@@ -9,14 +9,13 @@ from pathlib import Path
 
 import msgspec
 
-from idlc.check.package.cmake import calls
+from idlc.check.package.manifest import calls
 from idlc.compare.changes import LEVELS, Change
 from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
-from idlc.editor.edits import document_edit, of_documents
-from idlc.editor.elements import Element, spot
+from idlc.editor.elements import Element, document_edit, of_documents, spot
 from idlc.editor.features.navigation import mentions
 from idlc.editor.protocol import uris
 from idlc.editor.protocol.framing import REQUEST_FAILED, RequestError

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from struct import pack
 
-from idlc.generate.native import aarch64, x86_64
+from idlc.generate.native import machines
 from idlc.generate.native.elf import Image, Machine, Place, shared_library
 from idlc.generate.native.layouts import (
     LAYOUTS,
@@ -109,7 +109,7 @@ class Descriptions:
         return first, len(rows), len(rows)
 
 
-MACHINES = {"x86_64": x86_64.MACHINE, "aarch64": aarch64.MACHINE}
+MACHINES = {"x86_64": machines.X86_64, "aarch64": machines.AARCH64}
 
 AUTHOR = b"idlc"
 OWN = "rosidl_typesupport_cpp"

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
 
-from idlc.generate.python import documentation, fields, lines
+from idlc.generate.python import fields, lines
 from idlc.generate.python.fields import FieldView, Naming
 from idlc.generate.python.imports import References
 from idlc.generate.python.lines import (
@@ -120,7 +120,7 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     name: str
-    docstring: documentation.Docstring
+    docstring: fields.Docstring
     match_args: str
     constants: tuple[ConstantView, ...]
     fields: tuple[FieldView, ...]
@@ -162,7 +162,7 @@ def message(
     doubt = views[0].doubt if views else ()
     return MessageView(
         name=references.name(structure.name),
-        docstring=documentation.message(structure, purposes[structure.name], entries, file),
+        docstring=fields.message(structure, purposes[structure.name], entries, file),
         match_args="\n".join(layout_lines(names, 4, "__match_args__ = ")).partition(" = ")[2],
         constants=tuple(_constants(structure, file)),
         fields=views,
@@ -178,8 +178,8 @@ def message(
 def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
     for constant in structure.constants:
         statement = assign(constant.name, lines.scalar(constant.type, constant.value), 4)
-        words = documentation.words(constant)
-        yield ConstantView(_statement(statement), documentation.attribute(constant, words, file))
+        words = fields.field_words(constant)
+        yield ConstantView(_statement(statement), fields.attribute(constant, words, file))
     for field in structure.fields:
         if field.default:
             yield ConstantView(_statement(fields.default_constant(field)))

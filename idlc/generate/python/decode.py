@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
-from idlc.generate.python.position import START, Cursor
-from idlc.generate.python.statements import Block, Emitter, Line, Statement, Tables
+from idlc.generate.python.positions import START, Block, Cursor, Emitter, Line, Statement, Tables
 from idlc.model import ir
 from idlc.wire import plan
 from idlc.wire.layout import multiple_of

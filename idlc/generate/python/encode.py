@@ -14,10 +14,19 @@ from functools import lru_cache
 
 import msgspec
 
-from idlc.generate.python import statements
 from idlc.generate.python.lines import Comprehension, Group, Node, call, tuple_of
-from idlc.generate.python.position import Position, aligned_to_8
-from idlc.generate.python.statements import Emitter, Note, Put, Tables
+from idlc.generate.python.positions import (
+    Block,
+    Emitter,
+    Line,
+    Note,
+    Position,
+    Put,
+    Tables,
+    aligned_to_8,
+    function,
+    prune,
+)
 from idlc.wire import plan
 from idlc.wire.layout import Alignment, multiple_of
 
@@ -168,8 +177,8 @@ def encode(steps: tuple[plan.Step, ...], tables: Tables, indent: int) -> list[st
     for step in steps:
         encoder.step(step)
     encoder.flush(1)
-    body = statements.prune(tuple(encoder.body), NONE)
-    return statements.function(body, indent, tuple(encoder.again))
+    body = prune(tuple(encoder.body), NONE)
+    return function(body, indent, tuple(encoder.again))
 
 
 class _Encoder(PackBuilder):
@@ -220,8 +229,8 @@ class _Encoder(PackBuilder):
 
     def check(self, condition: str, problem: str) -> None:
         """Emit a check; `validate` finds the field and the words afterwards."""
-        raised = statements.Line(f'raise ValueError("{problem}")')
-        self.body.append(statements.Block(f"if {condition}:", (raised,)))
+        raised = Line(f'raise ValueError("{problem}")')
+        self.body.append(Block(f"if {condition}:", (raised,)))
 
     def bound(self, count: str, bound: int | None) -> None:
         """Check a sequence's upper limit."""
@@ -249,9 +258,9 @@ class _Encoder(PackBuilder):
             self.line(f"len({local})" + (f" // {step.unit}" if step.unit > 1 else ""), count)
         else:
             self.line(step.place.text, local)
-            converted = statements.Line(call(self.tables.sequence_writer(step), local), local)
+            converted = Line(call(self.tables.sequence_writer(step), local), local)
             array = self.tables.function("array", "array_of(order)")
-            self.body.append(statements.Block(f"if type({local}) is not {array}:", (converted,)))
+            self.body.append(Block(f"if type({local}) is not {array}:", (converted,)))
             self.line(f"len({local})", count)
             self.again.append(f"len({local}) != {count}")
         self.bound(count, step.bound)
@@ -290,8 +299,8 @@ class _Encoder(PackBuilder):
             for name in (place.local for place in places)
             for part in (f"{sized}[len({name})]", name, f"{ended}[len({name})]")
         ]
-        lines = [statements.Line(place.text, place.local) for place in places]
-        lines.append(statements.Line(tuple_of(*parts), rows, "+="))
+        lines = [Line(place.text, place.local) for place in places]
+        lines.append(Line(tuple_of(*parts), rows, "+="))
         loop = f"for {step.item} in {local}"
         values = tuple_of(*(place.text for place in places))
         each = self.tables.local("each")
@@ -299,9 +308,9 @@ class _Encoder(PackBuilder):
         unsized = call(self.tables.function("unsized", "unsized"), texts)
         self.line(step.place.text, local)
         self.line("[]", f"{rows}: list[str]")
-        attempt = statements.Block("try:", (statements.Block(f"{loop}:", tuple(lines)),))
-        instead = statements.Block("except IndexError:", (statements.Line(unsized, rows),))
-        self.body.append(statements.Block(f"if len({local}):", (attempt, instead)))
+        attempt = Block("try:", (Block(f"{loop}:", tuple(lines)),))
+        instead = Block("except IndexError:", (Line(unsized, rows),))
+        self.body.append(Block(f"if len({local}):", (attempt, instead)))
         self.count(step, f"len({rows}) // {len(parts)}")
         self.flush(4)
         self.pad(4)
