@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 import sys
-
-import msgspec
-
-from idlc.check import select
-from idlc.check.run import Checked, CheckOptions, check
-from idlc.cli import output, reports
-from idlc.diagnostics.report import Report
-from idlc.project.root import Root
-from idlc.project.settings import load_settings, scope
+from typing import NamedTuple
 
 
-class CheckArguments(msgspec.Struct, frozen=True):
+class CheckArguments(NamedTuple):
     """The arguments besides paths; `select` and `ignore` are lists of rules with commas."""
 
     select: str | None = None
@@ -32,10 +24,17 @@ class CheckArguments(msgspec.Struct, frozen=True):
 
 def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None) -> int:
     """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
+    from idlc.check.run import Checked, CheckOptions, check
+    from idlc.check.select import selection
+    from idlc.cli import output, reports
+    from idlc.diagnostics.report import Report
+    from idlc.project.root import Root
+    from idlc.project.settings import load_settings, scope
+
     arguments = arguments or CheckArguments()
     report = Report()
     settings = load_settings(Root.here(), report)
-    configured = select.selection(settings, report)
+    configured = selection(settings, report)
     chosen = configured.with_lists(arguments.select, arguments.ignore)
     checked = Checked(())
     if arguments.prefix is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,8 @@ _OURS = b"idlc.cli.main"
 
 def program() -> str:
     """Return `idlc` if that is this program, else another name for it."""
+    import shutil
+
     for name in ("idlc", "rosidlc"):
         path = shutil.which(name)
         if path and _is_ours(Path(path)):

@@ -17,7 +17,7 @@ from idlc.editor.protocol import uris
 from idlc.editor.protocol.parts import Change, DocumentItem, Range
 from idlc.editor.protocol.positions import in_lines, lines_of
 from idlc.model import ir
-from idlc.project.cache import cache_folder
+from idlc.project.files import cache_folder
 from idlc.project.find import KINDS
 from idlc.project.lock import digest
 from idlc.project.root import Root

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import signal
 import sys
-import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import apply
@@ -21,15 +20,72 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Edit, Report
     from idlc.project.root import Root
 
+#: All runs of a user's wait for one another, wherever they write: they take milliseconds.
+_MUTEX = "Local\\idlc-writes"
+_WAITED = 258
+_SYNCHRONIZE = 0x100000
+_ACCESS_DENIED = 5
+#: Seconds between attempts to move over a file that a scanner or an editor has open.
+PAUSES = (0.01, 0.05, 0.2, 0.5)
+
+
+def _kernel() -> Any:
+    import ctypes
+
+    kernel: Any = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined]
+    for name in ("CreateMutexW", "OpenProcess"):
+        getattr(kernel, name).restype = ctypes.c_void_p
+    return kernel
+
+
+@contextlib.contextmanager
+def only_writer_on_windows() -> Iterator[None]:
+    """Wait until no other run writes, and let none begin meanwhile; ends with the process."""
+    import ctypes
+
+    kernel = _kernel()
+    handle = ctypes.c_void_p(kernel.CreateMutexW(None, False, _MUTEX))
+    # in short steps, between which Ctrl-C is heard
+    while kernel.WaitForSingleObject(handle, 100) == _WAITED:
+        pass
+    try:
+        yield
+    finally:
+        kernel.ReleaseMutex(handle)
+        kernel.CloseHandle(handle)
+
+
+def is_running_on_windows(number: int) -> bool:
+    """Return whether there is a process of this number, which may be somebody else's."""
+    import ctypes
+
+    kernel = _kernel()
+    process = kernel.OpenProcess(_SYNCHRONIZE, False, number)
+    if not process:
+        return bool(ctypes.get_last_error() == _ACCESS_DENIED)  # type: ignore[attr-defined]
+    handle = ctypes.c_void_p(process)
+    running = kernel.WaitForSingleObject(handle, 0) == _WAITED
+    kernel.CloseHandle(handle)
+    return bool(running)
+
+
+def replace_patiently(path: str, target: str) -> None:
+    """Move a file over another one; wait a little for those who have that open."""
+    for pause in PAUSES:
+        with contextlib.suppress(PermissionError):
+            os.replace(path, target)  # noqa: PTH105 - as everywhere in a transaction
+            return
+        time.sleep(pause)
+    os.replace(path, target)  # noqa: PTH105
+
+
 _WRITING = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
 
 
 def move_over(path: str, target: str) -> None:
     """Move a file over another one."""
     if sys.platform == "win32":
-        from idlc.project import windows
-
-        windows.replace(path, target)
+        replace_patiently(path, target)
     else:
         os.replace(path, target)  # noqa: PTH105 - a Path costs as much as moving
 
@@ -68,9 +124,7 @@ def alone(folder: Path) -> Iterator[None]:
     """
     place = _nearest(folder)
     if sys.platform == "win32" and not _held:
-        from idlc.project import windows
-
-        with windows.alone(), _holding(place):
+        with only_writer_on_windows(), _holding(place):
             yield
         return
     if sys.platform == "win32" or place in _held:
@@ -169,6 +223,9 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     A link stays one, and the file that it leads to is replaced. What somebody else made of the
     file since it was read stays.
     """
+    import shutil
+    import tempfile
+
     target = path.resolve()
     try:
         if target.read_bytes() != old.encode("utf-8"):

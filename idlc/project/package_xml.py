@@ -8,7 +8,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from xml.parsers import expat
-from xml.sax.saxutils import escape
 
 import msgspec
 
@@ -319,6 +318,8 @@ def _manifest(data: bytes) -> Manifest | None:
 
 
 def _depend(name: str, tag: str) -> str:
+    from xml.sax.saxutils import escape
+
     return f"<{tag}>{escape(name)}</{tag}>"
 
 

@@ -11,7 +11,7 @@ import jinja2
 import msgspec
 
 from idlc.diagnostics.text import printable
-from idlc.project.cache import cache_folder
+from idlc.project.files import cache_folder
 
 _PACKAGE = Path(__file__).parents[1]
 

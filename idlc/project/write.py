@@ -212,9 +212,9 @@ def _in_use(stage: Path) -> bool:
     if not number.isdigit() or int(number) == os.getpid():
         return False
     if sys.platform == "win32":
-        from idlc.project import windows
+        from idlc.project import atomic
 
-        return windows.is_running(int(number))
+        return atomic.is_running_on_windows(int(number))
     try:
         os.kill(int(number), 0)
     except ProcessLookupError:

@@ -18,7 +18,7 @@ from idlc.diagnostics.report import Report, Severity
 from idlc.generate.target import last_change, requested_packages
 from idlc.model import ir
 from idlc.model.python_names import class_
-from idlc.project.cache import cache_folder
+from idlc.project.files import cache_folder
 from idlc.project.find import is_path
 from idlc.project.library import resolve
 from idlc.project.root import Root

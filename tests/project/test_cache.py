@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from idlc.project.cache import cache_folder
+from idlc.project.files import cache_folder
 
 WITH_CACHE = {"PYTHONDONTWRITEBYTECODE": ""}
 

@@ -22,7 +22,7 @@ import pytest
 from idlc.cli import exit_status
 from idlc.cli.main import main
 from idlc.diagnostics import formats
-from idlc.project import atomic, lock, windows
+from idlc.project import atomic, lock
 from idlc.project import write as transaction
 from tests.support import programs
 from tests.support.files import write
@@ -105,7 +105,7 @@ def test_the_lock_of_windows(kernel, tmp_path):
     entered = threading.Event()
 
     def other():
-        with windows.alone():
+        with atomic.only_writer_on_windows():
             entered.set()
 
     with atomic.alone(tmp_path / "a"):
@@ -140,7 +140,7 @@ def test_a_file_that_is_open_for_a_moment_is_replaced(tmp_path, monkeypatch):
         real(source, target)
 
     monkeypatch.setattr(os, "replace", replace)
-    monkeypatch.setattr(windows.time, "sleep", lambda _: None)
+    monkeypatch.setattr(atomic.time, "sleep", lambda _: None)
     write(tmp_path / "demo/msg/A.msg", "int8 a\n")
     monkeypatch.chdir(tmp_path)
     assert main(["gen", "demo", "-o", "out/demo"]) == 0
@@ -157,7 +157,7 @@ def test_a_file_that_stays_open_is_told_and_nothing_changes(tmp_path, monkeypatc
         raise PermissionError(13, "Access is denied")
 
     monkeypatch.setattr(os, "replace", replace)
-    monkeypatch.setattr(windows.time, "sleep", lambda _: None)
+    monkeypatch.setattr(atomic.time, "sleep", lambda _: None)
     write(tmp_path / "demo/msg/A.msg", "int8 a\n")
     monkeypatch.chdir(tmp_path)
     assert main(["gen", "demo", "-o", "out/demo"]) == 2
