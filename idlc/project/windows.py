@@ -1,4 +1,4 @@
-"""What Windows does otherwise: runs that wait for one another, processes, files that are open.
+"""Differences of Windows: runs that wait for one another, processes, files that are open.
 
 It is called, and imported, where `sys.platform` is "win32" only.
 """
