@@ -42,7 +42,7 @@ class Document:
 
     @property
     def data(self) -> bytes:
-        """What a file would hold; halves of characters, which no file can hold, become `?`."""
+        """The content of a file with this text; lone surrogates become `?`."""
         return self.text.encode("utf-8", errors="replace")
 
     def is_on_disk(self) -> bool:

@@ -1,4 +1,4 @@
-"""What stands at a place of an interface file."""
+"""The elements of an interface file, and the one at a position."""
 
 from __future__ import annotations
 

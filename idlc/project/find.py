@@ -137,7 +137,7 @@ def is_path(text: str, root: Root) -> bool:
 
 
 class Found(msgspec.Struct, frozen=True):
-    """What paths mean: interface files, each once, sorted, and the folders of packages.
+    """The files below some paths: interface files, each once, sorted, and the folders of packages.
 
     `empty` are the given folders without interface files, `folders` all that were looked into, by
     absolute path, with their status from before that.
@@ -340,9 +340,9 @@ def stamps(paths: Iterable[Path]) -> dict[str, Stamp]:
 
 
 class Picture:
-    """What folders were before they were listed, and files when they were read: absolute paths.
+    """The stamps of folders before they were listed, and of files when they were read.
 
-    That began at a time in nanoseconds.
+    All paths are absolute. Reading began at a time in nanoseconds.
     """
 
     def __init__(

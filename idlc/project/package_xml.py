@@ -79,7 +79,7 @@ class Facts(msgspec.Struct, frozen=True):
 
     @property
     def build_type(self) -> str:
-        """What builds it; CMake unless it says otherwise."""
+        """The build type; CMake unless package.xml has another."""
         return next(iter(self.declared("build_type")), "ament_cmake")
 
     @property

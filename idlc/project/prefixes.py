@@ -1,4 +1,4 @@
-"""What is installed in a prefix: the packages with interfaces, and their libraries."""
+"""The content of install prefixes: the packages with interfaces, and their libraries."""
 
 from __future__ import annotations
 

@@ -95,7 +95,9 @@ class Root:
 
     def is_file(self, path: str | Path) -> bool:
         """Return whether there is such a file, on disk or only in the editor."""
-        return is_file(self.path(path)) or self.is_open(self.absolute(path))
+        if is_file(self.path(path)):
+            return True
+        return bool(self._texts) and self.absolute(path) in self._texts
 
     def is_open(self, path: Path) -> bool:
         """Return whether another text counts than that of an absolute path's file."""

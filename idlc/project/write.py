@@ -104,7 +104,7 @@ def plan(
 
 
 class Ground(enum.Enum):
-    """What there is where a file is to be written, replaced or removed."""
+    """The file in a place that is to be written, replaced or removed."""
 
     OWN = "nothing, or what idlc wrote"
     EDITED = "what idlc wrote, edited since"

@@ -1,4 +1,4 @@
-"""What can be done about problems: fixes, other words, and remarks that silence them."""
+"""Actions on problems: fixes, other words, and remarks that silence them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may come next in a line: types, names, values, units and codes.
+"""Completions of a line: types, names, values, units and codes.
 
 Only the line and the lists of what there is are looked at, so that it comes while one types.
 """
@@ -118,7 +118,10 @@ class Items(Part, frozen=True, omit_defaults=False):
 
 
 class Typed(NamedTuple):
-    """What was typed of a line, and where; `undeclared` is what is known of packages so far."""
+    """The beginning of a line, and its place.
+
+    `undeclared` is whether package.xml lacks each of the packages that were looked up so far.
+    """
 
     document: Document
     path: Path

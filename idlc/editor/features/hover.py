@@ -1,4 +1,4 @@
-"""What a definition or type is, in words: comment, unit, range, default, bytes, hash."""
+"""Descriptions of definitions and types: comment, unit, range, default, bytes, hash."""
 
 from __future__ import annotations
 

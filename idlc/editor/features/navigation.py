@@ -113,7 +113,7 @@ class Highlight(Part, frozen=True):
 
 
 class Thing(NamedTuple):
-    """What a place is about: a definition, or the interface of that name."""
+    """The subject of a position: a definition, or the interface of that name."""
 
     known: Known
     name: ir.TypeName

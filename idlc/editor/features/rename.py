@@ -47,7 +47,7 @@ _CANNOT_MOVE = (
 
 
 class Renamed(Part, frozen=True):
-    """What would be renamed."""
+    """The range and the name that would be renamed."""
 
     range: Range
     placeholder: str

@@ -1,4 +1,4 @@
-"""What client and server can do, as they say it to each other."""
+"""The capabilities of client and server, as they tell them to each other."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ Number = Annotated[int, Meta(ge=0)]
 
 
 class Part(msgspec.Struct, rename="camel", omit_defaults=True, frozen=True):
-    """What all parts of messages have in common: camel case, and only what is not a default."""
+    """A part of a message, encoded in camel case and without values that are defaults."""
 
 
 class Position(Part, frozen=True):
@@ -82,13 +82,13 @@ class DidChange(Part, frozen=True):
 
 
 class OfDocument(Part, frozen=True):
-    """What is asked about a document as a whole."""
+    """The parameters of a request about a whole document."""
 
     text_document: DocumentId
 
 
 class PreviousResult(Part, frozen=True):
-    """What was answered on a document before."""
+    """An earlier answer on a document."""
 
     uri: str
     value: str
@@ -101,21 +101,21 @@ class AskedWorkspace(Part, frozen=True):
 
 
 class AtPosition(Part, frozen=True):
-    """What is asked about a place in a document."""
+    """The parameters of a request about a position in a document."""
 
     text_document: DocumentId
     position: Position
 
 
 class AtPositions(Part, frozen=True):
-    """What is asked about several places of a document."""
+    """The parameters of a request about several positions in a document."""
 
     text_document: DocumentId
     positions: tuple[Position, ...]
 
 
 class Action(Part, frozen=True):
-    """What a lens does, or only says if there is no command."""
+    """The command of a lens, or only its text if there is no command."""
 
     title: str
     command: str
@@ -131,14 +131,14 @@ class Lens(Part, frozen=True):
 
 
 class OfRange(Part, frozen=True):
-    """What is asked about a part of a document."""
+    """The parameters of a request about a range of a document."""
 
     text_document: DocumentId
     range: Range
 
 
 class ReferenceContext(Part, frozen=True):
-    """Whether the place of the definition is asked for as well."""
+    """The context of a request for references, which may include the definition."""
 
     include_declaration: bool = True
 
@@ -216,7 +216,7 @@ class Folder(Part, frozen=True):
 
 
 class Initialize(Part, frozen=True):
-    """What a client says of itself."""
+    """A client's capabilities, settings and folders."""
 
     process_id: int | None = None
     root_uri: str | None = None
