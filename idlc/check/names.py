@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import keyword
 
-from idlc.check.sections import sections
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Label, Report
 from idlc.model import derive, ir, names
-from idlc.model.link import Model
+from idlc.model.link import Model, own_sections
 
 
 def package_name(model: Model, report: Report) -> None:
@@ -46,7 +45,7 @@ def interface_names(model: Model, report: Report) -> None:
 
 def unique_fields(model: Model, report: Report) -> None:
     """No structure has two fields of one name."""
-    for message in sections(model):
+    for message in own_sections(model):
         first: dict[str, ir.Field] = {}
         for field in message.fields:
             earlier = first.setdefault(field.name, field)
@@ -63,7 +62,7 @@ def unique_fields(model: Model, report: Report) -> None:
 
 def unique_constants(model: Model, report: Report) -> None:
     """No structure has two constants of one name."""
-    for message in sections(model):
+    for message in own_sections(model):
         first: dict[str, ir.Constant] = {}
         for constant in message.constants:
             earlier = first.setdefault(constant.name, constant)
@@ -127,7 +126,7 @@ _RENAME = "rename it if C or C++ code may ever use this package"
 
 def reserved_field_names(model: Model, report: Report) -> None:
     """Fields are not called like words of Python, C or C++."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             if field.name_span is None:
                 continue
@@ -162,7 +161,7 @@ def _native_clash(name: str) -> tuple[codes.Code, str] | None:
 
 def reserved_constant_names(model: Model, report: Report) -> None:
     """Constants are not called like macros of the C standard library."""
-    for message in sections(model):
+    for message in own_sections(model):
         for constant in message.constants:
             if constant.name in _MACROS and constant.name_span:
                 text = f"`{constant.name}` is a macro; what rosidl generates does not compile"
@@ -195,7 +194,7 @@ def reserved_package_name(model: Model, report: Report) -> None:
 
 def derived_suffixes(model: Model, report: Report) -> None:
     """Messages whose names look derived are not used as the type of a field."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             element = ir.element_of(field.type)
             if not isinstance(element, ir.Ref) or field.type_span is None:

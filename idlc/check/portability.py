@@ -8,7 +8,6 @@ from collections.abc import Iterator
 
 import msgspec
 
-from idlc.check.sections import sections
 from idlc.check.style import REMARK, is_unit
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Report, first_few
@@ -16,13 +15,13 @@ from idlc.diagnostics.source import Span
 from idlc.language.escapes import plain_meaning
 from idlc.model import catalog, ir, lower_types
 from idlc.model.comments import brackets
-from idlc.model.link import Model
+from idlc.model.link import Model, own_sections
 from idlc.model.lower_values import BACKSLASH_HINT, FLOAT32_MAX
 
 
 def constants_and_defaults(model: Model, report: Report) -> None:
     """Values reach every language as they are written."""
-    for message in sections(model):
+    for message in own_sections(model):
         for constant in message.constants:
             if constant.value_span is not None:
                 report.extend(_problems(constant.value, constant.type, constant.value_span))
@@ -105,7 +104,7 @@ _INSTEAD = {
 
 def wide_strings(model: Model, report: Report) -> None:
     """`wstring` is not used: its encoding differs between middlewares and platforms."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             if _is_string(field.type, wide=True) and field.type_span:
                 report.add(
@@ -124,7 +123,7 @@ def _is_string(type_: ir.FieldType, *, wide: bool) -> bool:
 
 def chars(model: Model, report: Report) -> None:
     """`char` is not used: it is a uint8 that looks like a text."""
-    for message in sections(model):
+    for message in own_sections(model):
         spans = [field.type_span for field in message.fields if _is_char(field.type)]
         spans += [
             _constant_type(constant) for constant in message.constants if _is_char(constant.type)
@@ -164,7 +163,7 @@ def _constant_type(constant: ir.Constant) -> Span | None:
 
 def nested_bounds(model: Model, report: Report) -> None:
     """Bounded texts are not elements of arrays: no middleware checks their length there."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             element = ir.element_of(field.type)
             bound = element.bound if isinstance(element, ir.String) else None
@@ -180,7 +179,7 @@ def nested_bounds(model: Model, report: Report) -> None:
 
 def several_units(model: Model, report: Report) -> None:
     """A comment has one unit: of several pairs of brackets, ROS 2 takes none as the unit."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             text = "\n".join(field.comment)
             contents = [content for _, content in brackets(text)]
@@ -233,7 +232,7 @@ def changed_types(model: Model, report: Report) -> None:
 
 def _used(model: Model) -> Iterator[tuple[ir.TypeName, Span]]:
     """Yield the messages of other packages that fields hold, with the range of their names."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             element, span = ir.element_of(field.type), field.type_span
             if span is None or not isinstance(element, ir.Ref):

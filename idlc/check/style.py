@@ -7,13 +7,12 @@ from collections import Counter
 from collections.abc import Iterable
 from itertools import islice
 
-from idlc.check.sections import sections
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Span
 from idlc.model import derive, ir
 from idlc.model.comments import brackets
-from idlc.model.link import Model
+from idlc.model.link import Model, own_sections
 
 # the lengths are bounded, or a long comment without an end would take for ever
 REMARK = re.compile(r"idlc:\s{0,20}ignore\[[^\]]{0,200}\]")
@@ -210,7 +209,7 @@ def documented_interfaces(model: Model, report: Report) -> None:
 
 def documented_fields(model: Model, report: Report) -> None:
     """Every field has a comment or a unit."""
-    for message in sections(model):
+    for message in own_sections(model):
         for field in message.fields:
             if not field.comment and not unit_of(field) and field.name_span:
                 report.add(
@@ -225,7 +224,7 @@ def documented_fields(model: Model, report: Report) -> None:
 def _quantities(model: Model) -> Iterable[ir.Field]:
     """Return the fields that hold floating-point numbers."""
     floats = (ir.Primitive("float32"), ir.Primitive("float64"))
-    for message in sections(model):
+    for message in own_sections(model):
         yield from (field for field in message.fields if ir.element_of(field.type) in floats)
 
 
@@ -265,7 +264,7 @@ def unusual_units(model: Model, report: Report) -> None:
 
 def constant_prefixes(model: Model, report: Report) -> None:
     """Constants that are values of one thing share the first word of their names."""
-    for message in sections(model):
+    for message in own_sections(model):
         firsts = Counter(constant.name.partition("_")[0] for constant in message.constants)
         names = {word.upper() for field in message.fields for word in field.name.split("_")}
         whole = [constant for constant in message.constants if isinstance(constant.value, int)]

@@ -115,7 +115,7 @@ def _show(
     typed: BreakingArguments,
 ) -> None:
     from idlc.check.run import Checked
-    from idlc.cli import output, reports
+    from idlc.cli import output
     from idlc.diagnostics.formats import notice
 
     style = typed.style
@@ -130,7 +130,7 @@ def _show(
         if verdict:
             sys.stdout.write(f"{_summary(verdict, typed.levels)}\n")
     else:
-        reports.write(report, style, Checked(()), sys.stdout, command="breaking")
+        output.write_report(report, style, Checked(()), sys.stdout, command="breaking")
         if style == "github" and verdict:
             sys.stdout.write(notice("idlc breaking", _summary(verdict, typed.levels)))
 

@@ -26,7 +26,7 @@ def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None)
     """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
     from idlc.check.run import Checked, CheckOptions, check
     from idlc.check.select import selection
-    from idlc.cli import output, reports
+    from idlc.cli import output
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.project.settings import load_settings, scope
@@ -57,7 +57,9 @@ def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None)
         )
         checked = check(options, report)
     numbers, strict = arguments.statistics, arguments.strict
-    reports.write(report, arguments.style, checked, sys.stdout, numbers=numbers, strict=strict)
+    output.write_report(
+        report, arguments.style, checked, sys.stdout, numbers=numbers, strict=strict
+    )
     return output.status(report) or int(arguments.strict and bool(len(report)))
 
 

@@ -48,13 +48,13 @@ def _document(
     report: Report, style: str, packages: Sequence[Generated] = (), *, check: bool = False
 ) -> None:
     """Write the outcome in a format for programs."""
-    from idlc.cli import output, reports
+    from idlc.cli import output
 
     if style != "json":
         from idlc.check.run import Checked  # with its rules, which a run does without
 
         folders = tuple(package.out for package in packages)
-        reports.write(report, style, Checked(folders), sys.stdout, command="gen")
+        output.write_report(report, style, Checked(folders), sys.stdout, command="gen")
         return
     output.show(report, style, sys.stdout)
     for package in packages:

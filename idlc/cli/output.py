@@ -7,11 +7,16 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from idlc.diagnostics import codes, terminal
 from idlc.diagnostics.report import Report, Severity
+from idlc.diagnostics.terminal import MANY, counted, statistics, summary
 from idlc.diagnostics.text import one_line, visible
+from idlc.version import __version__
+
+if TYPE_CHECKING:
+    from idlc.check.run import Checked
 
 #: The text in our console scripts.
 _OURS = b"idlc.cli.main"
@@ -111,3 +116,43 @@ def status(report: Report) -> int:
     if any(diagnostic.code in codes.USAGE for diagnostic in errors):
         return 2
     return 1 if errors else 0
+
+
+def write_report(
+    report: Report,
+    style: str,
+    checked: Checked,
+    stream: TextIO,
+    *,
+    command: str = "check",
+    numbers: bool = False,
+    strict: bool = False,
+) -> None:
+    """Write a report on checked files; formats for machines are one whole document.
+
+    With `numbers`, the text has the number of problems by code instead of each; with `strict`,
+    warnings fail as errors do.
+    """
+    files, fixed = checked.files, checked.fixed
+    match style:
+        case "text":
+            if not numbers:
+                show(report, style, stream)
+            if numbers or len(report) > MANY:
+                stream.writelines(statistics(report))
+            done = f"{counted(fixed, 'problem')} fixed, " if fixed else ""
+            what = counted(len(files), "file")
+            if not files and checked.packages:
+                what = f"{counted(checked.packages, 'package')} without interfaces"
+            which = f" for {', '.join(checked.distros)}" if checked.distros else ""
+            rest = summary(report) if len(report) else f"no problems in {what}{which}"
+            stream.write(f"{done}{rest}\n")
+        case "json":
+            show(report, style, stream)
+            facts: dict[str, object] = {"files": len(files), **({"fixed": fixed} if fixed else {})}
+            facts |= {"distros": list(checked.distros)} if checked.distros else {}
+            fact(stream, "summary", **counts(report), **facts)
+        case _:
+            from idlc.diagnostics.formats import DOCUMENTS, Run
+
+            stream.write(DOCUMENTS[style](report, Run(command, __version__, files, strict)))

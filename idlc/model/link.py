@@ -27,8 +27,6 @@ from idlc.model.lower import lower
 from idlc.model.lower_types import STRINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from idlc.model.describe import Describer
 
 Node = TypeVar("Node", bound=Hashable)
@@ -521,3 +519,8 @@ def _of_others(target: ir.TypeName) -> str | None:
         f"it is built in for {titles(others)}; if your ROS 2 has it, {including('DIR')} with its "
         "sources, or source your ROS 2"
     )
+
+
+def own_sections(model: Model) -> Iterable[ir.Message]:
+    """Return every structure of the model's own files."""
+    return (part for interface in model.own for part in derive.sections(interface))

@@ -8,13 +8,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from idlc.check.sections import sections
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit, Label, Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import closest_package
 from idlc.model import catalog, ir
-from idlc.model.link import Model
+from idlc.model.link import Model, own_sections
 from idlc.project.package_xml import DEPENDENCIES, RANK, Facts
 
 _NEEDED = ("depend", "build_depend", "build_export_depend", "exec_depend")
@@ -43,7 +42,7 @@ def used_packages(model: Model) -> dict[str, Span]:
     """Return the packages whose messages are used, with the range of each one's first use."""
     packages = _packages_with_interfaces(model)
     spans: dict[str, Span] = {}
-    for message in sections(model):
+    for message in own_sections(model):
         for field, target in message.holders:
             if field.type_span is not None and target.package in packages:
                 spans.setdefault(target.package, field.type_span)
@@ -105,7 +104,7 @@ def used_dependencies(facts: Facts, model: Model, report: Report) -> None:
 
 def _has_gaps(model: Model) -> bool:
     """Return whether some field has an unknown type, which may be of any package."""
-    elements = [ir.element_of(field.type) for part in sections(model) for field in part.fields]
+    elements = [ir.element_of(field.type) for part in own_sections(model) for field in part.fields]
     return any(
         element.target not in model.interfaces
         if isinstance(element, ir.Ref)

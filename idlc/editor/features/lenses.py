@@ -9,10 +9,9 @@ from idlc.compare.changes import LEVELS
 from idlc.compare.packages import compare
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.terminal import counted
-from idlc.editor.elements import elements
+from idlc.editor.elements import elements, users
 from idlc.editor.protocol.parts import Action, Lens, OfDocument, OfRange, Part, Position, Range
 from idlc.editor.state import Known, ServerState
-from idlc.editor.usages import users
 from idlc.model import derive, ir
 from idlc.model.ir import spell_value
 from idlc.wire.layout import layout

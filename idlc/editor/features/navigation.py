@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
-from idlc.editor.elements import Element, elements, spot
+from idlc.editor.elements import Element, elements, snapshots, spot, text_of, users, uses
 from idlc.editor.protocol.framing import INVALID_PARAMS, RequestError
 from idlc.editor.protocol.parts import (
     AskedContent,
@@ -21,7 +21,6 @@ from idlc.editor.protocol.parts import (
     Range,
 )
 from idlc.editor.state import Known, ServerState
-from idlc.editor.usages import snapshots, text_of, users, uses
 from idlc.editor.workspace import Snapshot
 from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME

@@ -15,7 +15,7 @@ from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
-from idlc.editor.elements import Element, document_edit, of_documents, spot
+from idlc.editor.elements import Element, document_edit, of_documents, snapshots, spot, users, uses
 from idlc.editor.features.navigation import mentions
 from idlc.editor.protocol import uris
 from idlc.editor.protocol.framing import REQUEST_FAILED, RequestError
@@ -28,7 +28,6 @@ from idlc.editor.protocol.parts import (
     TextEdit,
 )
 from idlc.editor.state import Known, Renaming, ServerState
-from idlc.editor.usages import snapshots, users, uses
 from idlc.model import ir, names
 from idlc.project.files import is_file
 from idlc.project.root import Root

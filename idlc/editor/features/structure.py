@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 from idlc.diagnostics.source import Span
 from idlc.editor.documents import is_built_in
-from idlc.editor.elements import Element, elements, section_names
+from idlc.editor.elements import Element, elements, section_names, snapshots, text_of
 from idlc.editor.protocol.parts import AskedSymbols, AtPositions, Location, OfDocument, Part, Range
 from idlc.editor.state import CONTENT, Known, ServerState
-from idlc.editor.usages import snapshots, text_of
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.ir import spell

@@ -12,14 +12,13 @@ import msgspec
 
 from idlc.diagnostics.source import Span
 from idlc.editor.documents import Document
-from idlc.editor.elements import Element, elements
+from idlc.editor.elements import Element, elements, uses
 from idlc.editor.features.lenses import hints, lenses
 from idlc.editor.features.navigation import comments
 from idlc.editor.features.structure import sections
 from idlc.editor.protocol.capabilities import MODIFIERS, TYPES
 from idlc.editor.protocol.parts import DocumentId, OfDocument, OfRange, Position, Range
 from idlc.editor.state import Known, ServerState
-from idlc.editor.usages import uses
 from idlc.language import tree
 from idlc.model import ir
 from idlc.model.lower_types import STRINGS
