@@ -186,7 +186,7 @@ class Message(metaclass=MessageMeta):
 
     @_check_fields.setter
     def _check_fields(self, check: bool) -> None:
-        from .on_demand.validation import become_checked
+        from .checked import become_checked
 
         become_checked(self, check)
 
@@ -277,7 +277,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .on_demand.validation import validate
+        from .on_demand.typeinfo import validate
 
         validate(self)
 
