@@ -253,7 +253,7 @@ class Message(metaclass=MessageMeta):
 
         They are a structured array; or Columns, where that cannot hold them or if `ragged`.
         """
-        from .on_demand.columns.read import to_columns
+        from .on_demand.columns import to_columns
 
         return to_columns(cls, messages, fields, ragged, datetimes)
 
