@@ -23,10 +23,17 @@ from typing import Any, NamedTuple, Protocol
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
 from . import c, callbacks, introspection
-from .abi import element_type, placed_fields, structure
-from .descriptions import ARRAY, NESTED, SCALAR, Field
-from .introspection import allocator
-from .machine_code import RefusedError
+from .callbacks import RefusedError
+from .introspection import (
+    ARRAY,
+    NESTED,
+    SCALAR,
+    Field,
+    allocator,
+    element_type,
+    placed_fields,
+    structure,
+)
 
 _HEADER = 4
 _COUNT = Struct("=I")

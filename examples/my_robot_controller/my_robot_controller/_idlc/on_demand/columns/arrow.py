@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..typeinfo import FieldInfo, fields_of, type_name, types
+from . import table_of
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
-from .read import table_of
 from .table import columns_of
 
 #: Between a definition and those that it refers to.
