@@ -206,9 +206,9 @@ def _slot_type(definition: Any, field: FieldInfo) -> Any:
     return definition.UnboundedSequence(element) if field.is_sequence else element
 
 
-def spelling_hint(name: str, known: list[str]) -> str:
-    """Return the known name closest to a misspelled one, in words that follow a statement."""
-    matches = get_close_matches(name, known, 1)
+def spelling_hint(name: str, names: list[str]) -> str:
+    """Return the name closest to a misspelled one, in words that follow a statement."""
+    matches = get_close_matches(name, names, 1)
     return f"; did you mean {matches[0]!r}?" if matches else ""
 
 

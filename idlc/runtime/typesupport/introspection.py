@@ -372,7 +372,7 @@ def elements(size: int, content: int) -> MemoryFunctions:
 def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
     """Return new functions; they live as long as the process."""
     allocate, deallocate = allocator()
-    made = callbacks.machine_code(
+    addresses = callbacks.machine_code(
         "structs",
         {
             "allocate": allocate,
@@ -385,7 +385,7 @@ def memory_functions(size: int, content: int, converter: object) -> MemoryFuncti
             "size": size,
         },
     )
-    return MemoryFunctions(*(made[name] for name in MemoryFunctions._fields))
+    return MemoryFunctions(*(addresses[name] for name in MemoryFunctions._fields))
 
 
 class _Allocator(ctypes.Structure):
@@ -409,8 +409,8 @@ def allocator() -> Allocator:
     """Return the allocator that all of rosidl uses."""
     default = c.load_library("librcutils.so").rcutils_get_default_allocator
     default.restype = _Allocator
-    made = default()
-    return Allocator(made.zero_allocate, made.deallocate)
+    functions = default()
+    return Allocator(functions.zero_allocate, functions.deallocate)
 
 
 # A table of words says what must be freed in a structure: how many entries, and for

@@ -42,7 +42,7 @@ _WIDE = (18, 22)
 
 
 class Cursor:
-    """Where reading from CDR has come to; positions count from after the header."""
+    """A position in CDR that reading advances, counted from after the header."""
 
     __slots__ = ("at", "data")
 
@@ -305,7 +305,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     size, content = ctypes.sizeof(structure(name)), introspection.content(name)
     try:
-        made = introspection.memory_functions(size, content, _converter(cls, name))
+        addresses = introspection.memory_functions(size, content, _converter(cls, name))
         handle = introspection.handle(name, functional=True)
     except RefusedError as error:
         raise ImportError(
@@ -313,7 +313,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
             "set RMW_IMPLEMENTATION to rmw_fastrtps_cpp, or build the interface package "
             "with colcon"
         ) from error
-    return c.MessageSupport(handle, *made[:4])
+    return c.MessageSupport(handle, *addresses[:4])
 
 
 class _ServiceMembers(ctypes.Structure):
