@@ -186,7 +186,7 @@ class Message(metaclass=MessageMeta):
 
     @_check_fields.setter
     def _check_fields(self, check: bool) -> None:
-        from .on_demand.validation import become_checked
+        from .checked import become_checked
 
         become_checked(self, check)
 
@@ -253,7 +253,7 @@ class Message(metaclass=MessageMeta):
 
         They are a structured array; or Columns, where that cannot hold them or if `ragged`.
         """
-        from .on_demand.columns.read import to_columns
+        from .on_demand.columns import to_columns
 
         return to_columns(cls, messages, fields, ragged, datetimes)
 
@@ -277,7 +277,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .on_demand.validation import validate
+        from .on_demand.typeinfo import validate
 
         validate(self)
 

@@ -284,6 +284,20 @@ def test_copies_and_pickles_are_equal():
     assert copy.deepcopy(message).path is not message.path
 
 
+def test_old_pickles_of_messages_that_check_their_fields_are_read():
+    """Recorded before the runtime's modules were merged: they name `checked` and its function."""
+    recorded = (
+        b"\x80\x02crobot_msgs._idlc.checked\n_restored\nq\x00crobot_msgs.msg._point\nPoint\nq\x01"
+        b"}q\x02(X\x02\x00\x00\x00_xq\x03G@\x00\x00\x00\x00\x00\x00\x00"
+        b"X\x02\x00\x00\x00_yq\x04G?\xf8\x00\x00\x00\x00\x00\x00u\x86q\x05Rq\x06."
+    )
+    message = pickle.loads(recorded)
+    assert message == get("msg/Point")(2.0, 1.5)
+    with pytest.raises(AssertionError, match="x: "):
+        message.x = "text"
+    assert pickle.dumps(get("msg/Point")(2.0, check_fields=True), 2) == recorded
+
+
 def test_repr_is_rosidls():
     assert repr(robot(ids=[1, 2], octet=b"a")).startswith(
         "robot_msgs.msg.Robot(name='', mode=1, speed=0.0, goal=robot_msgs.msg.Point(x=0.0, y=1.5)"

@@ -5,7 +5,6 @@ sequences, and nothing in them tells which version they are of. So before the fi
 support of a process, the tables of two messages that are wherever rclpy is are compared
 with all that is known of these messages. What is not exactly as in a known layout is
 refused: a wrong one would end the process, or change what is received.
-By it, messages are laid out as rosidl's C generator lays them out.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ import os
 from ctypes import PYFUNCTYPE, c_void_p
 from functools import cache
 from struct import unpack_from
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from . import c
-from .descriptions import ARRAY, NESTED, SCALAR, Field, load
 
 _INTROSPECTION = "rosidl_typesupport_introspection_c"
 _ADVICE = (
@@ -43,7 +41,7 @@ _TABLES = ((32, 112, 32), (40, 112, 33), (40, 120, 33))
 _SEQUENCES = (24, 32)
 
 
-class _Known(NamedTuple):
+class _Member(NamedTuple):
     """A field: its name, the id of its type, and its size; a sequence has none."""
 
     name: bytes
@@ -55,18 +53,18 @@ _STRING = 16
 #: Messages of rcl_interfaces that have been the same ever since.
 _MESSAGES = {
     "ParameterValue": (
-        _Known(b"type", 8, 1),
-        _Known(b"bool_value", 6, 1),
-        _Known(b"integer_value", 15, 8),
-        _Known(b"double_value", 2, 8),
-        _Known(b"string_value", _STRING, 24),
-        _Known(b"byte_array_value", 7),
-        _Known(b"bool_array_value", 6),
-        _Known(b"integer_array_value", 15),
-        _Known(b"double_array_value", 2),
-        _Known(b"string_array_value", _STRING),
+        _Member(b"type", 8, 1),
+        _Member(b"bool_value", 6, 1),
+        _Member(b"integer_value", 15, 8),
+        _Member(b"double_value", 2, 8),
+        _Member(b"string_value", _STRING, 24),
+        _Member(b"byte_array_value", 7),
+        _Member(b"bool_array_value", 6),
+        _Member(b"integer_array_value", 15),
+        _Member(b"double_array_value", 2),
+        _Member(b"string_array_value", _STRING),
     ),
-    "ListParametersResult": (_Known(b"names", _STRING), _Known(b"prefixes", _STRING)),
+    "ListParametersResult": (_Member(b"names", _STRING), _Member(b"prefixes", _STRING)),
 }
 
 
@@ -112,9 +110,9 @@ class _Reader:
             raise _UnknownError(f"{content!r} where {text!r} should be")
 
 
-def _demand(found: object, expected: object, what: str) -> None:
-    if found != expected:
-        raise _UnknownError(f"{what} is {found}, not {expected}")
+def _demand(actual: object, expected: object, subject: str) -> None:
+    if actual != expected:
+        raise _UnknownError(f"{subject} is {actual}, not {expected}")
 
 
 def measure(*handles: int) -> Abi:
@@ -150,7 +148,7 @@ def _offsets(
     reader: _Reader,
     handle: int,
     message: str,
-    fields: tuple[_Known, ...],
+    fields: tuple[_Member, ...],
     members: int,
     member: int,
     is_array: int,
@@ -169,30 +167,30 @@ def _offsets(
         reader.read(code, 1)
     table = reader.read(rows, member * len(fields))
     parts = [table[at : at + member] for at in range(0, len(table), member)]
-    for part, known in zip(parts, fields, strict=True):
-        _check_member(reader, part, known, is_array)
+    for part, field in zip(parts, fields, strict=True):
+        _check_member(reader, part, field, is_array)
     return [*(unpack_from("=I", part, 52)[0] for part in parts), size]
 
 
-def _check_member(reader: _Reader, part: bytes, known: _Known, is_array: int) -> None:
+def _check_member(reader: _Reader, part: bytes, field: _Member, is_array: int) -> None:
     """Raise _UnknownError unless a member says what is known of its field."""
     name, _, bound, nested = unpack_from("=4Q", part)
-    reader.demand_text(name, known.name)
-    _demand(part[8], known.type_id, f"the type of {known.name!r}")
-    _demand((bound, nested), (0, 0), f"bound and type of {known.name!r}")
+    reader.demand_text(name, field.name)
+    _demand(part[8], field.type_id, f"the type of {field.name!r}")
+    _demand((bound, nested), (0, 0), f"bound and type of {field.name!r}")
     flags = bytearray(8)
-    flags[is_array - 32] = not known.size
-    _demand(part[32:40], bytes(flags), f"whether {known.name!r} is an array")
+    flags[is_array - 32] = not field.size
+    _demand(part[32:40], bytes(flags), f"whether {field.name!r} is an array")
     size, bounded = unpack_from("=QB", part, 40)
     default, *functions = unpack_from("=7Q", part, 56)
-    _demand((size, bounded, default), (0, 0, 0), f"the bounds of {known.name!r}")
-    if known.size:
-        _demand(any(functions), False, f"whether {known.name!r} has functions")
+    _demand((size, bounded, default), (0, 0, 0), f"the bounds of {field.name!r}")
+    if field.size:
+        _demand(any(functions), False, f"whether {field.name!r} has functions")
     for function in functions:
         if function:
             reader.read(function, 1)
     if len(part) > 112:  # whether it may be a buffer of another kind
-        _demand(part[112] in (0, 1), True, f"whether {known.name!r} has a flag")
+        _demand(part[112] in (0, 1), True, f"whether {field.name!r} has a flag")
 
 
 def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
@@ -207,13 +205,13 @@ def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
     raise _UnknownError(f"fields begin at {offsets}")
 
 
-def _laid_out(fields: tuple[_Known, ...], sequence: int, strings: int) -> list[int]:
+def _laid_out(fields: tuple[_Member, ...], sequence: int, strings: int) -> list[int]:
     """Return where fields begin, and where the last one ends."""
     offsets, end = [], 0
-    for known in fields:
-        end += -end % min(known.size or 8, 8)
+    for field in fields:
+        end += -end % min(field.size or 8, 8)
         offsets.append(end)
-        end += known.size or (strings if known.type_id == _STRING else sequence)
+        end += field.size or (strings if field.type_id == _STRING else sequence)
     return [*offsets, end]
 
 
@@ -234,70 +232,3 @@ def has_hashes() -> bool:
     """Return whether this ROS 2 knows type hashes, and with them events of services."""
     runtime = c.load_library("librosidl_runtime_c.so")
     return hasattr(runtime, "rosidl_stringify_type_hash")
-
-
-# C structures of messages
-
-#: Type id in descriptions -> (type id in introspection, C type of one element).
-_ELEMENTS: dict[int, tuple[int, Any]] = {
-    2: (9, ctypes.c_int8),
-    3: (8, ctypes.c_uint8),
-    4: (11, ctypes.c_int16),
-    5: (10, ctypes.c_uint16),
-    6: (13, ctypes.c_int32),
-    7: (12, ctypes.c_uint32),
-    8: (15, ctypes.c_int64),
-    9: (14, ctypes.c_uint64),
-    10: (1, ctypes.c_float),
-    11: (2, ctypes.c_double),
-    15: (6, ctypes.c_bool),
-    16: (7, ctypes.c_uint8),
-    17: (16, c.String),
-    18: (17, c.String),
-    21: (16, c.String),
-    22: (17, c.String),
-}
-_MESSAGE = 18
-
-
-@cache
-def structure(name: str) -> type[ctypes.Structure]:
-    """Return the C structure that rosidl's C generator would make for a message."""
-    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(load().types[name])]
-    return type(name.replace("/", "__"), (ctypes.Structure,), {"_fields_": fields})
-
-
-def introspection_id(field: Field) -> int:
-    """Return how introspection calls the type of a field's elements."""
-    return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
-
-
-def element_type(field: Field) -> Any:
-    """Return the C type of one element of a field."""
-    return (
-        structure(field.nested_type_name)
-        if field.base == NESTED
-        else _ELEMENTS[field.base][1]
-    )
-
-
-def _c_type(field: Field) -> Any:
-    if field.shape == SCALAR:
-        return element_type(field)
-    if field.shape == ARRAY:
-        return element_type(field) * field.capacity
-    return _sequence_type(field)
-
-
-def _sequence_type(field: Field) -> Any:
-    if field.base == NESTED:
-        return c.Sequence
-    size = abi().strings if element_type(field) is c.String else abi().sequence
-    return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
-
-
-def placed_fields(name: str) -> list[tuple[Field, int]]:
-    """Return a message's fields and where each begins in the C structure."""
-    kind = structure(name)
-    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
-    return list(zip(load().types[name], offsets, strict=True))

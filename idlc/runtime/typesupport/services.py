@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from . import c, callbacks, introspection
-from .descriptions import about
+from .introspection import about
 
 
 class _EventInfo(ctypes.Structure):

@@ -23,10 +23,17 @@ from typing import Any, NamedTuple, Protocol
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
 from . import c, callbacks, introspection
-from .abi import element_type, placed_fields, structure
-from .descriptions import ARRAY, NESTED, SCALAR, Field
-from .introspection import allocator
-from .machine_code import RefusedError
+from .callbacks import RefusedError
+from .introspection import (
+    ARRAY,
+    NESTED,
+    SCALAR,
+    Field,
+    allocator,
+    element_type,
+    placed_fields,
+    structure,
+)
 
 _HEADER = 4
 _COUNT = Struct("=I")
@@ -35,7 +42,7 @@ _WIDE = (18, 22)
 
 
 class Cursor:
-    """Where reading from CDR has come to; positions count from after the header."""
+    """A position in CDR that reading advances, counted from after the header."""
 
     __slots__ = ("at", "data")
 
@@ -298,7 +305,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
     size, content = ctypes.sizeof(structure(name)), introspection.content(name)
     try:
-        made = introspection.memory_functions(size, content, _converter(cls, name))
+        addresses = introspection.memory_functions(size, content, _converter(cls, name))
         handle = introspection.handle(name, functional=True)
     except RefusedError as error:
         raise ImportError(
@@ -306,7 +313,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
             "set RMW_IMPLEMENTATION to rmw_fastrtps_cpp, or build the interface package "
             "with colcon"
         ) from error
-    return c.MessageSupport(handle, *made[:4])
+    return c.MessageSupport(handle, *addresses[:4])
 
 
 class _ServiceMembers(ctypes.Structure):

@@ -60,7 +60,7 @@ def alter(path):
 def fast_cdr(path):
     """Find the pointers of an older Fast CDR, which is the only one in this process."""
     ctypes.CDLL(path)
-    return importlib.import_module("std_msgs._idlc.typesupport.fastcdr").fast_cdr()
+    return importlib.import_module("std_msgs._idlc.typesupport.fastrtps").fast_cdr()
 
 
 if __name__ == "__main__":

@@ -178,8 +178,8 @@ def garbage_is_dropped():
 
 def without_machine_code(name):
     """Do something where there is no machine code, which Fast DDS can do without."""
-    native = importlib.import_module("std_msgs._idlc.typesupport.machine_code")
-    native.CODE, native._executable = {}, None  # to call this would be an error
+    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
+    callbacks.CODE, callbacks._executable = {}, None  # to call this would be an error
     globals()[name]()
 
 
@@ -454,23 +454,23 @@ def serves_without_events():
 def says_what_to_do(case):
     """Print the error of a surrounding that type support cannot work in."""
     utilities = importlib.import_module("rclpy.utilities")
-    fastcdr = importlib.import_module("std_msgs._idlc.typesupport.fastcdr")
+    fastrtps = importlib.import_module("std_msgs._idlc.typesupport.fastrtps")
     introspection = importlib.import_module("std_msgs._idlc.typesupport.introspection")
-    native = importlib.import_module("std_msgs._idlc.typesupport.machine_code")
+    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
     if case in {"machine", "memory"}:
         utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
     if case == "machine":
-        native.CODE = {}
+        callbacks.CODE = {}
     elif case == "memory":
-        native._MAP_PRIVATE = 0  # the system refuses this, too
+        callbacks._MAP_PRIVATE = 0  # the system refuses this, too
     elif case == "middleware":
         utilities.get_rmw_implementation_identifier = lambda: "rmw_connextdds"
     elif case == "layout":
-        fastcdr._find = lambda *_: None
+        fastrtps._find = lambda *_: None
     elif case == "symbol":
-        fastcdr._VERSIONS = [one._replace(new="no_such_symbol") for one in fastcdr._VERSIONS]
+        fastrtps._VERSIONS = [one._replace(new="no_such_symbol") for one in fastrtps._VERSIONS]
     elif case == "fast cdr":
-        fastcdr._VERSIONS = (fastcdr._VERSIONS[1],)
+        fastrtps._VERSIONS = (fastrtps._VERSIONS[1],)
     elif case == "tables":
         importlib.import_module("std_msgs._idlc.typesupport.abi")._TABLES = ((40, 128, 33),)
     elif case == "library":

@@ -1,7 +1,7 @@
 """Making messages: codecs, imported and made for one byte order on first use, and constructors.
 
 The codecs of a module of classes are in the module of the same name and `__codec`.
-Constructors leave checks to `on_demand.validation`, which is rarely needed.
+Constructors leave checks to `checked`, which is rarely needed.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .on_demand.validation import validate
+    from .on_demand.typeinfo import validate
 
     try:
         validate(message, wire_only=True)
@@ -226,9 +226,9 @@ def construct(
     message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
 ) -> bool:
     """Check a constructor's arguments; return whether the message got all its fields."""
-    from .on_demand import validation
+    from . import checked
 
-    return validation.construct(message, options, arguments)
+    return checked.construct(message, options, arguments)
 
 
 def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
@@ -259,14 +259,13 @@ def maker(kind: Any) -> Callable[[], Any]:
 
 def _checking(kind: Any) -> Any:
     """Return the subclass of a message class whose instances check their fields."""
-    from .on_demand import validation
+    from . import checked
 
-    return validation.checked_class(kind)
+    return checked.checked_class(kind)
 
 
 def is_checked(kind: type) -> bool:
     """Return whether the instances of a class check their fields."""
-    # only what has imported `validation` has such instances
-    return any(
-        base.__module__.endswith(".on_demand.validation") for base in kind.__mro__
-    )
+    # only what has imported that module has such instances
+    module = f"{__package__}.checked"
+    return any(base.__module__ == module for base in kind.__mro__)

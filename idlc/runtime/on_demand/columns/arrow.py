@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..typeinfo import FieldInfo, fields_of, type_name, types
+from . import table_of
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
-from .read import table_of
 from .table import columns_of
 
 #: Between a definition and those that it refers to.
@@ -37,10 +37,10 @@ def to_arrow(
         ) from error
     table, top = table_of(kind, messages, fields, datetimes)
     columns = columns_of(table, top)
-    made = _Arrays(pyarrow, dictionary).struct(top.level.node, columns)
-    while flat and any(pyarrow.types.is_struct(field.type) for field in made.type):
-        made = _flattened(pyarrow, made)
-    batch = pyarrow.RecordBatch.from_struct_array(made)
+    rows = _Arrays(pyarrow, dictionary).struct(top.level.node, columns)
+    while flat and any(pyarrow.types.is_struct(field.type) for field in rows.type):
+        rows = _flattened(pyarrow, rows)
+    batch = pyarrow.RecordBatch.from_struct_array(rows)
     metadata = described(type_name(kind))
     return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
 
@@ -90,8 +90,8 @@ class _Arrays:
             return self.lists(node, column)
         if isinstance(node, Strings):
             buffers = [None, *map(pa.py_buffer, (column.offsets, column.values))]
-            made = pa.Array.from_buffers(pa.large_string(), len(column), buffers)
-            return made.dictionary_encode() if self.dictionary else made
+            texts = pa.Array.from_buffers(pa.large_string(), len(column), buffers)
+            return texts.dictionary_encode() if self.dictionary else texts
         if isinstance(node, Instant):
             type_ = getattr(pa, TIMES[node.code])("ns")
             return self.flat(type_, column.view(np.int64))

@@ -12,16 +12,15 @@ nodes meet in keys: numbers under which a scan keeps what it finds.
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from ..typeinfo import FieldInfo, fields_of, least_element
+from ..typeinfo import FieldInfo, fields_of, least_element, spelling_hint
 
 
 class Leaf(NamedTuple):
-    """Where the numbers of one column are in a segment.
+    """The place of the numbers of one column in a segment.
 
     `repeats` has the count and distance in bytes of the arrays around them, outermost first.
     """
@@ -179,12 +178,13 @@ def _selection(name: str, fields: tuple[str, ...]) -> dict[str, Any]:
         type_ = name
         *outer, last = field.split(".")
         for step in (*outer, last):
-            known = {info.name: info for info in fields_of(type_)} if type_ else {}
-            if step not in known:
-                close = get_close_matches(step, known, 1)
-                hint = f"; did you mean {close[0]!r}?" if close else ""
+            nested = (
+                {info.name: info.nested for info in fields_of(type_)} if type_ else {}
+            )
+            if step not in nested:
+                hint = spelling_hint(step, list(nested))
                 raise ValueError(f"{name} has no field {field!r}{hint}")
-            type_ = known[step].nested
+            type_ = nested[step]
         at: Any = tree
         for step in outer:
             at = {} if at is None else at.setdefault(step, {})
@@ -217,13 +217,13 @@ class _Builder:
         fields = fields_of(name)
         if not fields:
             self.place(1, 1)
-        made: dict[str, Node] = {}
+        nodes: dict[str, Node] = {}
         for field in fields:
             inner = None if wanted is None else wanted.get(field.name, NOTHING)
             node = self.field(field, inner)
             if inner != NOTHING:
-                made[field.name] = node
-        return Struct(made)
+                nodes[field.name] = node
+        return Struct(nodes)
 
     def field(self, field: FieldInfo, wanted: Wanted) -> Node:
         """Plan a field."""
@@ -247,14 +247,14 @@ class _Builder:
     def element(self, field: FieldInfo, wanted: Wanted) -> Node:
         """Plan a single value."""
         if field.nested:
-            made = self.structure(field.nested, wanted)
-            known = INSTANTS.get(field.nested)
-            if known is None or not self.datetimes or wanted is not None:
-                return made
-            seconds, nanoseconds = made.fields.values()
+            struct = self.structure(field.nested, wanted)
+            code = INSTANTS.get(field.nested)
+            if code is None or not self.datetimes or wanted is not None:
+                return struct
+            seconds, nanoseconds = struct.fields.values()
             assert isinstance(seconds, Numbers)
             assert isinstance(nanoseconds, Numbers)
-            return Instant(known, seconds, nanoseconds)
+            return Instant(code, seconds, nanoseconds)
         if field.primitive is not None:
             return self.numbers(field, wanted)
         text = Text(None if wanted == NOTHING else next(self.keys), field.wide)

@@ -49,7 +49,7 @@ class ScanResult:
 
 
 class Cursors:
-    """Where some messages are read, and where they end: arrays of positions in the buffer.
+    """Arrays of positions in the buffer, where some messages are read and where they end.
 
     Values align relative to `phase`. Arrays of positions are never changed in place, so they
     may be kept.

@@ -22,7 +22,7 @@ PAGE = 1 << 21
 
 
 class Place(NamedTuple):
-    """Where an array is in memory."""
+    """The place of an array in memory."""
 
     memory: Any
     offset: int
@@ -139,8 +139,8 @@ class Pieces:
 
     def items(self, starts: Any, dtype: str) -> Any:
         """Return what begins at each of some positions."""
-        made = np.dtype(dtype)
-        return self.ranges(starts, np.full(len(starts), made.itemsize)).view(made)
+        item = np.dtype(dtype)
+        return self.ranges(starts, np.full(len(starts), item.itemsize)).view(item)
 
     def strings(self, starts: Any, sizes: Any, width: int) -> Any:
         """Return bytes, at most `width` from each start, as numpy has them."""
@@ -186,9 +186,9 @@ def fresh(size: int) -> Any:
     """Return bytes of memory, so that if they are many, large pages are all they are made of."""
     if size < 2 * PAGE:
         return np.empty(size, np.uint8)
-    made: Any = np.empty(size + PAGE, np.uint8)
-    start = -made.__array_interface__["data"][0] % PAGE
-    return made[start : start + size]
+    memory: Any = np.empty(size + PAGE, np.uint8)
+    start = -memory.__array_interface__["data"][0] % PAGE
+    return memory[start : start + size]
 
 
 def _regular(starts: Any) -> int | None:
@@ -216,8 +216,8 @@ def without_zeros(source: Source, starts: Any, sizes: Any) -> Any:
 
 def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
     """Return the strings at some places, of so many bytes."""
-    made = Texts(offsets_of(sizes), source.ranges(starts, sizes))
-    return made if _is_utf8(made) else _encoded(map(_text, _parts(made)))
+    texts = Texts(offsets_of(sizes), source.ranges(starts, sizes))
+    return texts if _is_utf8(texts) else _encoded(map(_text, _parts(texts)))
 
 
 def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
@@ -226,8 +226,8 @@ def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) ->
     if big is not None:
         swapped = np.repeat(big, sizes)
         units[swapped] = units[swapped].byteswap()
-    made = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
-    return _encoded(part.decode("utf-16-le", "replace") for part in _parts(made))
+    texts = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
+    return _encoded(part.decode("utf-16-le", "replace") for part in _parts(texts))
 
 
 def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:

@@ -97,8 +97,8 @@ class Table:
                 if (order == np.arange(len(order))).all():
                     order = None
             big = None if elements.big is None else np.repeat(elements.big, counts)
-            made = Elements(level, int(offsets[-1]), order, big)
-            self.lists[step.key] = offsets, made
+            inside = Elements(level, int(offsets[-1]), order, big)
+            self.lists[step.key] = offsets, inside
         return self.lists[step.key]
 
     def numbers(self, elements: Elements) -> dict[int, Any]:
@@ -129,8 +129,8 @@ class Table:
             size = packed.size
             place = rows_of(self.source, starts, counts, size) if even else None
             if place is None:
-                made = self.source.ranges(starts, counts * size, size)
-                place = Place(made, 0, (elements.total,), (size,))
+                content = self.source.ranges(starts, counts * size, size)
+                place = Place(content, 0, (elements.total,), (size,))
             self.cut(packed, place, result)
         return result
 
@@ -155,11 +155,11 @@ class Table:
             strides = (*place.strides, *(distance for _, distance in leaf.repeats))
             dtype = np.dtype(self.order + leaf.code.replace("?", "u1"))
             if 0 in shape:
-                made: Any = np.empty(shape, dtype)
+                numbers: Any = np.empty(shape, dtype)
             else:
                 start = place.offset + leaf.offset
-                made = np.ndarray(shape, dtype, place.memory, start, strides)
-            result[leaf.key] = made
+                numbers = np.ndarray(shape, dtype, place.memory, start, strides)
+            result[leaf.key] = numbers
 
 
 def columns_of(table: Table, top: Elements) -> Columns:
@@ -192,10 +192,10 @@ class _Making(Reading):
     def column(self, node: Node, count: int, depth: int = 0) -> Any:
         """Return a column of `count` values, which are in arrays of so many dimensions."""
         if isinstance(node, Numbers):
-            made = self.table.native(
+            numbers = self.table.native(
                 self.numbers[node.key], node.code, self.elements.big
             )
-            return made.reshape(count, *made.shape[1 + depth :])
+            return numbers.reshape(count, *numbers.shape[1 + depth :])
         if isinstance(node, Strings):
             return self.table.texts(self.elements, node)
         if isinstance(node, Instant):
@@ -254,8 +254,8 @@ class _Types:
     def dtype(self, node: Node, elements: Elements, path: str) -> Any:
         """Return the dtype of a column."""
         if isinstance(node, Numbers):
-            made: Any = np.dtype(node.code)
-            return made if node.size is None else np.dtype((made, (node.size,)))
+            number: Any = np.dtype(node.code)
+            return number if node.size is None else np.dtype((number, (node.size,)))
         if isinstance(node, Instant):
             return np.dtype(node.code)
         if isinstance(node, Struct):

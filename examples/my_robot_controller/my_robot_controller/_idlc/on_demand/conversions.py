@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from ..errors import ValidationError
 from ..names import slot_name
 from ..objects import owner_of
-from .typeinfo import FieldInfo, class_of, fields_of, spelling_hint, type_name
-from .validation import validate, validate_count, validate_element
+from .typeinfo import (
+    FieldInfo,
+    class_of,
+    fields_of,
+    spelling_hint,
+    type_name,
+    validate,
+    validate_count,
+    validate_element,
+)
 
 if TYPE_CHECKING:
     import dataclasses

@@ -1,22 +1,216 @@
-"""Introspection members, and message memory as rosidl has it.
+"""Types as ROS 2 asks about them: hash, description, source text, members, C structures.
 
-Members are field names, types and C offsets, as a middleware walks them. Both kinds of
-type support need them. Fast DDS describes types to its peers from them and never looks
-at the memory; introspection-based middlewares read and write the memory that they
-describe, with the functions that stand beside it. These, and those by which rclpy makes
-and frees messages, are machine code.
+The facts are JSON in `type_data.py`, written with the package and read only when rclpy asks
+for type support:
+
+    {"package": "pkg",
+     "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
+     "hashes": {"pkg/msg/Name": "RIHS01_…"},
+     "sources": {"pkg/msg/Name": "text of the interface file"}}
+
+`descriptions` and `hashes` hold every structure of the package, derived ones and the
+pseudo-structures of services and actions included, and all that these refer to;
+`sources` holds the files among them. A type id is a base plus 48 for a fixed array, 96
+for a bounded, 144 for an unbounded sequence (rosidl's
+`type_description_interfaces/msg/FieldType`).
+
+Introspection members are field names, types and C offsets, as a middleware walks them. Both
+kinds of type support need them. Fast DDS describes types to its peers from them and never
+looks at the memory; introspection-based middlewares read and write the memory that they
+describe, which is as rosidl has it, with the functions that stand beside it. These, and those
+by which rclpy makes and frees messages, are machine code.
 """
 
 from __future__ import annotations
 
 import ctypes
+import os
+import sys
 from ctypes import c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from . import c, machine_code
-from .abi import abi, element_type, introspection_id, placed_fields, structure
-from .descriptions import ARRAY, BOUNDED_SEQUENCE, NESTED, SCALAR, Field, about
+from ..on_demand import typeinfo
+from . import c, callbacks
+from .abi import abi
+
+NESTED, UINT8, BOOL, BYTE, WSTRING = 1, 3, 15, 16, 18
+SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
+
+
+class Field(NamedTuple):
+    """A field as described; `capacity` is an array's size or a sequence's bound."""
+
+    name: str
+    type_id: int
+    capacity: int
+    string_capacity: int
+    nested_type_name: str
+    default_value: str
+
+    @property
+    def base(self) -> int:
+        """The type id of one element."""
+        return self.type_id % 48
+
+    @property
+    def shape(self) -> int:
+        """SCALAR, ARRAY, BOUNDED_SEQUENCE or SEQUENCE."""
+        return self.type_id // 48
+
+
+class Types(NamedTuple):
+    """The facts about a package's types; fields by type."""
+
+    package: str
+    types: dict[str, list[Field]]
+    hashes: dict[str, str]
+    sources: dict[str, str]
+
+
+@cache
+def load() -> Types:
+    """Return the facts about this package's types."""
+    data = typeinfo.types()
+    types = {
+        name: [
+            Field(field["name"], **field["type"], default_value=field["default_value"])
+            for field in description["fields"]
+        ]
+        for name, description in data["descriptions"].items()
+    }
+    return Types(data["package"], types, data["hashes"], data["sources"])
+
+
+@cache
+def references(name: str) -> frozenset[str]:
+    """Return all types that `name` refers to, directly or not, itself excluded."""
+    direct = {
+        field.nested_type_name for field in load().types[name] if field.nested_type_name
+    }
+    return frozenset(direct.union(*map(references, direct)))
+
+
+def _field(field: Field) -> c.Field:
+    kind = c.FieldType(
+        field.type_id,
+        field.capacity,
+        field.string_capacity,
+        c.string(field.nested_type_name),
+    )
+    return c.Field(c.string(field.name), kind, c.string(field.default_value))
+
+
+@cache
+def _individual(name: str) -> c.IndividualDescription:
+    fields = [_field(field) for field in load().types[name]]
+    return c.IndividualDescription(c.string(name), c.sequence(fields, c.Field))
+
+
+def _installed_text(name: str) -> str | None:
+    """Return another package's interface file, where ROS 2 has installed it."""
+    package, kind, short = name.split("/")
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    for prefix in filter(None, [*prefixes, sys.prefix]):
+        path = Path(prefix, "share", package, kind, f"{short}.{kind}")
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    return None
+
+
+def _source(name: str) -> c.Source:
+    """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
+    own = name.startswith(f"{load().package}/")
+    text = load().sources.get(name) if own else _installed_text(name)
+    encoding = "implicit" if text is None else name.split("/")[1]
+    return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
+
+
+def _type_hash(name: str) -> c.TypeHash:
+    digest = bytes.fromhex(load().hashes[name].removeprefix("RIHS01_"))
+    return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
+
+
+@cache
+def about(name: str) -> c.About:
+    """Return functions that never fail and never return NULL, as rcl demands."""
+    others = sorted(references(name))
+    individuals = c.sequence([_individual(n) for n in others], c.IndividualDescription)
+    description = c.Description(_individual(name), individuals)
+    sources = c.sequence([_source(n) for n in (name, *others)], c.Source)
+    values = (_type_hash(name), description, sources)
+    return c.About(*(c.constant(c.pointer(value)) for value in values))
+
+
+# C structures of messages, laid out as rosidl's C generator lays them out
+
+#: Type id in descriptions -> (type id in introspection, C type of one element).
+_ELEMENTS: dict[int, tuple[int, Any]] = {
+    2: (9, ctypes.c_int8),
+    3: (8, ctypes.c_uint8),
+    4: (11, ctypes.c_int16),
+    5: (10, ctypes.c_uint16),
+    6: (13, ctypes.c_int32),
+    7: (12, ctypes.c_uint32),
+    8: (15, ctypes.c_int64),
+    9: (14, ctypes.c_uint64),
+    10: (1, ctypes.c_float),
+    11: (2, ctypes.c_double),
+    15: (6, ctypes.c_bool),
+    16: (7, ctypes.c_uint8),
+    17: (16, c.String),
+    18: (17, c.String),
+    21: (16, c.String),
+    22: (17, c.String),
+}
+_MESSAGE = 18
+
+
+@cache
+def structure(name: str) -> type[ctypes.Structure]:
+    """Return the C structure that rosidl's C generator would make for a message."""
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(load().types[name])]
+    return type(name.replace("/", "__"), (ctypes.Structure,), {"_fields_": fields})
+
+
+def introspection_id(field: Field) -> int:
+    """Return how introspection calls the type of a field's elements."""
+    return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
+
+
+def element_type(field: Field) -> Any:
+    """Return the C type of one element of a field."""
+    return (
+        structure(field.nested_type_name)
+        if field.base == NESTED
+        else _ELEMENTS[field.base][1]
+    )
+
+
+def _c_type(field: Field) -> Any:
+    if field.shape == SCALAR:
+        return element_type(field)
+    if field.shape == ARRAY:
+        return element_type(field) * field.capacity
+    return _sequence_type(field)
+
+
+def _sequence_type(field: Field) -> Any:
+    if field.base == NESTED:
+        return c.Sequence
+    size = abi().strings if element_type(field) is c.String else abi().sequence
+    return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
+
+
+def placed_fields(name: str) -> list[tuple[Field, int]]:
+    """Return a message's fields and where each begins in the C structure."""
+    kind = structure(name)
+    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
+    return list(zip(load().types[name], offsets, strict=True))
+
+
+# members
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
@@ -178,7 +372,7 @@ def elements(size: int, content: int) -> MemoryFunctions:
 def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
     """Return new functions; they live as long as the process."""
     allocate, deallocate = allocator()
-    made = machine_code.functions(
+    addresses = callbacks.machine_code(
         "structs",
         {
             "allocate": allocate,
@@ -191,7 +385,7 @@ def memory_functions(size: int, content: int, converter: object) -> MemoryFuncti
             "size": size,
         },
     )
-    return MemoryFunctions(*(made[name] for name in MemoryFunctions._fields))
+    return MemoryFunctions(*(addresses[name] for name in MemoryFunctions._fields))
 
 
 class _Allocator(ctypes.Structure):
@@ -215,8 +409,8 @@ def allocator() -> Allocator:
     """Return the allocator that all of rosidl uses."""
     default = c.load_library("librcutils.so").rcutils_get_default_allocator
     default.restype = _Allocator
-    made = default()
-    return Allocator(made.zero_allocate, made.deallocate)
+    functions = default()
+    return Allocator(functions.zero_allocate, functions.deallocate)
 
 
 # A table of words says what must be freed in a structure: how many entries, and for
