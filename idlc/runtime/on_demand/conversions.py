@@ -13,6 +13,7 @@ from .typeinfo import (
     FieldInfo,
     class_of,
     fields_of,
+    inner_path,
     spelling_hint,
     type_name,
     validate,
@@ -73,21 +74,17 @@ def _from_dict(kind: Any, name: str, values: Any, path: str) -> Any:
         field = fields.get(key)
         if field is None:
             problem = f"{name} has no such field{spelling_hint(str(key), list(fields))}"
-            raise ValidationError(_join(path, key), "absent", value, problem)
-        place = _join(path, field.public)
+            raise ValidationError(inner_path(path, key), "absent", value, problem)
+        place = inner_path(path, field.public)
         _set(message, field, _value(value, field, place), path)
     return message
-
-
-def _join(path: str, name: object) -> str:
-    return f"{path}.{name}" if path else str(name)
 
 
 def _set(message: Any, field: FieldInfo, value: Any, path: str) -> None:
     try:
         setattr(message, field.public, value)
     except ValidationError as error:
-        raise error.at(_join(path, error.path), ValidationError) from None
+        raise error.at(inner_path(path, error.path), ValidationError) from None
 
 
 def _value(value: Any, field: FieldInfo, path: str) -> Any:

@@ -32,15 +32,8 @@ _OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
 #: Middlewares that have a type support of their own, generated in C++.
 _UNSUPPORTED = ("rmw_connextdds", "rmw_connextddsmicro")
 
-#: What rclpy reads from the metaclass; the type support comes last, because its presence
-#: says that all is there.
+#: The attribute of the metaclass that rclpy reads from every class.
 _SUPPORT = "_TYPE_SUPPORT"
-_MEMORY = (
-    "_CREATE_ROS_MESSAGE",
-    "_DESTROY_ROS_MESSAGE",
-    "_CONVERT_FROM_PY",
-    "_CONVERT_TO_PY",
-)
 
 
 # extension modules that rosidl built
@@ -48,12 +41,14 @@ _MEMORY = (
 #: Packages whose messages rcl, rcl_action and rcl_lifecycle know as C structures.
 _OF_RCL = {"action_msgs", "lifecycle_msgs", "type_description_interfaces"}
 
+#: What rclpy reads from a message's metaclass, and the names in extensions. The type support
+#: comes last, because its presence says that all is there.
 _MESSAGE_CAPSULES = {
     "_CREATE_ROS_MESSAGE": "create_ros_message_msg",
     "_DESTROY_ROS_MESSAGE": "destroy_ros_message_msg",
     "_CONVERT_FROM_PY": "convert_from_py_msg",
     "_CONVERT_TO_PY": "convert_to_py_msg",
-    "_TYPE_SUPPORT": "type_support_msg",
+    _SUPPORT: "type_support_msg",
 }
 
 
@@ -216,8 +211,8 @@ def import_message(cls: Any) -> None:
         _set_capsules(cls, built.message())
         return
     handle, *functions = map(c.capsule, _message(cls))
-    _set_capsules(cls, dict(zip(_MEMORY, functions, strict=True)))
-    _set_capsules(cls, {_SUPPORT: handle})
+    capsules = zip(_MESSAGE_CAPSULES, (*functions, handle), strict=True)
+    _set_capsules(cls, dict(capsules))
 
 
 def import_service(cls: Any) -> None:

@@ -35,7 +35,7 @@ from ..on_demand import typeinfo
 from . import c, callbacks
 from .abi import abi
 
-NESTED, UINT8, BOOL, BYTE, WSTRING = 1, 3, 15, 16, 18
+NESTED = 1
 SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
 
 

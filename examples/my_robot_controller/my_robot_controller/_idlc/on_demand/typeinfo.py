@@ -241,7 +241,7 @@ def validate_count(values: Any, field: FieldInfo) -> None:
 
 def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
     for field in fields_of(name):
-        place = f"{path}.{field.public}" if path else field.public
+        place = inner_path(path, field.public)
         if not hasattr(message, field.slot):
             raise ValidationError(path or "message", f"a {name}", message)
         value = getattr(message, field.slot)
@@ -303,6 +303,11 @@ def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
 def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
     problem = f"has {counted(count, what)}, at most {bound} are allowed"
     raise ValidationError(path, f"at most {counted(bound, what)}", value, problem)
+
+
+def inner_path(path: str, name: object) -> str:
+    """Return the path of a field or key in what is at a path."""
+    return f"{path}.{name}" if path else str(name)
 
 
 def counted(count: int, what: str) -> str:
@@ -452,7 +457,7 @@ class _Reader:
         if not fields:
             self.take(1, 1, path or name)
         for field in fields:
-            place = f"{path}.{field.public}" if path else field.public
+            place = inner_path(path, field.public)
             setattr(message, field.slot, self.field(field, place))
         return message
 
@@ -521,7 +526,7 @@ class _Reader:
     def take(self, size: int, align: int, path: str, what: str = "") -> bytes:
         """Return the bytes of the next value."""
         self.at += (4 - self.at) % align
-        self.enough(size, path, what or f"{size} byte{'s' * (size != 1)}")
+        self.enough(size, path, what or counted(size, "byte"))
         self.at += size
         return self.data[self.at - size : self.at]
 
