@@ -226,9 +226,9 @@ def construct(
     message: Any, options: Mapping[str, Any], arguments: dict[str, Any]
 ) -> bool:
     """Check a constructor's arguments; return whether the message got all its fields."""
-    from . import checked
+    from .checked import construct
 
-    return checked.construct(message, options, arguments)
+    return construct(message, options, arguments)
 
 
 def call_checked(cls: Any, *values: Any, **named: Any) -> Any:
@@ -259,9 +259,9 @@ def maker(kind: Any) -> Callable[[], Any]:
 
 def _checking(kind: Any) -> Any:
     """Return the subclass of a message class whose instances check their fields."""
-    from . import checked
+    from .checked import checked_class
 
-    return checked.checked_class(kind)
+    return checked_class(kind)
 
 
 def is_checked(kind: type) -> bool:
