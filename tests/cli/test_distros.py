@@ -103,7 +103,7 @@ def test_hashes_are_those_that_are_known(distro):
         if distro in distros.split()
         for name, value in hashes.items()
     }
-    library = WithOthers([], Report(), distro=BY_NAME[distro])
+    library = WithOthers([], Root.here(), Report(), distro=BY_NAME[distro])
     found = {}
     names = {*map(str, catalog.interfaces(BY_NAME[distro])), *(known.keys() & OTHERS.keys())}
     for name in map(ir.TypeName.parse, names):

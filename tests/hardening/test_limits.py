@@ -150,7 +150,7 @@ def test_each_file_is_read_and_lowered_once_however_many_packages_use_it(command
         return lower_(file, *rest)
 
     def read_bytes(path, *rest):
-        read[str(path)] += 1
+        read[os.path.relpath(path)] += 1
         return read_bytes_(path, *rest)
 
     lower_, read_bytes_ = idlc.model.lower.lower, idlc.project.files.read_bytes
