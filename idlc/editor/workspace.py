@@ -26,8 +26,8 @@ from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
-from idlc.project.find import Found, Picture, look, root_of
-from idlc.project.inputs import places
+from idlc.project.find import DiskSnapshot, Listing, list_files, root_of
+from idlc.project.inputs import output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
@@ -145,7 +145,7 @@ class Workspace:
         self._fixed = report = Report()  # problems that do not depend on texts
         self._older, self._earlier = self._earlier, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
-        files = Found((), (), (), {})
+        files = Listing((), (), (), {})
         begun = time.time_ns()
         self._root = root = Root.at(self.folder, self._texts())
         with without_options():
@@ -159,11 +159,11 @@ class Workspace:
             # a mistake in the settings stops the command line, too
             if not report.had_errors:
                 paths = self._paths or settings.paths or (".",)
-                files = look(paths, root, report, self._scope.exclude)
+                files = list_files(paths, root, report, self._scope.exclude)
                 self._packages = inputs.packages(files.files, self._scope, report, files.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
             on_disk = (path for path in self._files_read(files) if not root.is_open(path))
-            self._picture = Picture(files.folders, on_disk, begun)
+            self._picture = DiskSnapshot(files.folders, on_disk, begun)
         self._places = {
             self._absolute(entry.file.shown): (number, at)
             for number, package in enumerate(self._packages)
@@ -220,7 +220,7 @@ class Workspace:
         """Return the path of a file as the editor spells the folder, which may be a link."""
         return Path(os.path.normpath(self.folder / path))
 
-    def _files_read(self, files: Found) -> Iterator[Path]:
+    def _files_read(self, files: Listing) -> Iterator[Path]:
         """Yield the absolute paths of the files that a load reads in packages and for settings."""
         yield from (self._root.absolute(file.path) for file in files.files)
         homes = {self.folder, *files.packages, *(file.root for file in files.files)}
@@ -231,7 +231,7 @@ class Workspace:
         """Return whether the disk is certainly as it was read last."""
         if not self.is_loaded:
             return self.failure is not None or not is_folder(self.folder)
-        return self._picture.is_true()
+        return self._picture.is_current()
 
     def _text(self, path: Path) -> bytes | None:
         """Return the text of a file that is checked; `None` for other files."""
@@ -266,7 +266,7 @@ class Workspace:
         """Return whether the texts of a package may decide its name."""
         home = self._packages[number].home
         root = self._root
-        return not root.manifest(home) and any(map(root.locks, places(home, root)))
+        return not root.manifest(home) and any(map(root.locks, output_folders(home, root)))
 
     def _concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change the result of a check."""

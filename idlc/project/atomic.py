@@ -114,7 +114,7 @@ _held: set[Path] = set()
 
 
 @contextlib.contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def exclusive(folder: Path) -> Iterator[None]:
     """Wait until no other idlc writes to a folder, and let none begin meanwhile.
 
     The lock is the operating system's, on the folder itself, or the nearest above as long as
@@ -151,7 +151,7 @@ def _holding(place: Path) -> Iterator[None]:
 
 
 def _nearest(folder: Path) -> Path:
-    return next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+    return next((path for path in (folder, *folder.parents) if is_folder(path)), folder)
 
 
 def _lock(place: Path) -> int | None:

@@ -32,8 +32,8 @@ def cache_folder() -> Path | None:
         return None
     place = base / "idlc"
     try:
-        there = next(one for one in (place, *place.parents) if one.exists())
-        if not _is_ours(there):  # `sudo idlc` leaves nothing in another user's home
+        existing = next(folder for folder in (place, *place.parents) if folder.exists())
+        if not _is_ours(existing):  # `sudo idlc` leaves nothing in another user's home
             return None
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         private = _is_ours(place) and not _is_open(place)
@@ -45,11 +45,11 @@ def cache_folder() -> Path | None:
 def _base() -> Path | None:
     """Return where this system wants caches."""
     if sys.platform == "win32":
-        told = os.environ.get("LOCALAPPDATA", "")
+        setting = os.environ.get("LOCALAPPDATA", "")
     else:
-        told = os.environ.get("XDG_CACHE_HOME", "")
-    if Path(told).is_absolute():
-        return Path(told)
+        setting = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(setting).is_absolute():
+        return Path(setting)
     try:
         home = Path.home()
     except RuntimeError:

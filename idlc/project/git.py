@@ -21,7 +21,7 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.files import reason
-from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, look
+from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, list_files
 from idlc.project.root import MANIFEST, Root
 
 #: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
@@ -102,10 +102,12 @@ class Revision(NamedTuple):
         self, paths: Iterable[str], exclude: Exclusions, report: Report
     ) -> tuple[InterfaceFile, ...]:
         """Return the interface files that paths of the working tree meant; there may be none."""
-        there = [place for path in paths if (place := self.counterpart(path))]
-        places = [place for place in there if Path(place).exists()]
-        found = look(places, self.root, report, exclude.seen_from(self.folder, self.top)).files
-        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
+        counterparts = [place for path in paths if (place := self.counterpart(path))]
+        places = [place for place in counterparts if Path(place).exists()]
+        listed = list_files(
+            places, self.root, report, exclude.seen_from(self.folder, self.top)
+        ).files
+        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in listed)
 
     def holds(self, path: Path) -> bool:
         """Return whether a file of the working tree is in this repository, not in another."""
@@ -124,7 +126,7 @@ class Revision(NamedTuple):
     def is_skipped(self, shown: str) -> bool:
         """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
         path = PurePath(shown.removeprefix(self._shown(self.folder)[:-1]))
-        names = (one.as_posix() for one in (path, *path.parents))
+        names = (ancestor.as_posix() for ancestor in (path, *path.parents))
         return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
 
     def _shown(self, path: Path) -> str:
@@ -148,14 +150,14 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
             identity = _commit(name, top)
             hint = _DAMAGED
             entries = _extract(top, identity, folder)
-            submodules = tuple(one.path for one in entries if one.mode == _SUBMODULE)
+            submodules = tuple(entry.path for entry in entries if entry.mode == _SUBMODULE)
             skipped = _skipped(top, entries)
         except GitError as error:
             message = f"cannot read `git:{name}`: {one_line(str(error))}"
             if error.hint is None and hint:
                 hint = _completing(top) or hint
-            said = hint if error.hint is None else error.hint
-            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=said or None))
+            advice = hint if error.hint is None else error.hint
+            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=advice or None))
             revision = None
         else:
             revision = Revision(name, top, folder, root, submodules, skipped)
@@ -184,7 +186,7 @@ def commit(name: str, path: Path) -> str | None:
     return None
 
 
-def places(path: Path) -> tuple[Path, ...]:
+def reference_folders(path: Path) -> tuple[Path, ...]:
     """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
     with suppress(GitError):
         top = _repository(path)
@@ -196,8 +198,8 @@ def places(path: Path) -> tuple[Path, ...]:
 def setting(name: str, folder: Path) -> str:
     """Return a setting of git that holds in a folder, on one line; empty if there is none."""
     with suppress(GitError):
-        found = _git(_top(folder) or folder, ["config", "--get", name])
-        return one_line(found.decode("utf-8", errors="replace").strip())
+        value = _git(_top(folder) or folder, ["config", "--get", name])
+        return one_line(value.decode("utf-8", errors="replace").strip())
     return ""
 
 
@@ -207,7 +209,9 @@ def _top(path: Path) -> Path | None:
     Git would also take a tracked folder for a repository that only looks like the inside of one.
     """
     real = path.resolve()
-    return next((one for one in (real, *real.parents) if os.path.lexists(one / ".git")), None)
+    return next(
+        (folder for folder in (real, *real.parents) if os.path.lexists(folder / ".git")), None
+    )
 
 
 def _repository(path: Path) -> Path:
@@ -222,13 +226,13 @@ def _repository(path: Path) -> Path:
 
 
 def _commit(name: str, top: Path) -> str:
-    found = b""
+    identity = b""
     if name and not name.startswith("-"):
         words = ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"]
-        found = _git(top, words, otherwise="no such revision").rstrip()
-    if not _HASH.fullmatch(found):
+        identity = _git(top, words, otherwise="no such revision").rstrip()
+    if not _HASH.fullmatch(identity):
         raise GitError("no such revision")
-    return found.decode()
+    return identity.decode()
 
 
 def _program() -> str:
@@ -240,7 +244,7 @@ def _program() -> str:
     raise GitError("there is no `git` on PATH", "")
 
 
-def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "") -> bytes:
+def _git(top: Path, words: Sequence[str], input_: bytes = b"", otherwise: str = "") -> bytes:
     """Return what git prints; raise GitError, with git's own words, if it fails.
 
     Without words of its own, `otherwise` is the reason.
@@ -249,15 +253,15 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
     command = [_program(), *options, *words]
     kept = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
     try:
-        with TemporaryFile() as asked, TemporaryFile() as said:
-            asked.write(given)
-            asked.seek(0)
+        with TemporaryFile() as stdin, TemporaryFile() as stderr:
+            stdin.write(input_)
+            stdin.seek(0)
             with subprocess.Popen(  # noqa: S603 - no shell, and no option can be smuggled in
                 command,
                 cwd=top,
-                stdin=asked,
+                stdin=stdin,
                 stdout=subprocess.PIPE,
-                stderr=said,
+                stderr=stderr,
                 env=kept | _ENVIRONMENT,
             ) as process:
                 assert process.stdout is not None
@@ -270,8 +274,8 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
                 if len(answer) > MOST:
                     process.kill()
                     raise GitError(f"more than {MOST >> 20} MiB of files", "")
-            said.seek(0)
-            lines = list(filter(None, said.read(10_000).decode("utf-8", "replace").splitlines()))
+            stderr.seek(0)
+            lines = list(filter(None, stderr.read(10_000).decode("utf-8", "replace").splitlines()))
     except (OSError, ValueError) as error:
         raise GitError(f"git cannot be run: {reason(error)}", "") from None
     if process.returncode:
@@ -288,18 +292,20 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
     listed = _git(top, ["ls-tree", "-r", "-z", "--full-tree", commit])
     *lines, rest = listed.split(b"\0")
     entries = [_entry(line) for line in lines]
-    wanted = [one for one in entries if _is_wanted(one)]
-    names = list(dict.fromkeys(one.identity for one in wanted))
+    selected = [entry for entry in entries if _is_wanted(entry)]
+    names = list(dict.fromkeys(entry.identity for entry in selected))
     contents = dict(zip(names, _contents(top, names), strict=True))
     if rest:
         raise GitError("git's list of files ends in the middle")
     try:
-        for mode, identity, path in wanted:
+        for mode, identity, path in selected:
             target = root / path
             target.parent.mkdir(parents=True, exist_ok=True)
             if mode != _LINK:
                 target.write_bytes(contents[identity])
-        _link(root, {path: contents[identity] for mode, identity, path in wanted if mode == _LINK})
+        _link(
+            root, {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
+        )
     except (OSError, ValueError) as error:
         raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
     return entries
@@ -307,24 +313,24 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
 
 def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
     """Return what git leaves out of the working tree, if any file of a commit is not there."""
-    if all(os.path.lexists(top / one.path) for one in entries if _is_wanted(one)):
+    if all(os.path.lexists(top / entry.path) for entry in entries if _is_wanted(entry)):
         return frozenset()
     *lines, rest = _git(top, ["ls-files", "-t", "-z"]).split(b"\0")
     if rest or not all(line[1:2] == b" " for line in lines):
         raise GitError("git's list of files is damaged")
-    found = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
-    return frozenset(found)
+    skipped = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
+    return frozenset(skipped)
 
 
 def _link(root: Path, links: dict[str, bytes]) -> None:
     """Make a revision's links, but for those that lead out of it."""
-    made = []
+    created = []
     for path, content in links.items():
         target = root / path
         with suppress(OSError, ValueError):  # not every system has links
             target.symlink_to(os.fsdecode(content))
-            made.append(target)
-    for target in made:
+            created.append(target)
+    for target in created:
         try:
             target.stat()  # the system follows a few links only, so that few are resolved
             is_inside = target.resolve().is_relative_to(root)
@@ -342,16 +348,16 @@ class _Entry(NamedTuple):
 
 def _entry(line: bytes) -> _Entry:
     """Return an entry of a tree."""
-    found = _ENTRY.fullmatch(line)
-    if found is None:
+    match = _ENTRY.fullmatch(line)
+    if match is None:
         raise GitError("git's list of files is damaged")
-    return _Entry(found[1], found[2], found[3].decode("utf-8", "surrogateescape"))
+    return _Entry(match[1], match[2], match[3].decode("utf-8", "surrogateescape"))
 
 
 def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:
     """Yield what objects hold, which have to be files."""
-    asked = b"".join(name + b"\n" for name in names)
-    answer = _git(top, ["cat-file", "--batch"], asked) if names else b""
+    request = b"".join(name + b"\n" for name in names)
+    answer = _git(top, ["cat-file", "--batch"], request) if names else b""
     at = 0
     for name in names:
         end = answer.find(b"\n", at)

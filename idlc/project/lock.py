@@ -52,11 +52,11 @@ class Tree:
         folder = self._folder(path.rpartition("/")[0])
         if folder is not True:
             return folder or None
-        here = f"{self._root}/{path}"
+        whole = f"{self._root}/{path}"
         try:
-            status = os.lstat(here)
+            status = os.lstat(whole)
             if stat.S_ISREG(status.st_mode):
-                return content(here, status.st_size)
+                return content(whole, status.st_size)
             return Obstacle(_is(path, status.st_mode))
         except FileNotFoundError:
             return None
@@ -74,19 +74,19 @@ class Tree:
 
     def _is_one(self, path: str, other: str) -> bool:
         try:
-            first, second = (os.lstat(f"{self._root}/{one}") for one in (path, other))
+            first, second = (os.lstat(f"{self._root}/{name}") for name in (path, other))
         except OSError:
             return False
         return path != other and os.path.samestat(first, second)
 
     def _folder(self, path: str) -> Obstacle | bool:
         """Return whether a folder is there, or what is there instead of it or above it."""
-        known = self._folders.get(path)
-        if known is None:
+        status = self._folders.get(path)
+        if status is None:
             above = self._folder(path.rpartition("/")[0])
-            known = self._look(path) if above is True else above
-            self._folders[path] = known
-        return known
+            status = self._look(path) if above is True else above
+            self._folders[path] = status
+        return status
 
     def _look(self, path: str) -> Obstacle | bool:
         try:

@@ -46,7 +46,7 @@ class Facts(msgspec.Struct, frozen=True):
     interface files by name within the package, empty without `outputs`; `whole` is whether these
     files are all that it has. `generates` is whether its CMakeLists.txt
     generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
-    whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    whether resource/NAME exists. `available` are the names of ROS packages that can be found.
     `files` are the paths of interface files in the package's folder by name within the package.
     `folders` are those with files by dotted name, and whether they are Python packages.
     """
@@ -65,17 +65,17 @@ class Facts(msgspec.Struct, frozen=True):
     marker: bool = False
     whole: bool = False
     outputs: tuple[GeneratedOutput, ...] = ()
-    known: frozenset[str] = frozenset()
+    available: frozenset[str] = frozenset()
     files: Mapping[str, str] = {}
     folders: Mapping[str, bool] = {}
 
     def declared(self, *tags: str) -> dict[str, Statement]:
         """Return the statements with one of these tags by their text, the first of each."""
-        found: dict[str, Statement] = {}
+        by_text: dict[str, Statement] = {}
         for statement in self.statements:
             if statement.tag in tags:
-                found.setdefault(statement.text, statement)
-        return found
+                by_text.setdefault(statement.text, statement)
+        return by_text
 
     @property
     def build_type(self) -> str:
@@ -152,7 +152,9 @@ def read(data: bytes, encoding: str | None = None) -> Manifest:
         raise NotXmlError(str(error).partition(":")[0], error.lineno, error.offset) from error
     except (ValueError, LookupError) as error:  # an unknown encoding
         raise NotXmlError(str(error).partition(":")[0]) from error
-    return Manifest(reader.format, tuple(sorted(reader.found, key=lambda one: one.start)))
+    return Manifest(
+        reader.format, tuple(sorted(reader.elements, key=lambda element: element.start))
+    )
 
 
 class _Reader:
@@ -164,7 +166,7 @@ class _Reader:
     def __init__(self, data: bytes, encoding: str | None) -> None:
         self.data = data
         self.format = ""
-        self.found: list[Element] = []
+        self.elements: list[Element] = []
         self.open: list[str] = []
         self.begun: list[tuple[int, dict[str, str], list[str]]] = []
         self.parser = expat.ParserCreate(encoding)
@@ -188,7 +190,7 @@ class _Reader:
             if (parents := tuple(self.open)) in _PARENTS:
                 end = self.data.find(b">", self.parser.CurrentByteIndex) + 1
                 text = "".join(texts).strip()
-                self.found.append(Element(parents, tag, text, start, end, attributes))
+                self.elements.append(Element(parents, tag, text, start, end, attributes))
 
     def _text(self, text: str) -> None:
         for _, _, texts in self.begun:

@@ -28,13 +28,13 @@ def ament_prefixes() -> tuple[Path, ...]:
 
 def modules_folder() -> str:
     """Return the folder of a prefix in which the Python of ROS 2 here looks for modules."""
-    found = (
+    folders = (
         path.parent.relative_to(prefix).as_posix()
         for prefix in ament_prefixes()
         for path in sorted(prefix.glob("lib/python3*/site-packages/rclpy"))
     )
     own = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
-    return next(found, own)
+    return next(folders, own)
 
 
 def runs_nodes() -> bool:
@@ -101,13 +101,15 @@ def distribution(prefixes: Iterable[Path] | None = None) -> Distribution:
     nothing is installed, ROS_DISTRO alone counts: it is often set wrongly.
     """
     places = ament_prefixes() if prefixes is None else prefixes
-    found = list(filter(None, map(installed, places)))
-    wanted = os.environ.get("ROS_DISTRO", "")
-    if not found and wanted:
+    distributions = list(filter(None, map(installed, places)))
+    requested = os.environ.get("ROS_DISTRO", "")
+    if not distributions and requested:
         return Distribution(
-            wanted if wanted in _BY_VERSION.values() else "", f"ROS_DISTRO={wanted}"
+            requested if requested in _BY_VERSION.values() else "", f"ROS_DISTRO={requested}"
         )
-    chosen = [one for one in found if one.name == wanted] or found
+    chosen = [
+        candidate for candidate in distributions if candidate.name == requested
+    ] or distributions
     return chosen[0] if chosen else Distribution(DEFAULT, "no ROS 2 is installed here")
 
 

@@ -123,11 +123,11 @@ class Root:
 
 
 def _nearest_manifest(folder: Path) -> Path | None:
-    for here in map(str, (folder, *folder.parents)):
-        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
+    for directory in map(str, (folder, *folder.parents)):
+        path = os.path.join(directory, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
         if is_file(path):
             return Path(path)
-        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
+        if os.path.exists(os.path.join(directory, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
             break
     return None
 
@@ -138,5 +138,5 @@ def _locks(folder: Path) -> Iterator[lock.Lock]:
     except OSError:
         return
     for package in packages:
-        if (found := lock.load_lock(package, "", Report())) is not None:
-            yield found
+        if (record := lock.load_lock(package, "", Report())) is not None:
+            yield record

@@ -39,7 +39,7 @@ Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
 
-class Place(NamedTuple):
+class TableLocation(NamedTuple):
     """A table of a file: its name, how messages call it, and its number among those of one name."""
 
     source: Source
@@ -70,10 +70,10 @@ class Place(NamedTuple):
         if self.number < len(headers):
             header = headers[self.number]
             after = re.compile(r"(?m)^[ \t]*\[").search(text, header.end())
-            found = _key(key).search(text, header.end(), after.start() if after else len(text))
-            return Span(self.source, *(found or header).span(1))
-        found = _key(key).search(text)
-        return Span(self.source, *found.span(1)) if found else None
+            match = _key(key).search(text, header.end(), after.start() if after else len(text))
+            return Span(self.source, *(match or header).span(1))
+        match = _key(key).search(text)
+        return Span(self.source, *match.span(1)) if match else None
 
 
 def _key(name: str) -> re.Pattern[str]:
@@ -81,32 +81,32 @@ def _key(name: str) -> re.Pattern[str]:
 
 
 def read_table(
-    table: Mapping[str, Any], shape: type[_Shape], place: Place, report: Report
+    table: Mapping[str, Any], shape: type[_Shape], place: TableLocation, report: Report
 ) -> _Shape | None:
     """Return a table as a Struct; what is wrong is reported and left out.
 
     `None` means that something without a default is missing.
     """
     fields = {field.encode_name: field for field in msgspec.structs.fields(shape)}
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, value in table.items():
         if key not in fields:
-            listed = ", ".join(f"`{known}`" for known in fields)
+            listed = ", ".join(f"`{name}`" for name in fields)
             hint = did_you_mean(key, fields) or f"the settings are {listed}"
             place.wrong(key, f"unknown setting `{key}` in {place.shown}", report, hint)
             continue
         read = read_value(value, fields[key].type, key, place, report)
         if read is not None:
-            found[fields[key].name] = read
+            values[fields[key].name] = read
     missing = [key for key, field in fields.items() if field.required and key not in table]
     for key in missing:
         what = _meta(fields[key].type).description
         place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
     required = {field.name for field in fields.values() if field.required}
-    return shape(**found) if required <= found.keys() else None
+    return shape(**values) if required <= values.keys() else None
 
 
-def read_value(value: object, type_: Any, key: str, place: Place, report: Report) -> Any:
+def read_value(value: object, type_: Any, key: str, place: TableLocation, report: Report) -> Any:
     """Return a value as one of the types above; report one that is of another, return `None`."""
     try:
         return msgspec.convert(value, type_)
@@ -117,7 +117,7 @@ def read_value(value: object, type_: Any, key: str, place: Place, report: Report
 
 
 def _meta(type_: Any) -> Meta:
-    return next(one for one in get_args(type_) if isinstance(one, Meta))
+    return next(argument for argument in get_args(type_) if isinstance(argument, Meta))
 
 
 SETTINGS_FILE = "pyproject.toml"
@@ -217,31 +217,31 @@ def _broken(source: Source, message: str) -> Diagnostic:
 
 def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
     """Return the settings in a table; report each that is unknown or of the wrong type."""
-    place = Place(source, "tool.idlc", "[tool.idlc]")
+    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
     if not isinstance(table, dict):
         place.wrong("idlc", "`tool.idlc` must be a table", report)
         return Config(root)
-    found = read_table(table, Settings, place, report)
-    assert found is not None
-    for path in found.paths:
+    settings = read_table(table, Settings, place, report)
+    assert settings is not None
+    for path in settings.paths:
         place.no_url("paths", path, report)
     return Config(
         root,
-        paths=tuple(_typed(folder, path, root) for path in found.paths),
-        out=_typed(folder, found.out, root) if found.out else None,
-        package=found.package or None,
-        include=tuple(_typed(folder, path, root) for path in found.include),
-        exclude=found.exclude,
-        vendor_deps=found.vendor_deps,
-        distro=_distros(found.distro, place, report),
-        templates=_typed(folder, found.templates, root) if found.templates else None,
-        tables={"breaking": found.breaking, "check": found.check},
+        paths=tuple(_typed(folder, path, root) for path in settings.paths),
+        out=_typed(folder, settings.out, root) if settings.out else None,
+        package=settings.package or None,
+        include=tuple(_typed(folder, path, root) for path in settings.include),
+        exclude=settings.exclude,
+        vendor_deps=settings.vendor_deps,
+        distro=_distros(settings.distro, place, report),
+        templates=_typed(folder, settings.templates, root) if settings.templates else None,
+        tables={"breaking": settings.breaking, "check": settings.check},
         source=source,
         folder=folder,
     )
 
 
-def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tuple[str, ...]:
+def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
     """Return the names of distributions; report those that are unknown."""
     names = listed(value) if isinstance(value, str) else value
     for name in names:
@@ -262,14 +262,14 @@ def _typed(folder: Path, path: str, root: Root) -> str:
 
 def command_table(
     config: Config, name: str, shape: type[_Shape], report: Report
-) -> tuple[_Shape, Place | None]:
+) -> tuple[_Shape, TableLocation | None]:
     """Return the table of a command and its place, without one where there is no file."""
     if config.source is None:
         return shape(), None
-    place = Place(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
-    found = read_table(config.tables.get(name, {}), shape, place, report)
-    assert found is not None
-    return found, place
+    place = TableLocation(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
+    table = read_table(config.tables.get(name, {}), shape, place, report)
+    assert table is not None
+    return table, place
 
 
 class Scope(msgspec.Struct, frozen=True):

@@ -55,7 +55,7 @@ def verbatim(name: str) -> str:
     return loader.get_source(environment(), name)[0]
 
 
-def keep() -> None:
+def keep_compiled() -> None:
     """Let templates be compiled once: to compile them takes longer than to fill them in."""
     if environment().bytecode_cache is not None:
         return

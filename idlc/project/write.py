@@ -18,7 +18,7 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import lock
-from idlc.project.atomic import alone, create, move_over, uninterrupted
+from idlc.project.atomic import create, exclusive, move_over, uninterrupted
 from idlc.project.files import is_folder, reason
 from idlc.project.lock import FILE, Obstacle, Tree, digest, is_same
 
@@ -85,16 +85,16 @@ def plan(
         if isinstance(old, Obstacle):
             refused += [_in_the_way(name, path, old)] if new is not None else []
             continue
-        ground = _ground(path, old, owned)
-        if ground is Ground.USERS:
+        ground = _ownership(path, old, owned)
+        if ground is Ownership.USERS:
             continue
         if new is not None:
             outputs[path] = digest(new)
         if not is_same(old, new):
-            if ground is not Ground.OWN and not force:
+            if ground is not Ownership.OWN and not force:
                 diff = _diff(old, new) if len(refused) < DIFFS else ""
                 refused.append(_refusal(f"{name}/{path}", ground, diff, removed=new is None))
-            changes.append(Change(path, old, new, backup=ground is not Ground.OWN))
+            changes.append(Change(path, old, new, backup=ground is not Ownership.OWN))
     if isinstance(record, Obstacle):
         refused.append(_in_the_way(name, home + FILE, record))
     report.extend(refused)
@@ -103,7 +103,7 @@ def plan(
     return Plan(out, tuple(changes), outputs, record, home)
 
 
-class Ground(enum.Enum):
+class Ownership(enum.Enum):
     """The file in a place that is to be written, replaced or removed."""
 
     OWN = "nothing, or what idlc wrote"
@@ -112,12 +112,12 @@ class Ground(enum.Enum):
     USERS = "a file that idlc did not write, and that stays"
 
 
-def _ground(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ground:
+def _ownership(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ownership:
     if old is None or digest(old) in owned.get(path, ()):
-        return Ground.OWN
+        return Ownership.OWN
     if path in owned:
-        return Ground.EDITED
-    return Ground.USERS if path in YIELDING else Ground.FOREIGN
+        return Ownership.EDITED
+    return Ownership.USERS if path in YIELDING else Ownership.FOREIGN
 
 
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
@@ -128,8 +128,8 @@ def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
     )
 
 
-def _refusal(shown: str, ground: Ground, diff: str, *, removed: bool) -> Diagnostic:
-    if ground is Ground.FOREIGN:
+def _refusal(shown: str, ground: Ownership, diff: str, *, removed: bool) -> Diagnostic:
+    if ground is Ownership.FOREIGN:
         return codes.FOREIGN_FILE.of(
             shown,
             f"`{shown}` is in the way and was not written by idlc",
@@ -166,29 +166,31 @@ def _lines(data: bytes) -> list[str]:
     return data.decode("utf-8", errors="replace").splitlines()
 
 
-def emptied(changes: Iterable[Change]) -> list[str]:
+def emptied_folders(changes: Iterable[Change]) -> list[str]:
     """Return the folders that removed files were in, the deepest first."""
-    found = {
+    folders = {
         str(folder)
         for change in changes
         if change.new is None
         for folder in PurePosixPath(change.path).parents
         if folder.parts
     }
-    return sorted(found, key=lambda folder: (-folder.count("/"), folder))
+    return sorted(folders, key=lambda folder: (-folder.count("/"), folder))
 
 
 STAGE = ".idlc-stage-"
 
 
-def owned(out: Path, known: lock.Lock | None) -> dict[str, frozenset[str]]:
+def owned_files(out: Path, existing: lock.Lock | None) -> dict[str, frozenset[str]]:
     """Return the files that idlc wrote below `out`, each with the digests that it may have."""
-    found = {path: frozenset((one,)) for path, one in (known.outputs if known else {}).items()}
+    digests = {
+        path: frozenset((value,)) for path, value in (existing.outputs if existing else {}).items()
+    }
     for journal in journals(out):
         with contextlib.suppress(ValueError):
-            for path, one in lock.decode(journal).outputs.items():
-                found[path] = found.get(path, frozenset()) | {one}
-    return found
+            for path, value in lock.decode(journal).outputs.items():
+                digests[path] = digests.get(path, frozenset()) | {value}
+    return digests
 
 
 def journals(out: Path) -> Iterator[bytes]:
@@ -242,16 +244,16 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
 def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
     """Make all changes or none; report IDL612 and return `False` on a failure."""
     out = plan.out
-    with alone(out):
+    with exclusive(out):
         try:
             transaction = _Transaction(out, plan.home)
         except OSError as error:
             report.add(_failure(name, error))
             return False
-        left, changed = _left(out, plan.changes)
+        left, changed = _pending(out, plan.changes)
         if changed is not None:
             transaction.undo()
-            report.add(_meanwhile(name, changed))
+            report.add(_changed_meanwhile(name, changed))
             return False
         try:
             transaction.run(left, journal)
@@ -268,7 +270,7 @@ def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
     return True
 
 
-def _left(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
+def _pending(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
     """Return the changes that nobody else has made meanwhile, and the first that cannot be made."""
     tree = Tree(out)
     left = []
@@ -282,7 +284,7 @@ def _left(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], s
     return tuple(left), None
 
 
-def _meanwhile(name: str, path: str) -> Diagnostic:
+def _changed_meanwhile(name: str, path: str) -> Diagnostic:
     return codes.CANNOT_WRITE.of(
         f"{name}/{path}",
         f"`{name}/{path}` was changed while idlc was running",
@@ -328,9 +330,9 @@ class _Transaction:
     def __init__(self, out: Path, home: str) -> None:
         self._out = out
         self._stage = out / home / f"{STAGE}{os.getpid()}"
-        self._made: list[Path] = []
+        self._created: list[Path] = []
         self._done: list[tuple[str, bytes | None]] = []
-        self._there: set[str] = set()
+        self._folders: set[str] = set()
         self.current = ""
         self._make_folder(out)
 
@@ -341,7 +343,7 @@ class _Transaction:
             folder = folder.parent
         for path in reversed(missing):
             path.mkdir()
-            self._made.append(path)
+            self._created.append(path)
 
     def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
         """Make all changes, in order; raises what stopped it."""
@@ -375,9 +377,9 @@ class _Transaction:
 
     def _make_parent(self, path: str) -> None:
         folder = path.rpartition("/")[0]
-        if folder not in self._there:
+        if folder not in self._folders:
             self._make_folder(self._out / folder)
-            self._there.add(folder)
+            self._folders.add(folder)
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""
@@ -394,7 +396,7 @@ class _Transaction:
                 for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
                     with contextlib.suppress(OSError):
                         cached.unlink()
-        for folder in emptied(changes):
+        for folder in emptied_folders(changes):
             for path in (self._out / folder / "__pycache__", self._out / folder):
                 with contextlib.suppress(OSError):
                     path.rmdir()
@@ -416,7 +418,7 @@ class _Transaction:
                 torn.append(path)
         if not torn:
             _remove(self._stage)
-        for folder in reversed(self._made):
+        for folder in reversed(self._created):
             with contextlib.suppress(OSError):
                 folder.rmdir()
         return torn
