@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Exclusion(msgspec.Struct, frozen=True):
-    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are seen from.
+    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are relative to.
 
     `*` and `?` stand for any text within one name, `**` for any number of folders. A pattern may
     begin at any folder, and one that fits a folder leaves out everything in it.
@@ -68,7 +68,7 @@ class Exclusions(msgspec.Struct, frozen=True):
 
 
 def exclusion(patterns: Iterable[str], base: Path) -> Exclusion:
-    """Return what patterns leave out, as they are written in the folder `base`."""
+    """Return the exclusion by patterns that are written in the folder `base`."""
     split = (pattern.replace("\\", "/").split("/") for pattern in patterns)
     named = (tuple(name for name in names if name not in ("", ".")) for names in split)
     return Exclusion(tuple(filter(None, named)), base)
@@ -91,7 +91,7 @@ def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
 
 
 def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
-    """Return places in a pattern, with those that are reached where `**` stands for no folder."""
+    """Return places in a pattern, with places that are reached where `**` matches no folder."""
     for place in sorted(places):
         while place < len(pattern) and pattern[place] == "**":
             place += 1
@@ -101,19 +101,19 @@ def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
 
 KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
 KIND_FOLDERS = frozenset(KINDS.values())
-#: Folders that hold copies or no sources: what colcon and Python tools write.
+#: Folders with copies or without sources, which colcon and Python tools write.
 SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
 #: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
-#: What may be a type or package, as ROS 2, Python or C++ writes it.
+#: The name of a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
 NOTHING = Exclusions()
 
 
 class InterfaceFile(msgspec.Struct, frozen=True):
-    """An interface file: its absolute path, and that by which messages call it.
+    """An interface file: its absolute path, and the path by which messages call it.
 
-    `given` is the path on the command line that led to it, `root` the folder that holds the
+    `argument` is the path on the command line that led to it, `root` the folder that holds the
     msg/, srv/ and action/ folders, or the file's own.
     """
 
@@ -139,8 +139,8 @@ def is_path(text: str, root: Root) -> bool:
 class Listing(msgspec.Struct, frozen=True):
     """The files below some paths: interface files, each once, sorted, and the folders of packages.
 
-    `empty` are the given folders without interface files, `folders` all that were looked into, by
-    absolute path, with their status from before that.
+    `empty` are the listed folders without interface files, `folders` all that were searched, by
+    absolute path, with their status from before the search.
     """
 
     files: tuple[InterfaceFile, ...]
@@ -161,7 +161,7 @@ def find(
 def no_interfaces(
     folder: str, root: Root, exclude: Exclusions = NOTHING, *, also: str = ""
 ) -> Diagnostic:
-    """Return the problem with a folder without interface files; `also` is what else is missing."""
+    """Return the problem with a folder without interface files, and without files of `also`."""
     if exclude is not NOTHING and list_files((folder,), root, Report()).files:
         message = f"every interface file in `{folder}` is excluded"
         return codes.NO_INTERFACES.of(folder, message, hint="see `exclude` in [tool.idlc]")
@@ -175,7 +175,7 @@ def no_interfaces(
 def list_files(
     paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING
 ) -> Listing:
-    """Return what paths mean; a folder means everything below it.
+    """Return the files that paths mean; a folder means everything below it.
 
     Reports IDL601, IDL602, IDL605 and IDL622.
     """
@@ -252,7 +252,7 @@ def _interface(path: Path, whole: str, argument: str, root: Root) -> InterfaceFi
 
 @lru_cache(maxsize=1024)
 def root_of(folder: str) -> Path:
-    """Return the folder above `folder` if that is for one kind of interface, or itself."""
+    """Return the parent of a folder for one kind of interface; any other folder itself."""
     path = Path(folder)
     return path.parent if path.name in KIND_FOLDERS else path
 
@@ -272,11 +272,10 @@ def walk(
     """Yield each interface file and package.xml below a folder, in no particular order.
 
     Paths begin as the folder's does. `folders` gets the status of each folder from before it was
-    listed.
-    Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
+    listed. Files whose extensions have capitals, which ROS 2 does not read, are included.
 
-    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
-    one excepted; links to folders are followed, each folder once.
+    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, except `folder`
+    itself; links to folders are followed, each folder once.
     """
     waiting = [folder]
     visited: set[tuple[int, int]] = set()
@@ -305,7 +304,7 @@ def walk(
 
 
 def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
-    """Return whether `walk` would not reach a folder that lies in another."""
+    """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
         if (
@@ -362,12 +361,12 @@ class DiskSnapshot:
         self._stamps = {path: _stamp_of(status) for path, status in folders.items()}
         for path in files:
             stamp = _stamp(path)
-            # what changed since then was perhaps read before that
+            # a file that changed since then may have been read before its change
             is_new = any(begun - TICK <= at <= now for at in stamp[:2])
             self._stamps[path] = _UNKNOWN if is_new else stamp
 
     def is_current(self) -> bool:
-        """Return whether they surely still are the same."""
+        """Return whether all of them are certainly unchanged."""
         return all(stamp == _stamp(path) for path, stamp in self._stamps.items())
 
 

@@ -1,6 +1,6 @@
 """The interface files of a git revision, in a folder of their own.
 
-Repositories are others': what their settings name is not run, and nothing is fetched.
+Repositories are not trusted: programs that their settings name are not run, nothing is fetched.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from idlc.project.files import reason
 from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, list_files
 from idlc.project.root import MANIFEST, Root
 
-#: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
+#: Bytes; the longest answer of git that is read. A few kilobytes can name billions of files.
 MOST = 128 << 20
-#: Seconds; how long one answer may take. Settings can include a pipe, names can hold patterns.
+#: Seconds that one answer may take. Settings can include a pipe, names can hold patterns.
 PATIENCE = 120.0
 _HASH = re.compile(rb"[0-9a-f]{40}(?:[0-9a-f]{24})?")
 _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTALL)
 _LINK, _SUBMODULE = b"120000", b"160000"
-#: What a repository's own settings could otherwise have git run. Older gits know some of it only.
+#: Settings that could otherwise have git run programs. Older versions know some of them only.
 _SETTINGS = {
     "safe.bareRepository": "explicit",
     "core.fsmonitor": "false",
@@ -58,15 +58,15 @@ _SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
 _PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
 _NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
 _DAMAGED = "`git fsck` lists what is missing or damaged"
-#: How git begins the sentences that say what is wrong.
+#: Prefixes of git's error messages.
 _BAD = ("fatal: ", "error: ")
 
 
 class GitError(Exception):
-    """Git could not answer; the text says why, and `hint` what to do.
+    """Git could not answer; the text is the reason, and `hint` the remedy.
 
-    Without one, something is missing or damaged in the repository; an empty one is for what cannot
-    be repaired there.
+    Without a hint, something is missing or damaged in the repository; an empty one is for problems
+    that cannot be repaired there.
     """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
@@ -77,9 +77,9 @@ class GitError(Exception):
 class Revision(NamedTuple):
     """A revision's interface files below `folder`, laid out as in the repository at `top`.
 
-    `submodules` are the paths of those that it has, of which nothing is below `folder`. `skipped`
-    are the paths that git does not check out, as in a sparse checkout. Paths of the working tree
-    are seen from `root`.
+    `submodules` are the paths of its submodules, whose files are not below `folder`. `skipped` are
+    the paths that git does not check out, as in a sparse checkout. Paths of the working tree are
+    relative to `root`.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Revision(NamedTuple):
     skipped: frozenset[str] = frozenset()
 
     def counterpart(self, path: str) -> str | None:
-        """Return where a path of the working tree is in the revision; `None` outside of it."""
+        """Return the path in the revision for one of the working tree; `None` outside of it."""
         try:
             return (
                 self.folder / self.root.absolute(path).resolve().relative_to(self.top)
@@ -114,7 +114,7 @@ class Revision(NamedTuple):
         return _top(path) == self.top
 
     def unknown(self, paths: Iterable[str]) -> Iterator[str]:
-        """Yield the submodules below paths that are none any more: what they held is not known."""
+        """Yield the submodules below paths that are none any more: their files are not known."""
         places = [Path(place) for path in paths if (place := self.counterpart(path))]
         for name in self.submodules:
             now = self.top / name
@@ -130,7 +130,7 @@ class Revision(NamedTuple):
         return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
 
     def _shown(self, path: Path) -> str:
-        """Return how a file of the revision is called in messages."""
+        """Return the name of a file of the revision in messages."""
         return f"git:{self.name}:{path.relative_to(self.folder).as_posix()}"
 
 
@@ -175,12 +175,12 @@ def _completing(top: Path) -> str:
 
 
 def is_revision(name: str, path: str, root: Root) -> bool:
-    """Return whether a name means a revision of the repository that holds `path`, and no file."""
+    """Return whether a name is a revision of the repository that holds `path`, and no file."""
     return not os.path.lexists(root.path(name)) and commit(name, root.absolute(path)) is not None
 
 
 def commit(name: str, path: Path) -> str | None:
-    """Return which commit a name means in the repository that holds `path`, if it means one."""
+    """Return the commit of a name in the repository that holds `path`; `None` if it has none."""
     with suppress(GitError):
         return _commit(name, _repository(path))
     return None
@@ -196,7 +196,7 @@ def reference_folders(path: Path) -> tuple[Path, ...]:
 
 
 def setting(name: str, folder: Path) -> str:
-    """Return a setting of git that holds in a folder, on one line; empty if there is none."""
+    """Return a setting of git for a folder, on one line; empty if there is none."""
     with suppress(GitError):
         value = _git(_top(folder) or folder, ["config", "--get", name])
         return one_line(value.decode("utf-8", errors="replace").strip())
@@ -236,7 +236,7 @@ def _commit(name: str, top: Path) -> str:
 
 
 def _program() -> str:
-    """Return the git on PATH; what lies in the working folder is not the user's."""
+    """Return the git on PATH; a program in the working folder is not trusted."""
     name = "git.exe" if os.name == "nt" else "git"
     for entry in map(Path, os.get_exec_path()):
         if entry.is_absolute() and os.access(entry / name, os.X_OK) and (entry / name).is_file():
@@ -245,9 +245,9 @@ def _program() -> str:
 
 
 def _git(top: Path, words: Sequence[str], input_: bytes = b"", otherwise: str = "") -> bytes:
-    """Return what git prints; raise GitError, with git's own words, if it fails.
+    """Return git's output; raise GitError, with git's own message, if it fails.
 
-    Without words of its own, `otherwise` is the reason.
+    `otherwise` is the reason if git gives none.
     """
     options = [word for pair in _SETTINGS.items() for word in ("-c", "=".join(pair))]
     command = [_program(), *options, *words]
@@ -312,7 +312,7 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
 
 
 def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
-    """Return what git leaves out of the working tree, if any file of a commit is not there."""
+    """Return the paths that git keeps out of the working tree, if a file of a commit is absent."""
     if all(os.path.lexists(top / entry.path) for entry in entries if _is_wanted(entry)):
         return frozenset()
     *lines, rest = _git(top, ["ls-files", "-t", "-z"]).split(b"\0")
@@ -323,7 +323,7 @@ def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
 
 
 def _link(root: Path, links: dict[str, bytes]) -> None:
-    """Make a revision's links, but for those that lead out of it."""
+    """Make a revision's links, except links that lead out of it."""
     created = []
     for path, content in links.items():
         target = root / path
@@ -355,7 +355,7 @@ def _entry(line: bytes) -> _Entry:
 
 
 def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:
-    """Yield what objects hold, which have to be files."""
+    """Yield the contents of objects, which have to be files."""
     request = b"".join(name + b"\n" for name in names)
     answer = _git(top, ["cat-file", "--batch"], request) if names else b""
     at = 0

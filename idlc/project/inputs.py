@@ -1,4 +1,4 @@
-"""Input files by package: which files belong together, and under which name."""
+"""Input files by package, and the names of the packages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from idlc.project.settings import Scope, load_settings, scope
 
 
 def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:
-    """Return files by the folder that stands for their package."""
+    """Return files by the home folder of their package."""
     homes: dict[Path, list[InterfaceFile]] = {}
     for file in files:
         declared = root.manifest(file.root)
@@ -32,7 +32,7 @@ def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[Inter
 def separate_homes(homes: Mapping[Path, list[InterfaceFile]], root: Root) -> list[Path]:
     """Return the folders of packages if the files below them are no single package.
 
-    Files without a package.xml that were given by several paths are one.
+    Files without a package.xml from several arguments are one.
     """
     by_argument: dict[str, set[Path]] = {}
     for home, files in homes.items():
@@ -49,8 +49,8 @@ def name_of(
 ) -> tuple[str, str]:
     """Return a package's name, and a note about it if that is a guess.
 
-    It is what the nearest package.xml says, else what [tool.idlc] compiles the files into, else
-    what an idlc.lock nearby says of them, else the folder's name.
+    It is the name in the nearest package.xml, else that of the output in [tool.idlc], else the one
+    that an idlc.lock nearby records for these files, else the folder's name.
     """
     declared = scope.root.manifest(home)
     if declared:
@@ -75,7 +75,7 @@ def _by_settings(home: Path, scope: Scope) -> str | None:
 
 
 def output_folders(home: Path, root: Root) -> tuple[Path, ...]:
-    """Return the folders in which an output of a package is looked for."""
+    """Return the folders in which outputs of a package are searched."""
     return tuple(dict.fromkeys((home, home.parent, root.base)))
 
 
@@ -91,7 +91,7 @@ def _by_lock(home: Path, root: Root, digests: Callable[[], Mapping[str, str]]) -
 
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
-    """Return whether a package can be called so and imported; reports IDL607."""
+    """Return whether a package can have a name and be imported; reports IDL607."""
     from idlc.model.names import why_not_package  # a check needs no emitter
 
     what = why_not_package(name)
@@ -121,10 +121,9 @@ class Input(msgspec.Struct, frozen=True, dict=True):
 
 
 class Inputs(msgspec.Struct, frozen=True):
-    """The files of one package, in order, and the folders that they lie in.
+    """The files of one package, in order, and their folders.
 
-    `home` is the folder that stands for the package. `borrowed` files were
-    found as those of other packages are.
+    `home` is the package's own folder. `borrowed` files were found as a dependency's are.
     """
 
     package: str
@@ -137,7 +136,7 @@ class Inputs(msgspec.Struct, frozen=True):
     def digests(self) -> dict[str, str]:
         """The SHA-256 of each file by its name within the package.
 
-        Of a borrowed one it is that of its meaning: it may be found elsewhere the next time.
+        For a borrowed one it is the digest of its meaning: the next run may find another copy.
         """
         if self.borrowed:
             return {
@@ -146,7 +145,7 @@ class Inputs(msgspec.Struct, frozen=True):
         return {entry.file.key: digest(entry.data) for entry in self.files}
 
     def is_whole(self, root: Root) -> bool:
-        """Return whether a folder was given, so that what is not in it does not exist."""
+        """Return whether an argument is a folder, so that the package has no other interfaces."""
         return any(is_folder(Path(root.path(entry.file.argument))) for entry in self.files)
 
     @property
@@ -163,7 +162,7 @@ def load(
     root: Root,
     report: Report,
 ) -> Inputs:
-    """Read a package's files; report IDL609 for each that is there twice."""
+    """Read a package's files; report IDL609 for each duplicate."""
     loaded: dict[str, Input] = {}
     for file in files:
         first = loaded.get(file.key)
@@ -228,19 +227,19 @@ def without_duplicates(
 
 
 def nearby_packages(root: Root) -> Mapping[str, Sequence[Path]]:
-    """Return the folders of the packages that pyproject.toml names, or of the one around."""
+    """Return the folders of the packages that pyproject.toml names, or of the enclosing one."""
     declared = root.manifest(root.base)
     enclosing = (str(declared.parent),) if declared else ()
     return _packages(load_settings(root, Report()).paths or enclosing, root)
 
 
 def packages_below(root: Root) -> Mapping[str, Sequence[Path]]:
-    """Return the folders of all packages below the base; this looks at every folder."""
+    """Return the folders of all packages below the base; this searches every folder."""
     return _packages((".",), root)
 
 
 def names(root: Root) -> list[str]:
-    """Return what is in the base."""
+    """Return the names of the files and folders in the base."""
     try:
         return sorted(path.name for path in root.base.iterdir())
     except OSError:

@@ -1,4 +1,4 @@
-"""Where other packages' interfaces are: along -I, in the ament prefixes, in the catalogue."""
+"""Interfaces of other packages: along -I, in the ament prefixes, in the catalogue."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Folder:
 class Prefix:
     """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg.
 
-    Standard interfaces of another distribution than that which files are read for are not seen.
+    Standard interfaces are ignored if it is of another distribution than files are read for.
     """
 
     def __init__(self, path: Path, distro: Distro) -> None:
@@ -100,8 +100,9 @@ class Library:
     """Interfaces of all packages that can be found from a root, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
-    a single file finds its neighbours, unless they are excluded. `texts` come before all others.
-    Files that cannot be read are reported. `distro` is the distribution that files are read for.
+    a single file finds its neighbours, unless they are excluded. `texts` take precedence over
+    files. Files that cannot be read are reported. `distro` is the distribution that files are read
+    for.
     """
 
     def __init__(
@@ -133,7 +134,7 @@ class Library:
         self.report_to(report)
 
     def report_to(self, report: Report) -> None:
-        """Report what is wrong with what is asked for from now on, known or not."""
+        """Report problems to another report from now on, those of interfaces read before too."""
         self._report = report
         for path in self._missing:
             report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
@@ -159,7 +160,7 @@ class Library:
         return next(map(Path, files), None)
 
     def _excluded(self, package: str) -> Exclusions:
-        """Return what is left out of a package: of others than the compiled ones, nothing."""
+        """Return the exclusions for a package; they apply to the compiled ones only."""
         return self._exclude if package in self._own else NOTHING
 
     def source(self, name: ir.TypeName) -> Source | None:
@@ -201,7 +202,7 @@ class Library:
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, from the first place that has any.
 
-        What is being compiled is one place, of however many folders.
+        The package being compiled is one place, whatever the number of its folders.
         """
         if not _NAME.fullmatch(package):
             return []
@@ -232,7 +233,7 @@ class Library:
         return self._packages
 
     def nearby(self, package: str) -> str | None:
-        """Return what finds a package that lies beside one of those being compiled."""
+        """Return a hint at a package beside one of the compiled packages, if it is there."""
         for own in (folder for folders in self._own.values() for folder in folders):
             declared = self._root.manifest(own)
             beside = (declared.parent if declared else own).parent
@@ -265,7 +266,7 @@ _LISTED = 5
 
 
 class Package(NamedTuple):
-    """A package that is known here; `path` is `None` if it is built in."""
+    """A package in reach; `path` is `None` if it is built in."""
 
     name: str
     interfaces: int
@@ -273,14 +274,14 @@ class Package(NamedTuple):
 
 
 class ResolvedType(NamedTuple):
-    """A type that a text means, and the interface whose file defines it."""
+    """A type, and the interface whose file defines it."""
 
     name: ir.TypeName
     interface: ir.TypeName
 
 
 def packages(scope: Scope, report: Report) -> list[Package]:
-    """Return all packages that are known here, those below the base included."""
+    """Return all packages in reach, including the packages below the base."""
     library = _full_library(scope, report)
     return [_package(name, library, scope.root) for name in library.packages()]
 
@@ -320,10 +321,10 @@ def _full_library(scope: Scope, report: Report) -> Library:
 
 
 def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[ResolvedType, ...]]:
-    """Return the types that a text means, and where they are found; reports IDL618.
+    """Return the types that a text means, and the library that has them; reports IDL618.
 
     `package/kind/Name`, `package/Name` and `Name` mean one type, also with dots or `::`, and
-    `package` means all of its interfaces. Folders below are searched for what is not found else.
+    `package` means all of its interfaces. Folders below the base are searched last.
     """
     library = _nearby_library(scope, report)
     types = _candidates(text, library)
@@ -385,7 +386,7 @@ def _unknown_type(text: str, library: Library, root: Root) -> Diagnostic:
 
 
 def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
-    """Return the hint that names what is nearest to a type's or package's name."""
+    """Return the hint with the closest name to a type's or package's."""
     if len(parts) == 1:
         named = {interface.name: str(interface) for interface in _all(library)}
         near = closest(parts[0], [*inputs.names(root), *named, *library.packages()])

@@ -1,4 +1,4 @@
-"""`[tool.idlc]` of the nearest pyproject.toml: what would otherwise be typed each time.
+"""`[tool.idlc]` of the nearest pyproject.toml: defaults for options of the command line.
 
 Paths in it are relative to the file's folder. A mistake is reported as IDL611.
 """
@@ -48,7 +48,7 @@ class TableLocation(NamedTuple):
     number: int = 0
 
     def wrong(self, key: str, message: str, report: Report, hint: str | None = None) -> None:
-        """Report what is wrong with a setting, where it stands."""
+        """Report a problem with a setting, at its location in the file."""
         span = self._span(key)
         report.add(
             BAD_CONFIG.of(self.source.path, message, hint=hint)
@@ -57,13 +57,13 @@ class TableLocation(NamedTuple):
         )
 
     def no_url(self, key: str, value: str, report: Report) -> None:
-        """Report a URL: what a file of somebody else names is not fetched."""
+        """Report a URL: files, which others may have written, do not cause downloads."""
         if "://" in value:
             message = f"`{key}` in {self.shown} is a URL"
             self.wrong(key, message, report, "URLs are opened if they are typed")
 
     def _span(self, key: str) -> Span | None:
-        """Return where a key of the table stands, else the table's header, else any such key."""
+        """Return the span of a key of the table, else of its header, else of any such key."""
         text = self.source.text
         name = r"[ \t]*\.[ \t]*".join(map(re.escape, self.table.split(".")))
         headers = [*re.finditer(rf"(?m)^[ \t]*\[+[ \t]*({name})[ \t]*\]", text)]
@@ -83,9 +83,9 @@ def _key(name: str) -> re.Pattern[str]:
 def read_table(
     table: Mapping[str, Any], shape: type[_Shape], place: TableLocation, report: Report
 ) -> _Shape | None:
-    """Return a table as a Struct; what is wrong is reported and left out.
+    """Return a table as a Struct; invalid settings are reported and left out.
 
-    `None` means that something without a default is missing.
+    `None` means that a setting without a default is missing.
     """
     fields = {field.encode_name: field for field in msgspec.structs.fields(shape)}
     values: dict[str, Any] = {}
@@ -107,7 +107,7 @@ def read_table(
 
 
 def read_value(value: object, type_: Any, key: str, place: TableLocation, report: Report) -> Any:
-    """Return a value as one of the types above; report one that is of another, return `None`."""
+    """Return a value as one of the types above; report any other value and return `None`."""
     try:
         return msgspec.convert(value, type_)
     except msgspec.ValidationError:
@@ -126,7 +126,7 @@ _COSTLY = 10_000_000
 
 
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
-    """`[tool.idlc]` as it is written; `command_table` reads the tables of commands."""
+    """`[tool.idlc]` as written in the file; `command_table` reads the tables of commands."""
 
     paths: Texts = ()
     include: Texts = ()
@@ -141,12 +141,10 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
 
 
 class Config(msgspec.Struct, frozen=True):
-    """The settings found; what is absent is empty or `None`. Paths are as one would type them.
+    """The settings for the base of `root`, to which paths are relative; absent ones are empty.
 
-    They are those that hold in the base of `root`.
-
-    `tables` holds the tables of single commands; `source` is the file, `folder` where it lies;
-    `exclude` is relative to that.
+    `tables` holds the tables of single commands; `source` is the file, `folder` the file's folder,
+    to which `exclude` is relative.
     """
 
     root: Root
@@ -164,7 +162,7 @@ class Config(msgspec.Struct, frozen=True):
 
 
 def load_settings(root: Root, report: Report) -> Config:
-    """Return the settings that hold in the base of a root."""
+    """Return the settings for the base of a root."""
     for folder in (root.base, *root.base.parents):
         path = folder / SETTINGS_FILE
         if root.is_file(path):
@@ -216,7 +214,7 @@ def _broken(source: Source, message: str) -> Diagnostic:
 
 
 def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
-    """Return the settings in a table; report each that is unknown or of the wrong type."""
+    """Return the settings in a table; report unknown ones and wrong types."""
     place = TableLocation(source, "tool.idlc", "[tool.idlc]")
     if not isinstance(table, dict):
         place.wrong("idlc", "`tool.idlc` must be a table", report)
@@ -242,7 +240,7 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
 
 
 def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
-    """Return the names of distributions; report those that are unknown."""
+    """Return the names of distributions; report unknown ones."""
     names = listed(value) if isinstance(value, str) else value
     for name in names:
         if name and name not in BY_NAME:
@@ -252,7 +250,7 @@ def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report)
 
 
 def _typed(folder: Path, path: str, root: Root) -> str:
-    """Return a path in the file as one would type it in the base."""
+    """Return a path in the file relative to the base."""
     whole = folder / path
     try:
         return Path(root.relative(whole)).as_posix() if folder != root.base else path
@@ -273,10 +271,10 @@ def command_table(
 
 
 class Scope(msgspec.Struct, frozen=True):
-    """The package's name if it was given, folders with other packages, files that are left out.
+    """Options of a lookup: the package's name if set, folders with other packages, exclusions.
 
-    Paths are seen from `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its name
-    may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
+    Paths are relative to `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its
+    name may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
     except for `check`; none means the one that is installed.
     """
 
@@ -301,7 +299,7 @@ def scope(
     exclude: Sequence[str] = (),
     distro: str | None = None,
 ) -> Scope:
-    """Return what was typed, with what pyproject.toml says; `distro` is a list with commas."""
+    """Combine options of the command line with settings; `distro` is a list with commas."""
     left_out = [exclusion(exclude, settings.root.base)] if exclude else []
     if settings.exclude and settings.folder is not None:
         left_out.append(exclusion(settings.exclude, settings.folder))

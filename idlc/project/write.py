@@ -1,8 +1,8 @@
-"""Carrying a plan out: all or nothing, each file whole at any moment, the lock last.
+"""Plans for writing files: all or nothing, each file whole at any moment, the lock last.
 
-Everything is first written into a staging folder, then moved into place file by file. When a
-move fails the earlier ones are undone. When the process is killed the staging folder stays; the
-next run reads from it which files are idlc's own.
+All files are first written into a staging folder, then moved into place one by one. When a move
+fails the earlier ones are undone. When the process is killed the staging folder stays; the next
+run reads from it which files are idlc's own.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Change(NamedTuple):
 class Plan(NamedTuple):
     """Changes in the order in which to make them, and the digests of all files afterwards.
 
-    `record` is what the changes were planned against: the lock's content, if there was one. It
-    lies in `home`, which is empty or ends with a slash.
+    `record` is the lock's content when the changes were planned, if there was a lock. The lock is
+    in `home`, which is empty or ends with a slash.
     """
 
     out: Path
@@ -66,10 +66,10 @@ def plan(
     force: bool = False,
     home: str = "",
 ) -> Plan | None:
-    """Return what to change so that `out` holds `files`; report and return `None` if it must not.
+    """Return the changes after which `out` holds `files`; `None` after a report if it must not.
 
-    `owned` are the files that idlc wrote and the digests that it gave them. A file that is not
-    owned, or was edited since, is only replaced with `force`. `name` is how messages call `out`.
+    `owned` are the files that idlc wrote and the digests that they had. A file that is not owned,
+    or was edited since, is only replaced with `force`. `name` is the name of `out` in messages.
     Reports IDL613 and IDL614.
     """
     tree = Tree(out)
@@ -104,7 +104,7 @@ def plan(
 
 
 class Ownership(enum.Enum):
-    """The file in a place that is to be written, replaced or removed."""
+    """The ownership of a file that is to be written, replaced or removed."""
 
     OWN = "nothing, or what idlc wrote"
     EDITED = "what idlc wrote, edited since"
@@ -151,7 +151,7 @@ def _diff(old: bytes | None, new: bytes | None) -> str:
 
 
 def difference(old: bytes, new: bytes) -> Iterator[str]:
-    """Yield a unified diff from what is on disk to what idlc would write, cut when long."""
+    """Yield a unified diff from the file on disk to idlc's, cut when long."""
     import difflib
 
     lines = list(
@@ -167,7 +167,7 @@ def _lines(data: bytes) -> list[str]:
 
 
 def emptied_folders(changes: Iterable[Change]) -> list[str]:
-    """Return the folders that removed files were in, the deepest first."""
+    """Return the folders of removed files, the deepest first."""
     folders = {
         str(folder)
         for change in changes
@@ -194,7 +194,7 @@ def owned_files(out: Path, existing: lock.Lock | None) -> dict[str, frozenset[st
 
 
 def journals(out: Path) -> Iterator[bytes]:
-    """Yield what killed runs wrote down about the files that they were moving into place."""
+    """Yield the journals of killed runs, which list the files that they were moving into place."""
     for stage in _abandoned(out):
         with contextlib.suppress(OSError):
             yield (stage / lock.FILE).read_bytes()
@@ -229,7 +229,7 @@ def _in_use(stage: Path) -> bool:
 def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
     """Make the changes and write the lock; report IDL612 and return `False` on a failure.
 
-    After a failure every file is as it was, or the report says which are not.
+    After a failure every file is as it was, or the report names the others.
     """
     if not plan.changes and plan.record == new_lock:
         with contextlib.suppress(OSError):  # a package that cannot be written may be right
@@ -271,7 +271,7 @@ def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
 
 
 def _pending(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
-    """Return the changes that nobody else has made meanwhile, and the first that cannot be made."""
+    """Return the changes that no other process has made meanwhile, and the first conflict."""
     tree = Tree(out)
     left = []
     for change in changes:
@@ -310,7 +310,7 @@ def _outcome(torn: list[str], name: str) -> str:
 
 
 def sweep(out: Path) -> None:
-    """Remove what killed runs left."""
+    """Remove the staging folders of killed runs."""
     for stage in _abandoned(out):
         _remove(stage)
 
@@ -325,7 +325,7 @@ def _remove(stage: Path) -> None:
 
 
 class _Transaction:
-    """Moves staged files into place and remembers how to go back."""
+    """Moves staged files into place, and can undo that."""
 
     def __init__(self, out: Path, home: str) -> None:
         self._out = out
@@ -346,7 +346,7 @@ class _Transaction:
             self._created.append(path)
 
     def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
-        """Make all changes, in order; raises what stopped it."""
+        """Make all changes, in order; raises the first failure."""
         self._make_folder(self._stage)
         create(f"{self._stage}/{lock.FILE}", journal)
         for number, change in enumerate(changes):
@@ -402,7 +402,7 @@ class _Transaction:
                     path.rmdir()
 
     def undo(self) -> list[str]:
-        """Go back to the state before; return the files for which that failed."""
+        """Restore all files; return those for which that failed."""
         torn = []
         for path, old in reversed(self._done):
             target = self._out / path
