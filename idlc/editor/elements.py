@@ -198,14 +198,14 @@ def users(name: ir.TypeName, home: Snapshot, state: ServerState) -> Iterator[tup
     """
     source = text_of(name, home)
     file = home.path_of(source).resolve() if source else None
-    others = [
+    overriding = [
         snapshot
         for snapshot in snapshots(state)
         for path, (own, _) in snapshot.interfaces.items()
         if own.name == name and path.resolve() != file
     ]
     for snapshot, span, target in uses(state):
-        if target == name and not any(snapshot is other for other in others):
+        if target == name and not any(snapshot is other for other in overriding):
             yield snapshot, span
 
 

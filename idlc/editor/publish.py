@@ -127,7 +127,7 @@ def publish(state: ServerState) -> None:
     gone = state.published.keys() - new.keys()
     changed = {uri for uri, some in new.items() if state.published.get(uri) != some} | gone
     state.published = new
-    # a client that asks for problems itself would show pushed ones again
+    # a client that pulls problems would show pushed ones again
     if state.supports("textDocument", "diagnostic"):
         if changed and state.supports("workspace", "diagnostics", "refreshSupport"):
             state.ask("workspace/diagnostic/refresh", None)

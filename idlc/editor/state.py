@@ -31,7 +31,7 @@ from idlc.model import ir
 from idlc.project.find import KINDS
 from idlc.project.root import Root
 
-#: The files that are watched on disk: those that a check may read.
+#: The files to watch on disk: all that a check may read.
 WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(OTHER_INPUTS)}}}")
 #: A client's name for watches of folders which are not below the workspace's.
 RELATIVE = "relativePatternSupport"
@@ -89,7 +89,7 @@ class ServerState:
         self.documents = Documents(Root.here())
         self.settings = Settings()
         self.renaming: Renaming | None = None
-        #: Folders that lenses compare with a revision, with those of git that hold its references.
+        #: Folders that lenses compare with a revision, with git's folders of references for each.
         self.repositories: dict[Path, tuple[Path, ...]] = {}
         #: Whether problems may have changed since they were published.
         self.is_changed = False

@@ -117,7 +117,7 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
 class Workspace:
     """A folder that is checked as if `idlc check PATHS` ran in it.
 
-    Without `paths`, those of its pyproject.toml are checked, or the folder. `texts` returns the
+    Without `paths`, the paths in its pyproject.toml are checked, or the folder. `texts` returns the
     texts of open documents by absolute path; it is called at each load.
     """
 
@@ -369,7 +369,7 @@ def _failure(error: Exception, folder: Path) -> Diagnostic:
 def stray_folder(path: Path) -> tuple[Path, tuple[str, ...]]:
     """Return the folder in which a file outside of all workspaces is checked, and its paths.
 
-    That is its package; without a package.xml, only the file with those that it refers to.
+    That is its package; without a package.xml, only the file with the files that it refers to.
     """
     folder = root_of(str(path.parent))
     declared = Root(folder).manifest(folder)

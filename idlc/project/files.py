@@ -58,7 +58,7 @@ def _base() -> Path | None:
 
 
 def _is_open(path: Path) -> bool:
-    """Return whether others may write; on Windows, modes do not tell."""
+    """Return whether others may write; on Windows, modes do not show it."""
     return sys.platform != "win32" and bool(path.stat().st_mode & 0o022)
 
 

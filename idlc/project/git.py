@@ -142,7 +142,7 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
     """
     with TemporaryDirectory(prefix="idlc-") as place:
         folder = Path(place).resolve()
-        (folder / ".git").mkdir()  # what is above is not part of the repository
+        (folder / ".git").mkdir()  # folders above are not part of the repository
         hint, top = "", Path()
         try:
             top = _repository(root.absolute(path))
@@ -165,7 +165,7 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
 
 
 def _completing(top: Path) -> str:
-    """Return how to complete a clone that lacks things on purpose; empty for any other one."""
+    """Return the hint that completes a shallow or partial clone; empty for any other clone."""
     with suppress(GitError):
         if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
             return _SHALLOW

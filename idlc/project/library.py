@@ -134,7 +134,7 @@ class Library:
         self.report_to(report)
 
     def report_to(self, report: Report) -> None:
-        """Report problems to another report from now on, those of interfaces read before too."""
+        """Report problems to another report from now on, also for interfaces read before."""
         self._report = report
         for path in self._missing:
             report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))

@@ -140,7 +140,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def digest(data: bytes) -> str:
-    """Return the SHA-256 of a file; that of a text ignores its kind of line ends.
+    """Return the SHA-256 of a file, for a text with line ends normalized.
 
     On Windows, git checks texts out with other ones.
     """

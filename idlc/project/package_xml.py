@@ -125,7 +125,7 @@ class Element(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """The elements of a package.xml in order, those of its `<export>` included."""
+    """The elements of a package.xml in order, including its `<export>`."""
 
     format: str
     elements: tuple[Element, ...]

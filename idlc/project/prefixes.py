@@ -38,7 +38,7 @@ def modules_folder() -> str:
 
 
 def runs_nodes() -> bool:
-    """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
+    """Return whether this Python has rclpy; environments of pipx or pre-commit have idlc alone."""
     return bool(python_folders("rclpy"))
 
 

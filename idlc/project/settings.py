@@ -40,7 +40,7 @@ _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
 
 class TableLocation(NamedTuple):
-    """A table of a file: its name, how messages call it, and its number among those of one name."""
+    """The location of a table: file, name, name in messages, number among tables of the name."""
 
     source: Source
     table: str

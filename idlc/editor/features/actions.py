@@ -30,7 +30,7 @@ _OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 MOST = 3
 
 
-class Action(Part, frozen=True):
+class CodeAction(Part, frozen=True):
     """A code action."""
 
     title: str
@@ -54,13 +54,13 @@ class ProblemInContext(NamedTuple):
         """The problem as the client has it."""
         return shown(self.diagnostic, self.snapshot, self.state)
 
-    def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> Action:
+    def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> CodeAction:
         """Return an action on this problem."""
         change = workspace_edit(edits, self.snapshot, self.state)
-        return Action(title, _FIX, change, (self.shown,), best)
+        return CodeAction(title, _FIX, change, (self.shown,), best)
 
 
-def actions(state: ServerState, params: AskedActions) -> list[Action]:
+def actions(state: ServerState, params: AskedActions) -> list[CodeAction]:
     """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
     path = state.path(params.text_document.uri)
@@ -69,7 +69,7 @@ def actions(state: ServerState, params: AskedActions) -> list[Action]:
         for at, diagnostic, snapshot in problems(state)
         if at == path
     ]
-    offered: list[Action] = []
+    offered: list[CodeAction] = []
     if _is_requested(_FIX, params.context.only):
         for problem in all_:
             if _touch(problem.shown.range, params.range):
@@ -78,7 +78,7 @@ def actions(state: ServerState, params: AskedActions) -> list[Action]:
         offered += _everything(all_, params.text_document.uri, state)
     if _is_requested(_UPDATE, params.context.only):
         command = commands.command(state, params.text_document.uri)
-        offered += [Action(str(command["title"]), _UPDATE, command=command)] if command else []
+        offered += [CodeAction(str(command["title"]), _UPDATE, command=command)] if command else []
     return offered
 
 
@@ -94,7 +94,7 @@ def _touch(range_: Range, other: Range) -> bool:
     return start <= last and first <= end
 
 
-def _about(problem: ProblemInContext) -> Iterator[Action]:
+def _about(problem: ProblemInContext) -> Iterator[CodeAction]:
     diagnostic = problem.diagnostic
     if diagnostic.edits:
         hint = diagnostic.hint or f"fix {diagnostic.code}"
@@ -111,7 +111,7 @@ def _about(problem: ProblemInContext) -> Iterator[Action]:
         yield problem.action(f"Ignore {diagnostic.code} here", [remark])
 
 
-def _moved(problem: ProblemInContext) -> Action | None:
+def _moved(problem: ProblemInContext) -> CodeAction | None:
     """Return the action that gives a file the name that a hint says, if nothing has it."""
     hint = _OTHER_FILE.match(problem.diagnostic.hint or "")
     if hint is None or os.path.lexists(problem.path.with_name(hint[1])):
@@ -119,7 +119,7 @@ def _moved(problem: ProblemInContext) -> Action | None:
     title = f"Rename the file to `{hint[1]}`"
     arguments = [problem.state.uri(problem.path), hint[2]]
     command: dict[str, object] = {"title": title, "command": RENAME_FILE, "arguments": arguments}
-    return Action(title, _FIX, diagnostics=(problem.shown,), command=command)
+    return CodeAction(title, _FIX, diagnostics=(problem.shown,), command=command)
 
 
 def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
@@ -195,7 +195,7 @@ def _remark(problem: ProblemInContext) -> Edit | None:
     return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
 
 
-def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> Iterator[Action]:
+def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> Iterator[CodeAction]:
     """Yield the action that applies every fix of a document, as `idlc check --fix` does."""
     fixed = [problem for problem in all_ if problem.diagnostic.edits]
     edits = [
@@ -210,4 +210,4 @@ def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> I
     new = tidied(old.path, old.text, apply(old.text, edits)[0])
     change = of_documents({uri: differences(old.text, new, state.encoding)}, state)
     title = "Fix all that can be fixed without harm"
-    yield Action(title, _FIX_ALL, change, tuple(problem.shown for problem in fixed))
+    yield CodeAction(title, _FIX_ALL, change, tuple(problem.shown for problem in fixed))

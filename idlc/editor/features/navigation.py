@@ -57,7 +57,7 @@ def manifest_definition(package: str, state: ServerState) -> Location | None:
 def manifest_references(
     package: str, params: AskedReferences, state: ServerState
 ) -> list[Location]:
-    """Return where a package's messages are used, and where other packages declare it."""
+    """Return the uses of a package's messages, and the declarations in other packages."""
     locations = [
         state.location(at, snapshot)
         for snapshot, at, used in uses(state)
@@ -188,7 +188,7 @@ def references(state: ServerState, params: AskedReferences) -> list[Location]:
 
 
 def mentions(element: Element, context: InterfaceContext) -> Iterator[Span]:
-    """Yield where a field or constant is defined, and where comments of its file name it.
+    """Yield the definition of a field or constant, and its mentions in comments of the file.
 
     Comments mention constants by name. Field names are often words, so they need backticks.
     """
@@ -220,8 +220,8 @@ def highlights(state: ServerState, params: AtPosition) -> list[Highlight]:
     if subject is None:
         return []
     if subject.element is not None:
-        first, *others = mentions(subject.element, subject.context)
-        places = [Highlight(state.range(span), _READ) for span in others]
+        first, *mentioned = mentions(subject.element, subject.context)
+        places = [Highlight(state.range(span), _READ) for span in mentioned]
         return [Highlight(state.range(first), _WRITE), *places]
     return [
         Highlight(state.range(element.type), _READ)

@@ -137,8 +137,8 @@ def _rename_definition(
     if not valid:
         hint = names.CONSTANT_HINT if is_constant else names.FIELD_HINT
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {hint}")
-    others = element.message.constants if is_constant else element.message.fields
-    if any(definition.name == new and definition is not element.meaning for definition in others):
+    siblings = element.message.constants if is_constant else element.message.fields
+    if any(definition.name == new and definition is not element.meaning for definition in siblings):
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
     edits = [Edit(span, new) for span in mentions(element, context)]
     uri = state.uri(context.snapshot.path_of(context.source))
@@ -262,7 +262,7 @@ def _edits_of_users(
 
 
 def _in_cmake(name: ir.TypeName, path: Path, report: Report, state: ServerState) -> Iterator[Span]:
-    """Yield where CMakeLists.txt of a package names an interface file."""
+    """Yield the spans in which a package's CMakeLists.txt names an interface file."""
     cmake = path.parent.parent / BUILD
     root = Root(cmake.parent, state.documents.texts())
     if not root.is_file(cmake):

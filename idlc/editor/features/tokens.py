@@ -120,6 +120,6 @@ def fingerprints(
             model = context.snapshot.model_of(context.interface)
             name = context.interface.name
             has_hash = model and model.distro.has_hashes
-            # what the lenses say, without looking through all users for each document
+            # the texts of the lenses, without searching all users for each document
             shown += [model.describer.hash(str(name)) if model and has_hash else "", counts[name]]
         yield opened, crc32(msgspec.json.encode(shown))
