@@ -16,7 +16,7 @@ from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import libraries_of, shared
 from idlc.generate.python.render import support_packages
 from idlc.project.files import is_file, read_bytes
-from idlc.project.find import look
+from idlc.project.find import list_files
 from idlc.project.inputs import packages
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
@@ -48,7 +48,7 @@ def _compiled(package: str) -> type:
     report = Report()
     settings = load_settings(Root.here(), report)
     where = scope(settings, package)
-    inputs = packages(look((".",), where.root, Report(), where.exclude).files, where, report)
+    inputs = packages(list_files((".",), where.root, Report(), where.exclude).files, where, report)
     if not inputs:
         return distribution_class(package, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()

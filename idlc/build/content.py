@@ -16,12 +16,12 @@ from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import Libraries, build_tag, libraries_of, shared
 from idlc.project import settings
 from idlc.project.files import is_folder, read_bytes
-from idlc.project.find import look, nothing_in
+from idlc.project.find import list_files, no_interfaces
 from idlc.project.inputs import Inputs, packages
 from idlc.project.lock import load_lock
 from idlc.project.prefixes import INDEX, Distribution
 from idlc.project.root import MANIFEST, Root
-from idlc.project.settings import Place, Scope, load_settings, scope
+from idlc.project.settings import Scope, TableLocation, load_settings, scope
 
 
 class Options(NamedTuple):
@@ -50,7 +50,7 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
     root = Root.here()
     config = load_settings(root, report)
     if config.source:
-        place = Place(config.source, "tool.idlc", "[tool.idlc]")
+        place = TableLocation(config.source, "tool.idlc", "[tool.idlc]")
         if config.vendor_deps:
             message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
             hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
@@ -109,9 +109,9 @@ def _required_prefixes() -> list[str]:
 
 def _package(name: str, where: Scope, report: Report) -> Inputs | None:
     """Return the files of the package in the working folder; report IDL606 or IDL608 for none."""
-    files = look((".",), where.root, report, where.exclude)
+    files = list_files((".",), where.root, report, where.exclude)
     if files.empty:
-        report.add(nothing_in(".", where.root, where.exclude))
+        report.add(no_interfaces(".", where.root, where.exclude))
     inputs = () if report.had_errors else packages(files.files, where, report)
     if inputs and [package.package for package in inputs] != [name]:
         others = ", ".join(f"`{package.package}`" for package in inputs)

@@ -21,7 +21,7 @@ from idlc.generate.native.library import (
 )
 from idlc.model import derive
 from idlc.project import inputs
-from idlc.project.find import look
+from idlc.project.find import list_files
 from idlc.project.prefixes import (
     INDEX,
     InstalledPackage,
@@ -75,7 +75,7 @@ def _model(package: InstalledPackage) -> Model | None:
     """Return the model of a package's installed interfaces; `None` after errors."""
     dropped = Report()
     root = package.root
-    files = look((package.share,), root, dropped).files
+    files = list_files((package.share,), root, dropped).files
     home = package.prefix / "share" / package.package
     package_inputs = inputs.load(package.package, files, home, root, dropped)
     scope = Scope(root, include=(str(package.prefix),))

@@ -12,7 +12,7 @@ from idlc.check.package.facts import facts
 from idlc.check.select import Selection
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import inputs
-from idlc.project.find import KINDS, look, nothing_in
+from idlc.project.find import KINDS, list_files, no_interfaces
 from idlc.project.settings import Scope
 
 if TYPE_CHECKING:
@@ -111,11 +111,11 @@ def tidied(name: str, old: str, new: str) -> str:
 def _check_once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
     scope = options.scope
     root = scope.root
-    listing = look(options.paths, root, report, scope.exclude)
+    listing = list_files(options.paths, root, report, scope.exclude)
     packages = inputs.packages(listing.files, scope, report, listing.packages)
     for path in listing.empty:
         if not any(package.home.is_relative_to(root.absolute(path)) for package in packages):
-            report.add(nothing_in(path, root, scope.exclude, also="package.xml and no "))
+            report.add(no_interfaces(path, root, scope.exclude, also="package.xml and no "))
     reports: dict[str, Report] = {}
     models: list[Model] = []
     for distro, checker in checkers(packages, scope).items():

@@ -35,7 +35,7 @@ def types(
     package, slash, rest = word.partition("/")
     if slash:
         return sorted(_within(package, rest, library, kinds))
-    near = list(inputs.near(Root.here()))
+    near = list(inputs.nearby_packages(Root.here()))
     named = {
         interface.name
         for name in (library.packages() if bare == "all" else near)
@@ -81,4 +81,4 @@ def _library(include: Sequence[str], distro: str | None) -> Library:
     report, root = Report(), Root.here()
     name = distro if distro in BY_NAME else None
     selected = scope(load_settings(root, report), distro=name).distro
-    return Library(include, root, report, own=inputs.near(root), distro=selected)
+    return Library(include, root, report, own=inputs.nearby_packages(root), distro=selected)

@@ -32,7 +32,7 @@ from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import git, inputs, lock
 from idlc.project.files import is_folder
-from idlc.project.find import InterfaceFile, find, look, nothing_in
+from idlc.project.find import InterfaceFile, find, list_files, no_interfaces
 from idlc.project.git import Revision, checked_out, is_revision
 from idlc.project.inputs import Inputs, by_home
 from idlc.project.lock import load_lock
@@ -81,14 +81,14 @@ class Verdict(NamedTuple):
 def breaking(options: BreakingOptions, report: Report) -> Verdict | None:
     """Report each change that breaks something; `None` if a version could not be compiled."""
     root, exclude = options.scope.root, options.scope.exclude
-    listing = look(options.paths, root, report, exclude)
+    listing = list_files(options.paths, root, report, exclude)
     packages = inputs.packages(listing.files, options.scope, report)
     comparison = None if report.had_errors else _against(options, packages, report)
     if comparison is None:
         return None
     if listing.empty and not (comparison.differs or report.had_errors):
         # an empty folder is fine if its interfaces were removed
-        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
+        report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
         return None
     if comparison.left_out:  # for which allowances may be
         changes = not_allowed(comparison.changes, options, report)
@@ -427,7 +427,7 @@ class Earlier:
 
     def repository(self) -> tuple[Path, ...]:
         """Return the folders in which git stores the commits of names, if there is a repository."""
-        return git.places(self._folder) if self.name.startswith(GIT) else ()
+        return git.reference_folders(self._folder) if self.name.startswith(GIT) else ()
 
     def not_allowed(self, changes: Sequence[Change]) -> tuple[Change, ...]:
         """Return the changes that the settings do not allow."""

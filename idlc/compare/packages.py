@@ -20,7 +20,7 @@ from idlc.diagnostics.text import edit_distance
 from idlc.model import derive, ir
 from idlc.model.ir import meaning
 from idlc.model.link import Model
-from idlc.project.settings import Place, Tables, Text, command_table, read_table
+from idlc.project.settings import TableLocation, Tables, Text, command_table, read_table
 
 if TYPE_CHECKING:
     from idlc.project.settings import Config
@@ -326,7 +326,7 @@ def _allowance(
     at, until = entry.get("at"), entry.get("until")
     which = f"the entry for `{at}`" if isinstance(at, str) else "an entry"
     name = "tool.idlc.breaking.allow"
-    place = Place(config.source, name, f"{which} in [[{name}]]", number)
+    place = TableLocation(config.source, name, f"{which} in [[{name}]]", number)
     day = {"until": until.date()} if isinstance(until, datetime.datetime) else {}
     settings = read_table({**entry, **day}, AllowSettings, place, report)
     if settings is None:

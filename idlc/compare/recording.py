@@ -14,7 +14,7 @@ from idlc.diagnostics.report import Report, first_few
 from idlc.model import ir
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import look, nothing_in
+from idlc.project.find import list_files, no_interfaces
 from idlc.recordings.types import NAMED, LocalTypes, recorded_types, topics_of, versions
 
 
@@ -40,9 +40,9 @@ def compare_with_recordings(
     The interfaces of PATHs are compared, or without PATHs the ones of this machine. Without levels,
     only changes that affect readers are reported.
     """
-    listing = look(options.paths, options.scope.root, report, options.scope.exclude)
+    listing = list_files(options.paths, options.scope.root, report, options.scope.exclude)
     report.extend(
-        nothing_in(path, options.scope.root, options.scope.exclude) for path in listing.empty
+        no_interfaces(path, options.scope.root, options.scope.exclude) for path in listing.empty
     )
     problems = Report()
     packages = inputs.packages(listing.files, options.scope, problems)

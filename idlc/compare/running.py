@@ -38,7 +38,7 @@ from idlc.model import ir
 from idlc.model.from_description import DescriptionError, reported_model
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.find import look, nothing_in
+from idlc.project.find import list_files, no_interfaces
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.wire.layout import oversized
@@ -349,9 +349,9 @@ def _empty(patience: float) -> Diagnostic:
 def _local_models(options: BreakingOptions, report: Report, *, has_paths: bool) -> list[Model]:
     """Return the models of the user's files, or of the files in the working folder."""
     root, exclude = options.scope.root, options.scope.exclude
-    listing = look(options.paths, root, report, exclude)
+    listing = list_files(options.paths, root, report, exclude)
     if has_paths:
-        report.extend(nothing_in(path, root, exclude) for path in listing.empty)
+        report.extend(no_interfaces(path, root, exclude) for path in listing.empty)
     packages = inputs.packages(listing.files, options.scope, report)
     problems = Report()
     models = [model for _, model in models_of(packages, options.scope, problems)]

@@ -18,7 +18,7 @@ from idlc.generate.gen import is_name, named_packages
 from idlc.model import derive, ir
 from idlc.model.link import Model
 from idlc.project import inputs
-from idlc.project.atomic import alone
+from idlc.project.atomic import exclusive
 from idlc.project.find import find
 from idlc.project.lock import Obstacle, Tree, digest, is_same, may_be_own
 from idlc.project.package_xml import read_statements
@@ -247,7 +247,7 @@ LISTING = "idlc-docs.json"
 def write(out: str, files: Mapping[str, str], root: Root, report: Report) -> bool:
     """Write files below `out`; report IDL612 to IDL614 and return `False` if that is refused."""
     folder = root.absolute(out)
-    with alone(folder):
+    with exclusive(folder):
         return _write(folder, out, files, report)
 
 
@@ -323,7 +323,7 @@ def docs(paths: Sequence[str], out: str, scope: Scope, report: Report) -> int:
     from idlc.project import templates
 
     about = {package.package: _about(package, scope.root) for package in packages}
-    templates.keep()
+    templates.keep_compiled()
     with stage("document", out):
         files = {file.path: file.text for file in site(models, about)}
     written = Report()

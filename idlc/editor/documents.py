@@ -27,7 +27,10 @@ LANGUAGE = "rosmsg"
 
 
 class Document:
-    """One document; `path` is that of its file, or where it would be saved; `None` for others."""
+    """An open document.
+
+    `path` is its file, or where it would be saved; `None` for documents that are no files.
+    """
 
     def __init__(self, item: DocumentItem, root: Root) -> None:
         self.uri = item.uri
@@ -46,7 +49,7 @@ class Document:
         return self.text.encode("utf-8", errors="replace")
 
     def is_on_disk(self) -> bool:
-        """Return whether its file holds this text, however that is spelled on disk."""
+        """Return whether its file holds this text, with any line ends and byte order mark."""
         try:
             data = self.path.read_bytes() if self.path else b""
         except OSError:
@@ -54,16 +57,16 @@ class Document:
         return self.path is None or digest(data.removeprefix(BOM_UTF8)) == digest(self.data)
 
     def change(self, changes: Iterable[Change], encoding: str) -> None:
-        """Make changes, one after the other."""
-        for one in changes:
-            if one.range is None:
-                self._lines = lines_of(one.text)
+        """Apply changes in order."""
+        for change in changes:
+            if change.range is None:
+                self._lines = lines_of(change.text)
             else:
-                self._replace(one.range, one.text, encoding)
+                self._replace(change.range, change.text, encoding)
         self.__dict__.pop("text", None)
 
     def _replace(self, where: Range, new: str, encoding: str) -> None:
-        """Replace a range; only the lines around it are looked at."""
+        """Replace a range; only the lines around it are split again."""
         lines = self._lines
         first, start = in_lines(lines, where.start, encoding)
         last, end = in_lines(lines, where.end, encoding)
@@ -73,16 +76,16 @@ class Document:
         low, high = max(first - 1, 0), min(last + 1, len(lines) - 1)
         before = "".join(lines[low:first]) + lines[first][:start]
         after = lines[last][end:] + "".join(lines[last + 1 : high + 1])
-        found = lines_of(before + new + after)
-        if high < len(lines) - 1 and not found[-1]:
-            del found[-1]
-        lines[low : high + 1] = found
+        merged = lines_of(before + new + after)
+        if high < len(lines) - 1 and not merged[-1]:
+            del merged[-1]
+        lines[low : high + 1] = merged
 
 
 def _draft(item: DocumentItem, root: Root) -> Path | None:
-    """Return the path of an interface that has never been saved: here, or where its name says.
+    """Return the path at which an interface that was never saved would be.
 
-    How many sections it has says of which kind it is.
+    The number of its sections decides its kind if its name does not.
     """
     scheme, _, name = item.uri.partition(":")
     if scheme != "untitled" or item.language_id != LANGUAGE:
@@ -96,7 +99,7 @@ def _draft(item: DocumentItem, root: Root) -> Path | None:
 
 
 class Documents:
-    """All open documents by URI; those without a file are seen as if they lay in a root's base."""
+    """All open documents by URI; drafts without a file count as files in the base of a root."""
 
     def __init__(self, root: Root) -> None:
         self._root = root
@@ -119,12 +122,14 @@ class Documents:
         return self._open.pop(uri, None)
 
     def at(self, path: Path) -> Document | None:
-        """Return the open document of a file: of two URIs for it, that whose text counts."""
-        return next((one for one in reversed(self._open.values()) if one.path == path), None)
+        """Return the open document of a file; of two URIs for it, the one opened last."""
+        return next(
+            (document for document in reversed(self._open.values()) if document.path == path), None
+        )
 
     def texts(self) -> dict[Path, bytes]:
-        """Return what counts instead of the files on disk."""
-        return {one.path: one.data for one in self if one.path is not None}
+        """Return the texts that count instead of the files on disk."""
+        return {document.path: document.data for document in self if document.path is not None}
 
 
 #: Where texts of the catalogue are kept in the cache.
@@ -132,7 +137,7 @@ FOLDER = "interfaces"
 
 
 def inside(source: Source) -> str:
-    """Return what a text of the catalogue is, such as `jazzy/std_msgs/msg/Header.msg`."""
+    """Return the name of a text of the catalogue, such as `jazzy/std_msgs/msg/Header.msg`."""
     return source.path.replace("<", "", 1).replace(">", "", 1)
 
 
@@ -152,7 +157,7 @@ def file_of(source: Source) -> Path | None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Put a file that can only be read in the place of what is there, at once."""
+    """Replace a file atomically with one that can only be read."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent)
     try:
@@ -167,5 +172,5 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def is_built_in(source: Source) -> bool:
-    """Return whether a text is of the catalogue."""
+    """Return whether a text is from the catalogue."""
     return source.path.startswith("<")

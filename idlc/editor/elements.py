@@ -10,7 +10,7 @@ from idlc.diagnostics.report import Edit
 from idlc.diagnostics.source import Source, Span
 from idlc.editor.protocol.parts import Position, TextEdit
 from idlc.editor.protocol.positions import Places, lines_of
-from idlc.editor.state import Known, ServerState
+from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.language import tree
 from idlc.language.parse import parse, parse_definition
@@ -19,7 +19,7 @@ from idlc.model.lower import SECTIONS
 
 
 def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
-    """Return the edits that turn one text into another: lines, each edit as few as can be."""
+    """Return the edits that turn one text into another: whole lines, as few as possible."""
     before, after = lines_of(old), lines_of(new)
     places = Places(old, encoding)
     starts = [0]
@@ -37,16 +37,16 @@ def differences(old: str, new: str, encoding: str) -> list[TextEdit]:
 def workspace_edit(
     edits: Iterable[Edit], snapshot: Snapshot, state: ServerState
 ) -> dict[str, object]:
-    """Return edits of any files as one, for the versions that are open."""
-    found: dict[str, list[TextEdit]] = {}
-    for one in dict.fromkeys(edits):
-        uri = state.uri(snapshot.path_of(one.span.source))
-        found.setdefault(uri, []).append(TextEdit(state.range(one.span), one.text))
-    return of_documents(found, state)
+    """Return edits of any files as one workspace edit, for the versions that are open."""
+    by_uri: dict[str, list[TextEdit]] = {}
+    for edit in dict.fromkeys(edits):
+        uri = state.uri(snapshot.path_of(edit.span.source))
+        by_uri.setdefault(uri, []).append(TextEdit(state.range(edit.span), edit.text))
+    return of_documents(by_uri, state)
 
 
 def of_documents(edits: Mapping[str, list[TextEdit]], state: ServerState) -> dict[str, object]:
-    """Return edits by URI as one, in the form that the client understands."""
+    """Return edits by URI as one workspace edit, in the form that the client understands."""
     if not state.supports("workspace", "workspaceEdit", "documentChanges"):
         return {"changes": edits}
     return {"documentChanges": [document_edit(uri, some, state) for uri, some in edits.items()]}
@@ -63,9 +63,9 @@ Part: TypeAlias = Literal["type", "name", "value", "comment"]
 
 
 class Element(NamedTuple):
-    """A definition: its line, what the line says, and what that means, if anything.
+    """A definition: its line, the line's syntax tree, and the field or constant, if it is valid.
 
-    `message` is the structure whose section it stands in.
+    `message` is the structure of its section.
     """
 
     source: Source
@@ -75,7 +75,7 @@ class Element(NamedTuple):
     meaning: ir.Field | ir.Constant | None
 
     def span(self, piece: tree.Piece) -> Span:
-        """Return the place of a piece of the line."""
+        """Return the span of a piece of the line."""
         start = self.line.start + piece.start
         return Span(self.source, start, start + len(piece.text))
 
@@ -125,13 +125,15 @@ class Spot(NamedTuple):
 
 
 def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
-    """Yield the definitions of a file in order; what is none is left out."""
+    """Yield the definitions of a file in order; lines that are none are left out."""
     file = parse(source)
     parts = derive.sections(interface)
     meanings: dict[int, ir.Field | ir.Constant] = {}
     for part in parts:
-        meanings |= {one.name_span.start: one for one in part.fields if one.name_span}
-        meanings |= {one.name_span.start: one for one in part.constants if one.name_span}
+        meanings |= {field.name_span.start: field for field in part.fields if field.name_span}
+        meanings |= {
+            constant.name_span.start: constant for constant in part.constants if constant.name_span
+        }
     for section, message in zip(file.sections, parts, strict=False):
         for line in section.lines:
             code = line.after_optional or line
@@ -143,43 +145,43 @@ def elements(source: Source, interface: ir.Interface) -> Iterator[Element]:
                 yield Element(source, code, body, message, meaning)
 
 
-def spot(state: ServerState, known: Known, position: Position) -> Spot | None:
-    """Return what stands at a position; `None` outside of definitions.
+def spot_at(state: ServerState, context: InterfaceContext, position: Position) -> Spot | None:
+    """Return the part of a definition at a position; `None` outside of definitions.
 
-    A name counts up to the place after its last character.
+    A name includes the position after its last character.
     """
-    offset = state.offset(known.source, position)
-    for one in elements(known.source, known.interface):
-        end = one.line.start + len(one.line.code) + len(one.line.comment)
-        if not one.line.start <= offset <= end:
+    offset = state.offset(context.source, position)
+    for element in elements(context.source, context.interface):
+        end = element.line.start + len(element.line.code) + len(element.line.comment)
+        if not element.line.start <= offset <= end:
             continue
         parts: list[tuple[Part, Span | None]] = [
-            ("name", one.name),
-            ("type", one.span(one.body.type.whole)),
-            ("value", one.value),
-            ("comment", one.comment),
+            ("name", element.name),
+            ("type", element.span(element.body.type.whole)),
+            ("value", element.value),
+            ("comment", element.comment),
         ]
         for part, span in parts:
             if span is not None and span.start <= offset <= span.end and span.end > span.start:
-                return Spot(one, part, span)
+                return Spot(element, part, span)
         return None
     return None
 
 
 def section_names(interface: ir.Interface) -> tuple[str, ...]:
-    """Return what the sections of a file are called, such as `Request`; empty for a message."""
+    """Return the names of the sections of a file, such as `Request`; empty for a message."""
     names = SECTIONS[interface.name.kind]
     return tuple(name.lstrip("_") for name in names) if len(names) > 1 else ()
 
 
 def snapshots(state: ServerState) -> Iterator[Snapshot]:
-    """Yield what is known of each folder that can be looked at."""
-    found = (workspace.snapshot() for workspace in state.workspaces())
-    return (snapshot for snapshot in found if snapshot is not None)
+    """Yield the snapshot of each folder that can be read."""
+    candidates = (workspace.snapshot() for workspace in state.workspaces())
+    return (snapshot for snapshot in candidates if snapshot is not None)
 
 
 def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
-    """Yield where fields name a message in their types, and which."""
+    """Yield each place where a field's type names a message, and the message."""
     for snapshot in snapshots(state):
         for model in snapshot.models.values():
             for interface in model.own:
@@ -189,23 +191,21 @@ def uses(state: ServerState) -> Iterator[tuple[Snapshot, Span, ir.TypeName]]:
                             yield snapshot, field.type_span, target
 
 
-def users(
-    name: ir.TypeName, known: Snapshot, state: ServerState
-) -> Iterator[tuple[Snapshot, Span]]:
-    """Yield where fields name the message that a folder knows by a name.
+def users(name: ir.TypeName, home: Snapshot, state: ServerState) -> Iterator[tuple[Snapshot, Span]]:
+    """Yield each place where a field's type names the message that a folder has by a name.
 
-    Where another folder of the workspace has a message of its own by this name, that is meant.
+    Fields of another folder that has its own message of this name refer to that one.
     """
-    source = text_of(name, known)
-    file = known.path_of(source).resolve() if source else None
-    others = [
+    source = text_of(name, home)
+    file = home.path_of(source).resolve() if source else None
+    overriding = [
         snapshot
         for snapshot in snapshots(state)
         for path, (own, _) in snapshot.interfaces.items()
         if own.name == name and path.resolve() != file
     ]
     for snapshot, span, target in uses(state):
-        if target == name and not any(snapshot is one for one in others):
+        if target == name and not any(snapshot is other for other in overriding):
             yield snapshot, span
 
 

@@ -1,4 +1,4 @@
-"""Problems as diagnostics of documents, at the same places as `idlc check` has them."""
+"""Problems as diagnostics of documents, at the same locations as in `idlc check`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from idlc.editor.workspace import Snapshot, Workspace
 
 _SEVERITIES = {Severity.ERROR: 1, Severity.WARNING: 2}
 _UNNECESSARY = 1
-#: What is about text that could as well be removed.
+#: Codes about text that could as well be removed.
 _NEEDLESS = frozenset({codes.UNUSED_DEPENDENCY.id, codes.UNUSED_IGNORE.id})
 #: Where the pages of codes are installed.
 _PAGES = Path(explain.__file__).parent / "explain"
@@ -52,26 +52,26 @@ class Shown(Part, frozen=True):
 
 def diagnostics(state: ServerState) -> dict[str, list[Shown]]:
     """Return the problems of all documents that have any, by URI."""
-    found: dict[str, dict[Shown, None]] = {}
-    for path, one, snapshot in problems(state):
-        found.setdefault(state.uri(path), {})[shown(one, snapshot, state)] = None
+    by_uri: dict[str, dict[Shown, None]] = {}
+    for path, problem, snapshot in problems(state):
+        by_uri.setdefault(state.uri(path), {})[shown(problem, snapshot, state)] = None
     for workspace in state.workspaces():
         if workspace.failure is not None:
             failed = state.uri(workspace.folder / workspace.failure.path)
-            found.setdefault(failed, {})[_shown(workspace.failure, _TOP)] = None
-    return {uri: list(some) for uri, some in found.items()}
+            by_uri.setdefault(failed, {})[_shown(workspace.failure, _TOP)] = None
+    return {uri: list(some) for uri, some in by_uri.items()}
 
 
 def problems(state: ServerState) -> Iterator[tuple[Path, Diagnostic, Snapshot]]:
-    """Yield the problems of all folders, each with its file; the innermost folder counts."""
+    """Yield the problems of all folders, each with its file; of two folders, the innermost's."""
     inner: list[Workspace] = []
     for workspace in state.workspaces():
         snapshot = workspace.snapshot()
-        for one in snapshot.problems if snapshot else ():
+        for problem in snapshot.problems if snapshot else ():
             assert snapshot is not None
-            path = _path(one, snapshot)
+            path = _path(problem, snapshot)
             if path is not None and not any(other.has(path) for other in inner):
-                yield path, one, snapshot
+                yield path, problem, snapshot
         inner.append(workspace)
 
 
@@ -110,11 +110,13 @@ _PARTS = ("inlayHint", "codeLens", "semanticTokens")
 
 
 def publish(state: ServerState) -> None:
-    """Send the client the problems that there are now, where that changed."""
+    """Send the client the problems of each document for which they changed."""
     if not state.is_changed:
         return
     state.is_changed = False
-    new_documents = [one for one in state.documents if one.uri not in state.fingerprints]
+    new_documents = [
+        document for document in state.documents if document.uri not in state.fingerprints
+    ]
     state.fingerprints |= _fingerprints(state, new_documents) if new_documents else {}
     problems_now = diagnostics(state)
     versions = {document.uri: document.version for document in state.documents}
@@ -125,7 +127,7 @@ def publish(state: ServerState) -> None:
     gone = state.published.keys() - new.keys()
     changed = {uri for uri, some in new.items() if state.published.get(uri) != some} | gone
     state.published = new
-    # a client that asks for problems itself would show pushed ones again
+    # a client that pulls problems would show pushed ones again
     if state.supports("textDocument", "diagnostic"):
         if changed and state.supports("workspace", "diagnostics", "refreshSupport"):
             state.ask("workspace/diagnostic/refresh", None)
@@ -138,21 +140,21 @@ def publish(state: ServerState) -> None:
 
 
 def idle(state: ServerState) -> None:
-    """Look for what a client does not tell, while it says nothing."""
+    """Poll for changes that a client does not report, while it is idle."""
     if not state.supports("workspace", "didChangeWatchedFiles", RELATIVE):
         state.refresh_moved_lenses()
     rest(state)
 
 
 def rest(state: ServerState) -> None:
-    """Do what can wait until the client says nothing."""
+    """Do the work that can wait until the client is idle."""
     if not state.is_watching and state.notice_changes():
         publish(state)
     _refresh(state)
 
 
 def _refresh(state: ServerState) -> None:
-    """Have the client ask again for what it shows where another document changed that."""
+    """Have the client request features again where another document changed their answers."""
     before = state.fingerprints
     state.fingerprints = _fingerprints(state, state.documents)
     for uri, (version, number) in state.fingerprints.items():
@@ -170,4 +172,7 @@ def _fingerprints(
         return {}
     from idlc.editor.features.tokens import fingerprints
 
-    return {one.uri: (one.version, number) for one, number in fingerprints(state, documents)}
+    return {
+        document.uri: (document.version, number)
+        for document, number in fingerprints(state, documents)
+    }

@@ -1,7 +1,7 @@
-"""The loop of the server: messages come in one after the other, and are answered in this order.
+"""The loop of the server: messages are answered in the order in which they arrive.
 
-A thread reads, so that a cancellation is known before its request is begun, and so that many
-changes in a row are followed by one check. Whatever a client sends, the server lives on.
+A thread reads, so that a cancellation arrives before its request is begun, and so that many
+changes in a row are followed by one check. No message of a client ends the server.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class Method(NamedTuple):
-    """A function of a module in `idlc.editor.features`, and the type of what it is asked with."""
+    """A function of a module in `idlc.editor.features`, and the type of its parameters."""
 
     module: str
     function: str
@@ -45,13 +45,13 @@ class Method(NamedTuple):
         return import_module(f"idlc.editor.features.{self.module}")
 
     def call(self, state: ServerState, params: object) -> object:
-        """Return what the function answers; raises ValidationError for wrong parameters."""
+        """Return the function's answer; raises ValidationError for wrong parameters."""
         import msgspec
 
-        asked = msgspec.convert(
+        request = msgspec.convert(
             params, getattr(import_module("idlc.editor.protocol.parts"), self.params)
         )
-        answer: object = getattr(self.prepare(), self.function)(state, asked)
+        answer: object = getattr(self.prepare(), self.function)(state, request)
         return answer
 
 
@@ -91,14 +91,14 @@ METHODS = {
 MAX_PROCESS = 1 << 31
 
 
-#: Messages in a row after which problems are told although more are waiting.
+#: Messages in a row after which problems are published although more are waiting.
 MOST_IN_A_ROW = 500
-#: Seconds without a message after which there is time for what nobody waits for; it is twice as
-#: long until the next look at what changed and whether the client still lives, and so on.
+#: Seconds without a message after which the server is idle. It doubles before each next poll for
+#: changes on disk and for whether the client still lives.
 QUIET = 0.3
-#: Seconds between such looks at most.
+#: Seconds between such polls at most.
 PATIENCE = 10.0
-#: What came in: a message, something that is none, or the end.
+#: An arrival: a message, the error for a malformed one, or the end.
 Message: TypeAlias = "dict[str, Any]"
 Arrival: TypeAlias = "Message | RequestError | None"
 Answer: TypeAlias = Callable[[Any], None]
@@ -116,13 +116,13 @@ class Server:
         self._reader = reader
         self._writer = writer
         self._arrivals: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
-        #: How many requests of an id wait for their answer, and which of the ids are cancelled.
+        #: The number of requests of each id that wait for their answer, and the cancelled ids.
         self._waiting: Counter[int | str | None] = Counter()
         self._cancelled: set[int | str] = set()
         self._lock = threading.Lock()
         self._count = 0
         self._asked: dict[int, Answer] = {}
-        #: Makes the state after `initialize`, when it is needed: what it imports takes long.
+        #: Makes the state after `initialize`, when it is needed: its imports take long.
         self._make_state: Callable[[], ServerState] | None = None
         self._state: ServerState | None = None
         self._client_process: object = None
@@ -130,7 +130,7 @@ class Server:
 
     @property
     def state(self) -> ServerState:
-        """The state, made when it is asked for first; only after `initialize`."""
+        """The state, made at its first use; only after `initialize`."""
         if self._state is None:
             assert self._make_state is not None
             self._state = self._make_state()
@@ -149,7 +149,7 @@ class Server:
     def run(self) -> int:
         """Serve, and return the exit status."""
         threading.Thread(target=self._read, daemon=True).start()
-        # to search for garbage takes longer than any answer, and there is hardly any
+        # searching for garbage takes longer than any answer, and there is hardly any
         gc.disable()
         in_a_row = since = 0
         wait = PATIENCE
@@ -157,7 +157,7 @@ class Server:
             while True:
                 if in_a_row and (in_a_row >= MOST_IN_A_ROW or self._arrivals.empty()):
                     in_a_row = 0
-                    self._attempt("problems", self.settle)
+                    self._attempt("problems", self.publish_problems)
                 if since >= MOST_IN_A_ROW:
                     since = self._tidy()
                 try:
@@ -176,7 +176,7 @@ class Server:
                 wait = QUIET
                 if arrival is None or _is_exit(arrival):
                     return 0 if self._is_shut_down else 1
-                self._take(arrival)
+                self._dispatch(arrival)
         except (OSError, ValueError):  # nobody reads what is written
             return 1
 
@@ -200,10 +200,10 @@ class Server:
             raise RequestError(METHOD_NOT_FOUND, f"there is no method `{name}`")
         return METHODS[name].call(self.state, params)
 
-    def take(self, name: str, params: object) -> None:
-        """Take a notification; those that are not known, or not for now, are passed over."""
+    def handle_notification(self, name: str, params: object) -> None:
+        """Handle a notification; unknown ones, and those out of session, are ignored."""
         if self._make_state is not None and not self._is_shut_down:
-            self.state.take(name, params)
+            self.state.handle_notification(name, params)
 
     def encode(self, message: object) -> bytes:
         """Return a message as JSON."""
@@ -213,25 +213,25 @@ class Server:
 
         try:
             return msgspec.json.encode(message)
-        except UnicodeEncodeError:  # words of a client that are no text
+        except UnicodeEncodeError:  # strings of a client that have half a surrogate pair
             return json.dumps(msgspec.to_builtins(message)).encode()
 
-    def settle(self) -> None:
-        """Tell the client which problems there are now, where that changed."""
+    def publish_problems(self) -> None:
+        """Send the client the problems of each document for which they changed."""
         if (state := self._live_state) is not None and state.is_changed:
             from idlc.editor.publish import publish
 
             publish(state)
 
     def idle(self) -> None:
-        """Do what can be done while the client says nothing."""
+        """Poll for changes while the client is idle."""
         if (state := self._live_state) is not None:
             from idlc.editor.publish import idle
 
             idle(state)
 
     def prepare(self) -> None:
-        """Import what answers, so that the first time takes no longer than others; look around."""
+        """Import all features, so that their first answers take no longer, and poll for changes."""
         if (state := self._live_state) is None:
             return
         if any(True for _ in state.documents):
@@ -242,7 +242,7 @@ class Server:
         rest(state)
 
     def _client_is_gone(self) -> bool:
-        """Return whether the process of the client has ended; where that can be asked."""
+        """Return whether the process of the client has ended, where the system can tell."""
         client = self._client_process
         if not isinstance(client, int) or not 0 < client < MAX_PROCESS or os.name != "posix":
             return False
@@ -255,13 +255,13 @@ class Server:
         return False
 
     def _tidy(self) -> int:
-        """Do what nobody waits for; return how many messages came since then."""
+        """Do work that nobody waits for; return 0, the messages since then."""
         self._attempt("preparation", self.prepare)
         gc.collect()
         return 0
 
     def _read(self) -> None:
-        """Put each message that comes in where the loop takes it; `None` comes last."""
+        """Put each message into the queue of the loop; `None` comes last."""
         while True:
             try:
                 body = framing.read(self._reader)
@@ -286,21 +286,21 @@ class Server:
                 break
         self._arrivals.put(None)
 
-    def _take(self, arrival: Message | RequestError) -> None:
+    def _dispatch(self, arrival: Message | RequestError) -> None:
         if isinstance(arrival, RequestError):
             self._fail(None, arrival)
         elif "method" not in arrival:
-            self._take_answer(arrival)
+            self._handle_answer(arrival)
         elif "id" in arrival:
             self._answer(arrival)
         else:
             name, params = arrival["method"], arrival.get("params")
-            self._attempt(name, lambda: self.take(name, params))
+            self._attempt(name, lambda: self.handle_notification(name, params))
 
-    def _take_answer(self, arrival: Message) -> None:
-        """Take an answer to what was asked of the client; one to nothing that was is left."""
-        asked = arrival.get("id")
-        take = self._asked.pop(asked, None) if isinstance(asked, int) else None
+    def _handle_answer(self, arrival: Message) -> None:
+        """Handle the client's answer to a request; an answer to no request is ignored."""
+        id_ = arrival.get("id")
+        take = self._asked.pop(id_, None) if isinstance(id_, int) else None
         if take is not None and "result" in arrival:
             self._attempt("answer", lambda: take(arrival["result"]))
 
@@ -328,7 +328,7 @@ class Server:
         return is_cancelled
 
     def _attempt(self, what: str, action: Callable[[], object]) -> None:
-        """Do what needs no answer; only the log says if that fails."""
+        """Run an action that has no answer; failures are only logged."""
         failure, _ = self._result(action)
         if failure is not None:
             self._log(f"{what}: {failure.message}")
@@ -347,8 +347,8 @@ class Server:
             return RequestError(INTERNAL_ERROR, f"{kind}: {error}"), None
 
     def _fail(self, id_: int | str | None, error: RequestError) -> None:
-        told = {"code": error.code, "message": error.message}
-        self._write({"jsonrpc": "2.0", "id": id_, "error": told})
+        details = {"code": error.code, "message": error.message}
+        self._write({"jsonrpc": "2.0", "id": id_, "error": details})
 
     def _log(self, message: str) -> None:
         self.notify("window/logMessage", {"type": 1, "message": f"idlc: {message}"})
@@ -386,7 +386,7 @@ def _message(body: bytes) -> Message:
 
 
 def _params(request: Message) -> object:
-    """Return what a request asks with; raises RequestError for text that is none."""
+    """Return the parameters of a request; raises RequestError for malformed strings."""
     if not _is_text(request):
         raise RequestError(INVALID_PARAMS, "a string has one half of a surrogate pair")
     return request.get("params")
@@ -402,7 +402,7 @@ def _is_text(value: object) -> bool:
 
 
 def _cancelled(message: Message) -> int | str:
-    """Return which request is cancelled; raises RequestError."""
+    """Return the id of the request that is cancelled; raises RequestError."""
     params = message.get("params")
     id_ = params.get("id") if isinstance(params, dict) else None
     if not isinstance(id_, (int, str)):

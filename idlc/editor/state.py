@@ -1,4 +1,4 @@
-"""The state of a language server: documents, workspaces, and what its client can and wants."""
+"""The state of a language server: documents, workspaces, client capabilities and settings."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from idlc.editor.protocol.parts import (
     Position,
     Range,
 )
-from idlc.editor.workspace import AROUND, EditorOptions, Snapshot, Workspace, alone
+from idlc.editor.workspace import OTHER_INPUTS, EditorOptions, Snapshot, Workspace, stray_folder
 from idlc.model import ir
 from idlc.project.find import KINDS
 from idlc.project.root import Root
 
-#: The files that are watched on disk: those that a check may read.
-WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(AROUND)}}}")
+#: The files to watch on disk: all that a check may read.
+WATCHED = ("**/*.{msg,srv,action}", f"**/{{{','.join(OTHER_INPUTS)}}}")
 #: A client's name for watches of folders which are not below the workspace's.
 RELATIVE = "relativePatternSupport"
 #: A client's name for showing documents which are no files.
@@ -42,7 +42,7 @@ CONTENT = "textDocumentContent"
 class Settings(EditorOptions, frozen=True, rename="camel", kw_only=True):
     """An editor's settings below `idlc`: options of `idlc check`, and of features.
 
-    `against` is what the lens on breaking changes compares with.
+    `against` is the version that the lens on breaking changes compares with.
     """
 
     inlay_hints: bool = True
@@ -51,7 +51,7 @@ class Settings(EditorOptions, frozen=True, rename="camel", kw_only=True):
     against: str = ""
 
 
-class Known(NamedTuple):
+class InterfaceContext(NamedTuple):
     """An interface file: the snapshot of its folder, the interface that it defines, its text."""
 
     snapshot: Snapshot
@@ -60,9 +60,9 @@ class Known(NamedTuple):
 
 
 class Renaming(NamedTuple):
-    """A file that the client was last told to rename, with the edits of its users.
+    """The last file that the client was requested to rename, with the edits of its users.
 
-    `text` is what the document at `uri`, where the user asked for it, holds after the edits.
+    `text` is the text after the edits of the document at `uri`, in which the user requested it.
     """
 
     old: Path
@@ -74,7 +74,7 @@ class Renaming(NamedTuple):
 class ServerState:
     """The state between the messages of a client; features read it to answer requests.
 
-    `initialize` is what the client says at first. `notify` and `ask` send a method with its
+    `initialize` holds the parameters of that request. `notify` and `ask` send a method with its
     parameters to the client; `ask` may have a function that takes the answer.
     """
 
@@ -89,15 +89,15 @@ class ServerState:
         self.documents = Documents(Root.here())
         self.settings = Settings()
         self.renaming: Renaming | None = None
-        #: Folders that lenses compare with a revision, with those in which git notes what it is.
+        #: Folders that lenses compare with a revision, with git's folders of references for each.
         self.repositories: dict[Path, tuple[Path, ...]] = {}
         #: Whether problems may have changed since they were published.
         self.is_changed = False
-        #: Whether the client was asked to tell of changes on disk.
+        #: Whether the client was requested to report changes on disk.
         self.is_watching = False
-        #: The problems that were published of each document, and the version that they were of.
+        #: The problems that were published for each document, and the document's version then.
         self.published: dict[str, tuple[int | None, bytes]] = {}
-        #: What features show of each document, as a number, and the version that they show.
+        #: A checksum of the features' answers for each document, and the document's version then.
         self.fingerprints: dict[str, tuple[int | None, int]] = {}
         self._options = EditorOptions()
         self._folders: dict[Path, Workspace] = {}
@@ -115,24 +115,24 @@ class ServerState:
         }
         try:
             client = msgspec.convert(initialize, Initialize)
-        except msgspec.ValidationError:  # from a client that is of another mind
+        except msgspec.ValidationError:  # malformed capabilities from the client
             client = Initialize()
         self.client = client.capabilities
         self.encoding = capabilities.encoding(client.capabilities)
-        self._settle(client.initialization_options)
+        self._use_settings(client.initialization_options)
         folders = [folder.uri for folder in client.workspace_folders or ()]
         if client.workspace_folders is None:
             folders = [client.root_uri] if client.root_uri else []
         self._replace_folders([Folder(uri) for uri in folders], [])
 
-    def take(self, name: str, params: object) -> None:
-        """Take a notification; one that is not known is passed over."""
-        kind, take = self._notifications.get(name, (None, None))
-        if kind is not None and take is not None:
-            take(msgspec.convert(params, kind))
+    def handle_notification(self, name: str, params: object) -> None:
+        """Handle a notification; unknown ones are ignored."""
+        kind, handler = self._notifications.get(name, (None, None))
+        if kind is not None and handler is not None:
+            handler(msgspec.convert(params, kind))
 
     def supports(self, *path: str) -> bool:
-        """Return whether the client says that it can do something, or names it in a list."""
+        """Return whether the client has a capability, or names it in a list."""
         value: Any = self.client
         for name in path:
             if isinstance(value, list):
@@ -142,57 +142,59 @@ class ServerState:
         return value not in (None, False)
 
     def refresh(self, what: str) -> None:
-        """Have the client ask for something again, such as `codeLens`, if it can."""
+        """Have the client request a feature again, such as `codeLens`, if it can."""
         if self.supports("workspace", what, "refreshSupport"):
             self.ask(f"workspace/{what}/refresh", None)
 
-    # Workspaces: those of the client, and those of open files that are in none of them.
+    # Workspaces: the client's, and one for each open file outside of them.
 
     def workspaces(self) -> list[Workspace]:
-        """Return the client's folders, and those of stray files, the innermost of two first."""
+        """Return the workspaces of the client's folders and of stray files, innermost first."""
         strays: dict[Path, list[tuple[str, ...]]] = {}
         for document in self.documents:
             path = document.path
             if path is None or path.suffix not in KINDS:
                 continue
             if not any(workspace.holds(path) for workspace in self._folders.values()):
-                folder, paths = alone(path)
+                folder, paths = stray_folder(path)
                 strays.setdefault(folder, []).append(paths)
-        wanted = {(folder, _together(paths)): folder for folder, paths in strays.items()}
+        folders = {(folder, _together(paths)): folder for folder, paths in strays.items()}
         self._strays = {
             key: self._strays.get(key) or self._workspace(folder, key[1])
-            for key, folder in wanted.items()
+            for key, folder in folders.items()
         }
         return self._known_workspaces()
 
     def workspace_of(self, path: Path) -> Workspace | None:
         """Return the innermost workspace that holds a file."""
-        return next((one for one in self.workspaces() if one.holds(path)), None)
+        return next((workspace for workspace in self.workspaces() if workspace.holds(path)), None)
 
     def forget(self) -> None:
-        """Let all folders be read again when they are needed."""
+        """Have all folders read again when they are needed."""
         self.is_changed = True
         for workspace in self._known_workspaces():
             workspace.forget()
 
     def notice_changes(self) -> bool:
-        """Let folders be read again that changed on disk; return whether any did."""
-        changed = [one for one in self._known_workspaces() if not one.is_current()]
+        """Have folders that changed on disk read again; return whether any did."""
+        changed = [
+            workspace for workspace in self._known_workspaces() if not workspace.is_current()
+        ]
         for workspace in changed:
             workspace.forget()
         self.is_changed |= bool(changed)
         return bool(changed)
 
     def _known_workspaces(self) -> list[Workspace]:
-        """Return the workspaces that there were when they were asked for last, in that order."""
+        """Return the workspaces that `workspaces` returned last, in that order."""
         every = (*self._folders.values(), *self._strays.values())
-        return sorted(every, key=lambda one: len(one.folder.parts), reverse=True)
+        return sorted(every, key=lambda workspace: len(workspace.folder.parts), reverse=True)
 
     def _workspace(self, folder: Path, paths: tuple[str, ...] = ()) -> Workspace:
         return Workspace(folder, self._options, self.documents.texts, paths)
 
     def _add(self, folders: Iterable[Path]) -> None:
-        """Add folders of the workspace; a whole disk or home is none, which would take minutes."""
+        """Add folders of the workspace, but no whole disk or home, which would take minutes."""
         for folder in folders:
             if folder not in (folder.parent, Path.home()):
                 self._folders.setdefault(folder, self._workspace(folder))
@@ -210,15 +212,15 @@ class ServerState:
 
     # Documents and files.
 
-    def known(self, uri: str) -> Known | None:
-        """Return what is known of an interface file; `None` if it is not looked at."""
+    def context(self, uri: str) -> InterfaceContext | None:
+        """Return the context of an interface file; `None` if it is not checked."""
         path = self.path(uri)
         workspace = self.workspace_of(path) if path else None
         snapshot = workspace.snapshot() if workspace else None
         if path is None or snapshot is None or path not in snapshot.interfaces:
             return None
         interface, source = snapshot.interfaces[path]
-        return Known(snapshot, interface, source)
+        return InterfaceContext(snapshot, interface, source)
 
     def path(self, uri: str) -> Path | None:
         """Return the path of a document."""
@@ -246,7 +248,7 @@ class ServerState:
         return positions.places(source.text, self.encoding, skips_mark=skips_mark)
 
     def location(self, span: Span, snapshot: Snapshot) -> Location:
-        """Return the location of a span; what is built in is a document of its own.
+        """Return the location of a span; a built-in interface is a document without a file.
 
         For clients that cannot show such a document, it is a file of the user's cache.
         """
@@ -279,7 +281,7 @@ class ServerState:
         self.forget()
 
     def _follow(self, document: Document, data: bytes | None) -> None:
-        """Take note that other text counts for a document, `None` for what is on disk."""
+        """Use a new text for a document; `None` for the one on disk."""
         if document.path is not None:
             for workspace in self._known_workspaces():
                 workspace.follow(document.path, data)
@@ -297,16 +299,16 @@ class ServerState:
         self._follow_disk(filter(None, moved))
 
     def _follow_disk(self, paths: Iterable[Path]) -> None:
-        """Take note that files changed; the text of an open one counts as before."""
+        """Handle changes of files on disk; the text of an open document counts as before."""
         for path in paths:
             for workspace in self._known_workspaces():
                 workspace.follow(path, None)
         self.is_changed = True
 
-    # Git, with whose revisions lenses compare.
+    # Git revisions, with which lenses compare.
 
     def follow_git(self, folder: Path, repository: Callable[[], Iterable[Path]]) -> None:
-        """Have the client tell when something else is checked out for a folder, if it can."""
+        """Have the client report when another commit is checked out for a folder, if it can."""
         if folder in self.repositories:
             return
         places = self.repositories[folder] = tuple(repository())
@@ -323,12 +325,12 @@ class ServerState:
         self.ask("client/registerCapability", {"registrations": [registration]})
 
     def _is_of_git(self, path: Path) -> bool:
-        """Return whether a file is one in which git notes what is checked out."""
+        """Return whether a file is one in which git records the commit that is checked out."""
         places = (place for places in self.repositories.values() for place in places)
         return any(path.is_relative_to(place) for place in places)
 
     def refresh_moved_lenses(self) -> None:
-        """Have lenses asked for again if what they compare with is another commit now."""
+        """Have lenses requested again if the revision that they compare with has moved."""
         moved = [
             workspace.earlier(self.settings.against).has_moved()
             for workspace in self._known_workspaces()
@@ -340,20 +342,20 @@ class ServerState:
     # Settings.
 
     def _initialized(self, _: object) -> None:
-        """Ask for what may change without the editor's documents."""
-        wanted: list[tuple[str, dict[str, object]]] = []
+        """Register for changes of files and settings, and fetch the settings."""
+        requested: list[tuple[str, dict[str, object]]] = []
         if self.supports("workspace", "didChangeWatchedFiles", "dynamicRegistration"):
             options: dict[str, object] = {
                 "watchers": [{"globPattern": pattern} for pattern in WATCHED]
             }
-            wanted.append(("workspace/didChangeWatchedFiles", options))
+            requested.append(("workspace/didChangeWatchedFiles", options))
             self.is_watching = True
         if self.supports("workspace", "didChangeConfiguration", "dynamicRegistration"):
-            wanted.append(("workspace/didChangeConfiguration", {"section": "idlc"}))
-        if wanted:
+            requested.append(("workspace/didChangeConfiguration", {"section": "idlc"}))
+        if requested:
             registrations = [
                 {"id": method, "method": method, "registerOptions": options}
-                for method, options in wanted
+                for method, options in requested
             ]
             self.ask("client/registerCapability", {"registrations": registrations})
         self._fetch_settings()
@@ -361,16 +363,18 @@ class ServerState:
     def _fetch_settings(self) -> None:
         if self.supports("workspace", "configuration"):
             items = {"items": [{"section": "idlc"}]}
-            self.ask("workspace/configuration", items, lambda values: self._settle(*values[:1]))
+            self.ask(
+                "workspace/configuration", items, lambda values: self._use_settings(*values[:1])
+            )
 
     def _change_settings(self, params: DidChangeSettings) -> None:
         if self.supports("workspace", "configuration"):
             self._fetch_settings()
         else:
-            self._settle(params.settings)
+            self._use_settings(params.settings)
 
-    def _settle(self, settings: object = None) -> None:
-        """Use settings; an editor without any says `null`."""
+    def _use_settings(self, settings: object = None) -> None:
+        """Use settings; an editor without any sends `null`."""
         if settings is None:
             return
         self.is_changed = True

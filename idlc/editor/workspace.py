@@ -1,8 +1,8 @@
 """A folder that is checked again and again while its files are edited, as `idlc check` does.
 
-The disk is read by a load. After that only texts change, until the next load: what an editor has
-open counts instead of what its file holds. The result follows from what is on disk and what is
-open, never from the way there.
+A load reads the disk. After that only texts change, until the next load: a document that an editor
+has open counts instead of its file. The result depends on the files and the open documents only,
+never on the order of events.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from idlc.diagnostics.text import without_options
 from idlc.model import ir
 from idlc.project import inputs, prefixes, settings
 from idlc.project.files import MAX_SIZE, is_folder
-from idlc.project.find import Found, Picture, look, root_of
-from idlc.project.inputs import places
+from idlc.project.find import DiskSnapshot, Listing, list_files, root_of
+from idlc.project.inputs import output_folders
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
@@ -40,8 +40,15 @@ if TYPE_CHECKING:
     from idlc.project.library import Library
     from idlc.project.package_xml import Facts
 
-#: What a check of a package may read beside its interfaces.
-AROUND = (MANIFEST, settings.SETTINGS_FILE, "CMakeLists.txt", "setup.py", "setup.cfg", "idlc.lock")
+#: Files that a check of a package may read beside its interfaces.
+OTHER_INPUTS = (
+    MANIFEST,
+    settings.SETTINGS_FILE,
+    "CMakeLists.txt",
+    "setup.py",
+    "setup.cfg",
+    "idlc.lock",
+)
 
 
 class EditorOptions(msgspec.Struct, frozen=True, rename="camel"):
@@ -58,8 +65,8 @@ class EditorOptions(msgspec.Struct, frozen=True, rename="camel"):
 class Snapshot(msgspec.Struct, frozen=True, dict=True):
     """A folder as it was checked at one moment.
 
-    `models` are those of its packages for the first of its distributions, by name, and `library`
-    has everything else.
+    `models` maps its packages to their models for the first of its distributions; `library` has
+    all other interfaces.
     """
 
     folder: Path
@@ -73,27 +80,27 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
     def interfaces(self) -> Mapping[Path, tuple[ir.Interface, Source]]:
         """The interfaces of the folder's own files, by absolute path, with their texts."""
         return {
-            self.path_of(one.source): (one, one.source)
+            self.path_of(interface.source): (interface, interface.source)
             for model in self.models.values()
-            for one in model.own
-            if one.source
+            for interface in model.own
+            if interface.source
         }
 
     @cached_property
     def _broken(self) -> frozenset[str]:
         """The files that have errors."""
-        errors = (one for one in self.problems if one.severity is Severity.ERROR)
-        return frozenset(one.where[0] for one in errors)
+        errors = (problem for problem in self.problems if problem.severity is Severity.ERROR)
+        return frozenset(problem.where[0] for problem in errors)
 
     def model_of(self, interface: ir.Interface) -> Model | None:
-        """Return a model of an interface, `None` if there are errors in what it needs.
+        """Return a model of an interface, `None` if it or an interface that it needs has errors.
 
         Other interfaces of the package may have some.
         """
         for model in self.models.values():
             if model.interfaces.get(interface.name) is interface:
                 reach = model.reach(interface.name)
-                paths = {one.source.path for one in reach if one and one.source}
+                paths = {needed.source.path for needed in reach if needed and needed.source}
                 is_sound = model.is_sound(interface.name) and not paths & self._broken
                 return model.restricted_to(interface) if is_sound else None
         return None
@@ -110,8 +117,8 @@ class Snapshot(msgspec.Struct, frozen=True, dict=True):
 class Workspace:
     """A folder that is checked as if `idlc check PATHS` ran in it.
 
-    Without `paths`, what its pyproject.toml says is meant, or the folder. `texts` returns what is
-    open, by absolute path; it is called at each load.
+    Without `paths`, the paths in its pyproject.toml are checked, or the folder. `texts` returns the
+    texts of open documents by absolute path; it is called at each load.
     """
 
     def __init__(
@@ -132,13 +139,13 @@ class Workspace:
         self._snapshot: Snapshot | None = None
 
     def load(self) -> None:
-        """Read the disk, unless that was done; raises OSError if the folder is gone."""
+        """Read the disk, unless it is loaded already; raises OSError if the folder is gone."""
         if self.is_loaded:
             return
         self._fixed = report = Report()  # problems that do not depend on texts
         self._older, self._earlier = self._earlier, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
-        files = Found((), (), (), {})
+        files = Listing((), (), (), {})
         begun = time.time_ns()
         self._root = root = Root.at(self.folder, self._texts())
         with without_options():
@@ -152,11 +159,11 @@ class Workspace:
             # a mistake in the settings stops the command line, too
             if not report.had_errors:
                 paths = self._paths or settings.paths or (".",)
-                files = look(paths, root, report, self._scope.exclude)
+                files = list_files(paths, root, report, self._scope.exclude)
                 self._packages = inputs.packages(files.files, self._scope, report, files.packages)
             self._checkers = checkers(self._packages, self._scope, again=True)
             on_disk = (path for path in self._files_read(files) if not root.is_open(path))
-            self._picture = Picture(files.folders, on_disk, begun)
+            self._picture = DiskSnapshot(files.folders, on_disk, begun)
         self._places = {
             self._absolute(entry.file.shown): (number, at)
             for number, package in enumerate(self._packages)
@@ -165,12 +172,12 @@ class Workspace:
         self.is_loaded = True
 
     def forget(self) -> None:
-        """Let everything be read again when it is needed."""
+        """Have everything read again when it is needed."""
         self.is_loaded = False
         self._snapshot = None
 
     def snapshot(self) -> Snapshot | None:
-        """Return the folder as it is now; `None` if it is gone, or `failure` says why."""
+        """Return the folder as it is now; `None` if it is gone, or after a `failure`."""
         if self._snapshot is None:
             self.failure = None
             is_new = not self.is_loaded
@@ -178,7 +185,7 @@ class Workspace:
                 self.load()
                 self._snapshot = self._checked()
                 if is_new:
-                    gc.freeze()  # what a whole folder is read into is no garbage
+                    gc.freeze()  # the data of a whole folder is no garbage
             except OSError:
                 self.forget()
             except Exception as error:
@@ -186,7 +193,7 @@ class Workspace:
         return self._snapshot
 
     def holds(self, path: Path) -> bool:
-        """Return whether a file is one of those that are checked; reads the disk if need be."""
+        """Return whether a file is checked; reads the disk if need be."""
         try:
             self.load()
         except Exception:  # which `snapshot` keeps
@@ -194,47 +201,47 @@ class Workspace:
         return self.has(path)
 
     def has(self, path: Path) -> bool:
-        """Return whether a file is one of those that are checked, as far as was read."""
+        """Return whether a file is checked, as of the last load."""
         return self.is_loaded and path in self._places
 
     def follow(self, path: Path, data: bytes | None) -> None:
-        """Take note that other text counts for a file, `None` for what is on disk."""
+        """Use a new text for a file; `None` for the one on disk."""
         if not self.is_loaded:
             return
-        known = self._text(path)
-        if known is not None and data == known:
+        current = self._text(path)
+        if current is not None and data == current:
             return
         if data is not None and self._change(path, data):
             self._snapshot = None
-        elif known is not None or self._concerns(path):
+        elif current is not None or self._concerns(path):
             self.forget()
 
     def _absolute(self, path: str) -> Path:
         """Return the path of a file as the editor spells the folder, which may be a link."""
         return Path(os.path.normpath(self.folder / path))
 
-    def _files_read(self, there: Found) -> Iterator[Path]:
+    def _files_read(self, files: Listing) -> Iterator[Path]:
         """Yield the absolute paths of the files that a load reads in packages and for settings."""
-        yield from (self._root.absolute(one.path) for one in there.files)
-        homes = {self.folder, *there.packages, *(one.root for one in there.files)}
+        yield from (self._root.absolute(file.path) for file in files.files)
+        homes = {self.folder, *files.packages, *(file.root for file in files.files)}
         homes |= {self._settings.folder} if self._settings.folder else set()
-        yield from (home / name for home in homes for name in AROUND)
+        yield from (home / name for home in homes for name in OTHER_INPUTS)
 
     def is_current(self) -> bool:
-        """Return whether the disk surely holds what was read last."""
+        """Return whether the disk is certainly as it was read last."""
         if not self.is_loaded:
             return self.failure is not None or not is_folder(self.folder)
-        return self._picture.is_true()
+        return self._picture.is_current()
 
     def _text(self, path: Path) -> bytes | None:
-        """Return the text that counts for one of the files that are checked; `None` for others."""
+        """Return the text of a file that is checked; `None` for other files."""
         number, at = self._places.get(path, (-1, -1))
         return self._packages[number].files[at].data if number >= 0 else None
 
     def _change(self, path: Path, data: bytes) -> bool:
-        """Let a text count for one of the files that are checked, if that can change no other.
+        """Use a text for a file that is checked, if no other file depends on it.
 
-        Otherwise, a load is needed.
+        Return whether that was so; otherwise, a load is needed.
         """
         number, at = self._places.get(path, (-1, -1))
         if number < 0 or len(data) > MAX_SIZE or self._is_named_by_lock(number):
@@ -247,7 +254,7 @@ class Workspace:
         return True
 
     def snapshot_with(self, path: Path, text: str) -> Snapshot | None:
-        """Return the folder as it would be with another text for a file; nothing is changed."""
+        """Return the folder as it would be with a new text of a file; nothing is changed."""
         packages = self._packages
         try:
             is_changed = self._change(path, text.encode("utf-8", "replace"))
@@ -256,10 +263,10 @@ class Workspace:
             self._packages = packages
 
     def _is_named_by_lock(self, number: int) -> bool:
-        """Return whether the texts of a package may decide what it is called."""
+        """Return whether the texts of a package may decide its name."""
         home = self._packages[number].home
         root = self._root
-        return not root.manifest(home) and any(map(root.locks, places(home, root)))
+        return not root.manifest(home) and any(map(root.locks, output_folders(home, root)))
 
     def _concerns(self, path: Path) -> bool:
         """Return whether a file outside of the packages may change the result of a check."""
@@ -267,11 +274,11 @@ class Workspace:
             path.parent
         ):
             return True
-        folders = (self.folder, *(self._absolute(one) for one in self._scope.include))
-        return any(path.is_relative_to(one) for one in (*folders, *prefixes.ament_prefixes()))
+        folders = (self.folder, *(self._absolute(folder) for folder in self._scope.include))
+        return any(path.is_relative_to(folder) for folder in (*folders, *prefixes.ament_prefixes()))
 
     def name_of(self, path: Path) -> ir.TypeName:
-        """Return the name of the interface of one of the files that are checked."""
+        """Return the name of the interface in a file that is checked."""
         number, at = self._places[path]
         file = self._packages[number].files[at].file
         return ir.TypeName(self._packages[number].package, file.kind, file.name)
@@ -279,47 +286,47 @@ class Workspace:
     def inputs(self, path: Path) -> tuple[str, Mapping[str, str], str]:
         """Return the package of a file, its files' digests, and the file's name among them."""
         number, at = self._places[path]
-        given = self._packages[number]
-        return given.package, given.digests, given.files[at].file.key
+        package_inputs = self._packages[number]
+        return package_inputs.package, package_inputs.digests, package_inputs.files[at].file.key
 
     def packages(self) -> Iterable[str]:
-        """Return the packages that are known here and have messages."""
-        return (one for one in self._library.packages() if self.names(one))
+        """Return the packages that have messages, found from the folder."""
+        return (package for package in self._library.packages() if self.names(package))
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of the messages of a package."""
         return self._library.names(package)
 
     def dependency(self, path: Path, package: str) -> Edit | None:
-        """Return the edit of package.xml by which a file may use a package; `None` if it may."""
+        """Return the edit of package.xml that declares a package; `None` if none is needed."""
         from idlc.check.package.manifest import dependency
 
-        facts = self._around(path)
+        facts = self._package_facts(path)
         return dependency(facts, package) if facts else None
 
     def declaration(self, path: Path, package: str) -> Span | None:
-        """Return where package.xml of a file's package declares another."""
+        """Return the span where package.xml of a file's package declares another package."""
         from idlc.check.package.manifest import declaration
 
-        facts = self._around(path)
+        facts = self._package_facts(path)
         return declaration(facts, package) if facts else None
 
-    def _around(self, path: Path) -> Facts | None:
-        given = self._packages[self._places[path][0]]
-        return next(iter(self._checkers.values())).package_facts(given)
+    def _package_facts(self, path: Path) -> Facts | None:
+        package_inputs = self._packages[self._places[path][0]]
+        return next(iter(self._checkers.values())).package_facts(package_inputs)
 
     def earlier(self, against: str = "") -> Earlier:
-        """Return what the packages are compared with: `against`, or what pyproject.toml says."""
+        """Return the version to compare with: `against`, or the one of pyproject.toml."""
         if against not in self._earlier:
             from idlc.compare.breaking import Earlier
 
-            found = Earlier(self.folder, against, self._settings, self._scope)
-            found.follow(self._older.get(against))
-            self._earlier[against] = found
+            earlier = Earlier(self.folder, against, self._settings, self._scope)
+            earlier.follow(self._older.get(against))
+            self._earlier[against] = earlier
         return self._earlier[against]
 
     def before(self, against: str = "") -> Side:
-        """Return the packages as they were."""
+        """Return the packages as they were in the version to compare with."""
         return self.earlier(against).side(self._packages)
 
     @property
@@ -327,15 +334,15 @@ class Workspace:
         return next(iter(self._checkers.values())).library
 
     def _checked(self) -> Snapshot:
-        """Return the folder, checked with the texts of now."""
-        found: dict[str, Report] = {}
+        """Return the folder, checked with its current texts."""
+        reports: dict[str, Report] = {}
         models: dict[str, list[Model]] = {}
         with without_options():
             for distro, checker in self._checkers.items():
-                found[distro] = Report()
-                models[distro] = checker.check(self._packages, self._selection, found[distro])
+                reports[distro] = Report()
+                models[distro] = checker.check(self._packages, self._selection, reports[distro])
             every = [model for some in models.values() for model in some]
-            problems = [*self._fixed, *judged(found, every, self._selection)]
+            problems = [*self._fixed, *judged(reports, every, self._selection)]
         first = next(iter(self._checkers))
         return Snapshot(
             self.folder,
@@ -359,10 +366,10 @@ def _failure(error: Exception, folder: Path) -> Diagnostic:
     )
 
 
-def alone(path: Path) -> tuple[Path, tuple[str, ...]]:
-    """Return for a file of no workspace the folder in which it is checked, and what is there.
+def stray_folder(path: Path) -> tuple[Path, tuple[str, ...]]:
+    """Return the folder in which a file outside of all workspaces is checked, and its paths.
 
-    That is its package; without a package.xml, only the file with those that it refers to.
+    That is its package; without a package.xml, only the file with the files that it refers to.
     """
     folder = root_of(str(path.parent))
     declared = Root(folder).manifest(folder)

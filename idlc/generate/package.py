@@ -63,7 +63,7 @@ def package_of(
     if refused:
         target.report.extend(refused)
         return None
-    templates.keep()
+    templates.keep_compiled()
     with stage("render", model.package):
         modules = {file.path: file.text for file in render_package(model)}
         files = _with_surroundings(model, modules, target)

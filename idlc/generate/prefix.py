@@ -15,7 +15,7 @@ from idlc.generate.idl import file_text, idl
 from idlc.generate.native.inspect import inspect
 from idlc.generate.target import Target
 from idlc.project import prefixes, write
-from idlc.project.atomic import alone
+from idlc.project.atomic import exclusive
 from idlc.project.library import Library
 from idlc.project.lock import Tree
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
@@ -172,7 +172,7 @@ class Overlay(Target):
     def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here meanwhile; all packages are in one folder."""
         del beside
-        return alone(self._path)
+        return exclusive(self._path)
 
     def beside(self, package: str) -> Overlay:
         """Return another package in the prefix."""

@@ -16,10 +16,10 @@ from idlc.diagnostics.report import Diagnostic, Report, first_few
 from idlc.model import catalog, ir
 from idlc.model.ir import TypeName
 from idlc.project import inputs, prefixes, write
-from idlc.project.atomic import alone
+from idlc.project.atomic import exclusive
 from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
-from idlc.project.inputs import accept_name, by_home, places, several
+from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
 from idlc.project.library import Library
 from idlc.project.lock import FILE, Lock, Obstacle, Tree, digest, encode, load_lock, meaning
 from idlc.project.package_xml import declared_name
@@ -56,7 +56,7 @@ def _from_files(
     """Return files by package: as one, by default with the name of the folder `out`."""
     root = scope.root
     homes = by_home(files, root)
-    apart = [] if scope.package else several(homes, root)
+    apart = [] if scope.package else separate_homes(homes, root)
     if _mixed(apart, root, report):
         return ()
     declared = next((path for home in homes if (path := root.manifest(home))), None)
@@ -95,7 +95,7 @@ def _from_files(
 
 def _note_name(name: str, home: Path, out: str, root: Root, report: Report) -> None:
     """Note a name that other commands cannot know."""
-    if name != home.name and root.absolute(out).parent not in places(home, root):
+    if name != home.name and root.absolute(out).parent not in output_folders(home, root):
         report.notes.append(
             f"the package is called `{name}`, as the folder given with -o; other commands need "
             f"`--package {name}`, or a package.xml beside the interfaces"
@@ -311,7 +311,7 @@ class Target:
 
     def exclusive(self, *, beside: bool = False) -> AbstractContextManager[None]:
         """Keep other runs of idlc from writing here, or also beside this folder, meanwhile."""
-        return alone(self._path.parent if beside else self._path)
+        return exclusive(self._path.parent if beside else self._path)
 
     def beside(self, package: str) -> Target:
         """Return the folder of another package next to this one."""
@@ -376,7 +376,7 @@ class Target:
             path: text.encode("utf-8") if isinstance(text, str) else text
             for path, text in files.items()
         }
-        owned = write.owned(self._path / self.home, self.lock)
+        owned = write.owned_files(self._path / self.home, self.lock)
         force = check or self._force
         return plan(self._path, self.name, content, owned, self.report, force=force, home=self.home)
 

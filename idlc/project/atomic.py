@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from idlc.diagnostics.report import Edit, Report
     from idlc.project.root import Root
 
-#: All runs of a user's wait for one another, wherever they write: they take milliseconds.
+#: All runs of one user wait for one another, wherever they write: they take milliseconds.
 _MUTEX = "Local\\idlc-writes"
 _WAITED = 258
 _SYNCHRONIZE = 0x100000
@@ -40,7 +40,7 @@ def _kernel() -> Any:
 
 @contextlib.contextmanager
 def only_writer_on_windows() -> Iterator[None]:
-    """Wait until no other run writes, and let none begin meanwhile; ends with the process."""
+    """Wait until no other run writes, and keep others out; the lock ends with the process."""
     import ctypes
 
     kernel = _kernel()
@@ -70,7 +70,7 @@ def is_running_on_windows(number: int) -> bool:
 
 
 def replace_patiently(path: str, target: str) -> None:
-    """Move a file over another one; wait a little for those who have that open."""
+    """Move a file over another one; retry while another process has that open."""
     for pause in PAUSES:
         with contextlib.suppress(PermissionError):
             os.replace(path, target)  # noqa: PTH105 - as everywhere in a transaction
@@ -91,7 +91,7 @@ def move_over(path: str, target: str) -> None:
 
 
 def create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
-    """Write a whole file or none; past `open`, which takes as long as the operating system."""
+    """Write a whole file or none; without `open`, which takes as long as the system's calls."""
     handle = os.open(path, _WRITING | how, 0o666)
     try:
         try:
@@ -109,18 +109,18 @@ def create(path: str, data: bytes, how: int = os.O_TRUNC) -> None:
 if sys.platform != "win32":
     import fcntl
 
-#: What this process has locked, so that it does not wait for itself.
+#: Folders that this process has locked, so that it does not wait for itself.
 _held: set[Path] = set()
 
 
 @contextlib.contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Wait until no other idlc writes to a folder, and let none begin meanwhile.
+def exclusive(folder: Path) -> Iterator[None]:
+    """Wait until no other idlc writes to a folder, and keep others out.
 
-    The lock is the operating system's, on the folder itself, or the nearest above as long as
-    there is none: it leaves no file and ends with the process. Where folders cannot be
-    locked, nothing is; on Windows one lock is for all. A run that holds one folder may only ask
-    for others below it.
+    The lock is the operating system's, on the folder itself, or on the nearest one above until it
+    exists: it leaves no file and ends with the process. Where folders cannot be locked, nothing is
+    locked; Windows has one lock for all folders. A run that holds one folder may only lock others
+    below it.
     """
     place = _nearest(folder)
     if sys.platform == "win32" and not _held:
@@ -151,11 +151,11 @@ def _holding(place: Path) -> Iterator[None]:
 
 
 def _nearest(folder: Path) -> Path:
-    return next((one for one in (folder, *folder.parents) if is_folder(one)), folder)
+    return next((path for path in (folder, *folder.parents) if is_folder(path)), folder)
 
 
 def _lock(place: Path) -> int | None:
-    """Lock a folder, after those who locked one above it because this one was not there yet."""
+    """Lock a folder, after runs that locked one above it because it did not exist yet."""
     for above in reversed(place.parents):
         if above not in _held:
             _unlock(_opened(above, fcntl.LOCK_SH))
@@ -179,7 +179,7 @@ def _unlock(handle: int | None) -> None:
 
 
 def _is(handle: int | None, place: Path) -> bool:
-    """Return whether a handle is still that of the folder of this name, or there is none."""
+    """Return whether a handle still is for the folder of this name, or there is no handle."""
     try:
         return handle is None or os.path.samestat(os.fstat(handle), place.stat())
     except OSError:
@@ -188,7 +188,7 @@ def _is(handle: int | None, place: Path) -> bool:
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Let signals that would end the process wait."""
+    """Defer signals that would end the process."""
     if sys.platform == "win32":
         with _without_ctrl_c():
             yield
@@ -203,7 +203,7 @@ def uninterrupted() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _without_ctrl_c() -> Iterator[None]:
-    """Let Ctrl-C wait where signals cannot be blocked; only the main thread hears it."""
+    """Defer Ctrl-C where signals cannot be blocked; only the main thread receives it."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -220,8 +220,8 @@ def _without_ctrl_c() -> Iterator[None]:
 def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
     """Give a file new content; report IDL612 and return `False` if that fails.
 
-    A link stays one, and the file that it leads to is replaced. What somebody else made of the
-    file since it was read stays.
+    A link stays one, and the file that it leads to is replaced. A file that was changed since it
+    was read is not overwritten.
     """
     import shutil
     import tempfile
@@ -251,9 +251,9 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
 def edit(
     edits: Iterable[Edit], root: Root, report: Report, tidied: Callable[[str, str, str], str]
 ) -> int:
-    """Make edits in the files that they are for; return how many were made.
+    """Apply edits to their files; return the number of applied edits.
 
-    `tidied` returns what to write, of a file's name, its text and the text after the edits.
+    `tidied` takes a file's name, its text and the text after the edits, and returns the new text.
     """
     by_path: dict[str, list[Edit]] = {}
     for edit in edits:

@@ -1,4 +1,4 @@
-"""The outcome of editing one of the user's files: its new text, or why it must be done by hand."""
+"""The outcome of editing one of the user's files: its new text, or a line to add by hand."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class Edited(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """Why a file is not edited, and the line that a person has to add, and where."""
+    """The reason why a file is not edited, and the line that the user has to add, and where."""
 
     why: str
     line: str
@@ -30,11 +30,11 @@ class Script(NamedTuple):
 
     @property
     def line(self) -> str:
-        """The entry as it stands in `console_scripts`."""
+        """The entry in `console_scripts`."""
         return f"{self.name} = {self.target}"
 
     def same(self, entry: str) -> bool:
-        """Return whether an entry says the same, however it is spaced."""
+        """Return whether an entry is the same, with any whitespace."""
         return split(entry) == (self.name, self.target)
 
 
@@ -44,7 +44,7 @@ def split(entry: str) -> tuple[str, str]:
     return name.strip(), "".join(target.split())
 
 
-def taken(script: Script, target: str, where: str) -> Refused:
+def already_taken(script: Script, target: str, where: str) -> Refused:
     """Return the refusal of a command that calls something else already."""
     why = f"`{script.name}` is already the command for `{target}`"
     return Refused(why, script.line, where)

@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 def cache_folder() -> Path | None:
     """Return this user's folder of idlc's caches, made if need be; `None` if nothing can be kept.
 
-    What is kept there is run. So it is only used where nobody else can write.
+    Its content is executed. So it is only used where nobody else can write.
     """
     base = _base()
     if base is None:
         return None
     place = base / "idlc"
     try:
-        there = next(one for one in (place, *place.parents) if one.exists())
-        if not _is_ours(there):  # `sudo idlc` leaves nothing in another user's home
+        existing = next(folder for folder in (place, *place.parents) if folder.exists())
+        if not _is_ours(existing):  # `sudo idlc` leaves nothing in another user's home
             return None
         place.mkdir(mode=0o700, parents=True, exist_ok=True)
         private = _is_ours(place) and not _is_open(place)
@@ -43,13 +43,13 @@ def cache_folder() -> Path | None:
 
 
 def _base() -> Path | None:
-    """Return where this system wants caches."""
+    """Return the folder for caches on this system."""
     if sys.platform == "win32":
-        told = os.environ.get("LOCALAPPDATA", "")
+        setting = os.environ.get("LOCALAPPDATA", "")
     else:
-        told = os.environ.get("XDG_CACHE_HOME", "")
-    if Path(told).is_absolute():
-        return Path(told)
+        setting = os.environ.get("XDG_CACHE_HOME", "")
+    if Path(setting).is_absolute():
+        return Path(setting)
     try:
         home = Path.home()
     except RuntimeError:
@@ -58,7 +58,7 @@ def _base() -> Path | None:
 
 
 def _is_open(path: Path) -> bool:
-    """Return whether others may write, of which modes say nothing on Windows."""
+    """Return whether others may write; on Windows, modes do not show it."""
     return sys.platform != "win32" and bool(path.stat().st_mode & 0o022)
 
 
@@ -95,14 +95,14 @@ def is_folder(path: Path) -> bool:
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return what the operating system says, without number and path."""
+    """Return the operating system's message, without number and path."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror[:1].lower() + error.strerror[1:]
     return str(error)
 
 
 def kind_of(mode: int) -> str:
-    """Return what a file that is not regular is, such as `a named pipe`."""
+    """Return a description of a file that is not regular, such as `a named pipe`."""
     return _SPECIAL.get(stat.S_IFMT(mode), "a special file")
 
 
@@ -125,7 +125,7 @@ def read_bytes(path: Path, name: str, report: Report) -> bytes | None:
 
 
 def content(path: str | Path, size: int, most: int = sys.maxsize) -> bytes:
-    """Return a file's content, of which `most` bytes; `size` is what is expected.
+    """Return a file's content, at most `most` bytes; `size` is the expected length.
 
     The layers above the system's calls would take half of the time.
     """
@@ -190,6 +190,6 @@ def _not_text(data: bytes, name: str, offset: int) -> Diagnostic:
 
 
 def read_source(path: Path, name: str, report: Report) -> Source | None:
-    """Return a file as source text; report what stands in the way and return `None` else."""
+    """Return a file as source text; report an obstacle and return `None` else."""
     data = read_bytes(path, name, report)
     return None if data is None else decode(data, name, report)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class Exclusion(msgspec.Struct, frozen=True):
-    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are seen from.
+    """Patterns such as `msg/ros1/**` or `old_*`, and the folder that their paths are relative to.
 
     `*` and `?` stand for any text within one name, `**` for any number of folders. A pattern may
     begin at any folder, and one that fits a folder leaves out everything in it.
@@ -68,7 +68,7 @@ class Exclusions(msgspec.Struct, frozen=True):
 
 
 def exclusion(patterns: Iterable[str], base: Path) -> Exclusion:
-    """Return what patterns leave out, as they are written in the folder `base`."""
+    """Return the exclusion by patterns that are written in the folder `base`."""
     split = (pattern.replace("\\", "/").split("/") for pattern in patterns)
     named = (tuple(name for name in names if name not in ("", ".")) for names in split)
     return Exclusion(tuple(filter(None, named)), base)
@@ -91,7 +91,7 @@ def _fits(pattern: tuple[str, ...], names: Iterable[str]) -> bool:
 
 
 def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
-    """Return places in a pattern, with those that are reached where `**` stands for no folder."""
+    """Return places in a pattern, with places that are reached where `**` matches no folder."""
     for place in sorted(places):
         while place < len(pattern) and pattern[place] == "**":
             place += 1
@@ -101,19 +101,19 @@ def _with_none(pattern: tuple[str, ...], places: set[int]) -> set[int]:
 
 KINDS: dict[str, Kind] = {".msg": "msg", ".srv": "srv", ".action": "action"}
 KIND_FOLDERS = frozenset(KINDS.values())
-#: Folders that hold copies or no sources: what colcon and Python tools write.
+#: Folders with copies or without sources, which colcon and Python tools write.
 SKIPPED = frozenset({"build", "install", "log", "__pycache__", "node_modules", "site-packages"})
 #: Files that close a folder to searches: colcon's and ament's markers, a virtual environment.
 CLOSING = frozenset({"COLCON_IGNORE", "AMENT_IGNORE", "pyvenv.cfg"})
-#: What may be a type or package, as ROS 2, Python or C++ writes it.
+#: The name of a type or package, as ROS 2, Python or C++ writes it.
 _NAME = re.compile(r"[A-Za-z]\w*((/|\.|::)\w+){0,2}")
 NOTHING = Exclusions()
 
 
 class InterfaceFile(msgspec.Struct, frozen=True):
-    """An interface file: its absolute path, and that by which messages call it.
+    """An interface file: its absolute path, and the path by which messages call it.
 
-    `given` is the path on the command line that led to it, `root` the folder that holds the
+    `argument` is the path on the command line that led to it, `root` the folder that holds the
     msg/, srv/ and action/ folders, or the file's own.
     """
 
@@ -121,7 +121,7 @@ class InterfaceFile(msgspec.Struct, frozen=True):
     shown: str
     kind: Kind
     name: str
-    given: str
+    argument: str
     root: Path
 
     @property
@@ -136,11 +136,11 @@ def is_path(text: str, root: Root) -> bool:
     return not named or os.path.lexists(root.path(text))
 
 
-class Found(msgspec.Struct, frozen=True):
+class Listing(msgspec.Struct, frozen=True):
     """The files below some paths: interface files, each once, sorted, and the folders of packages.
 
-    `empty` are the given folders without interface files, `folders` all that were looked into, by
-    absolute path, with their status from before that.
+    `empty` are the listed folders without interface files, `folders` all that were searched, by
+    absolute path, with their status from before the search.
     """
 
     files: tuple[InterfaceFile, ...]
@@ -153,37 +153,39 @@ def find(
     paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING
 ) -> tuple[InterfaceFile, ...]:
     """Return the interface files that paths mean; reports IDL606 for a path that means none."""
-    found = look(paths, root, report, exclude)
-    report.extend(nothing_in(given, root, exclude) for given in found.empty)
-    return found.files
+    listing = list_files(paths, root, report, exclude)
+    report.extend(no_interfaces(folder, root, exclude) for folder in listing.empty)
+    return listing.files
 
 
-def nothing_in(
-    given: str, root: Root, exclude: Exclusions = NOTHING, *, also: str = ""
+def no_interfaces(
+    folder: str, root: Root, exclude: Exclusions = NOTHING, *, also: str = ""
 ) -> Diagnostic:
-    """Return the problem with a folder without interface files; `also` is what else is missing."""
-    if exclude is not NOTHING and look((given,), root, Report()).files:
-        message = f"every interface file in `{given}` is excluded"
-        return codes.NO_INTERFACES.of(given, message, hint="see `exclude` in [tool.idlc]")
+    """Return the problem with a folder without interface files, and without files of `also`."""
+    if exclude is not NOTHING and list_files((folder,), root, Report()).files:
+        message = f"every interface file in `{folder}` is excluded"
+        return codes.NO_INTERFACES.of(folder, message, hint="see `exclude` in [tool.idlc]")
     return codes.NO_INTERFACES.of(
-        given,
-        f"no {also}.msg, .srv or .action file in `{given}`",
+        folder,
+        f"no {also}.msg, .srv or .action file in `{folder}`",
         hint="interfaces are looked for in msg/, srv/ and action/ folders and in the folder itself",
     )
 
 
-def look(paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING) -> Found:
-    """Return what paths mean; a folder means everything below it.
+def list_files(
+    paths: Iterable[str], root: Root, report: Report, exclude: Exclusions = NOTHING
+) -> Listing:
+    """Return the files that paths mean; a folder means everything below it.
 
     Reports IDL601, IDL602, IDL605 and IDL622.
     """
-    found: dict[str, InterfaceFile] = {}
+    by_path: dict[str, InterfaceFile] = {}
     packages: dict[Path, None] = {}
     empty: dict[str, None] = {}
     folders: dict[Path, os.stat_result] = {}
-    for given in paths:
-        seen = not is_folder(Path(root.path(given)))
-        for path in _under(given, root, report, folders):
+    for argument in paths:
+        has_files = not is_folder(Path(root.path(argument)))
+        for path in _files_of(argument, root, report, folders):
             whole = os.path.normpath(root.path(path))
             if exclude.has(whole):
                 continue
@@ -192,27 +194,29 @@ def look(paths: Iterable[str], root: Root, report: Report, exclude: Exclusions =
             elif path.suffix not in KINDS:
                 report.add(_unread(path))
             else:
-                seen = True
-                found.setdefault(whole, _interface(path, whole, given, root))
-        if not seen:
-            empty.setdefault(given)
-    files = sorted(found.values(), key=lambda file: (file.shown, file.given))
-    return Found(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
+                has_files = True
+                by_path.setdefault(whole, _interface(path, whole, argument, root))
+        if not has_files:
+            empty.setdefault(argument)
+    files = sorted(by_path.values(), key=lambda file: (file.shown, file.argument))
+    return Listing(tuple(files), tuple(sorted(packages)), tuple(empty), folders)
 
 
-def _under(
-    given: str, root: Root, report: Report, folders: dict[Path, os.stat_result]
+def _files_of(
+    argument: str, root: Root, report: Report, folders: dict[Path, os.stat_result]
 ) -> Iterator[Path]:
     """Yield the interface and package.xml files that one path means; note folders as `walk`."""
-    path = Path(given)
+    path = Path(argument)
     if path.suffix in KINDS and root.is_file(path) and not Path(root.path(path)).exists():
         yield path
         return
     try:
         mode = os.stat(root.path(path)).st_mode  # noqa: PTH116 - no Path is needed
     except (OSError, ValueError) as error:
-        problem = unreadable(given, error)
-        report.add(codes.CODES[problem.code].of(given, problem.message, hint=_similar(path, root)))
+        problem = unreadable(argument, error)
+        report.add(
+            codes.CODES[problem.code].of(argument, problem.message, hint=_similar(path, root))
+        )
         return
     if stat.S_ISDIR(mode):
         yield from walk(path, root, report, folders)
@@ -224,7 +228,9 @@ def _under(
     elif path.suffix not in KINDS or not stat.S_ISREG(mode):
         what = "" if stat.S_ISREG(mode) else f"{kind_of(mode)}, "
         report.add(
-            codes.NOT_AN_INTERFACE.of(given, f"`{given}` is {what}not a .msg, .srv or .action file")
+            codes.NOT_AN_INTERFACE.of(
+                argument, f"`{argument}` is {what}not a .msg, .srv or .action file"
+            )
         )
     else:
         yield path
@@ -237,18 +243,18 @@ def _unread(path: Path) -> Diagnostic:
     return codes.UNREAD_FILE.of(path.as_posix(), message, hint=hint)
 
 
-def _interface(path: Path, whole: str, given: str, root: Root) -> InterfaceFile:
+def _interface(path: Path, whole: str, argument: str, root: Root) -> InterfaceFile:
     kind = KINDS[path.suffix]
     package = root_of(os.path.dirname(whole))  # noqa: PTH120 - a Path for each takes as long again
     place = Path(root.path(path))
-    return InterfaceFile(place, path.as_posix(), kind, path.stem, given, package)
+    return InterfaceFile(place, path.as_posix(), kind, path.stem, argument, package)
 
 
 @lru_cache(maxsize=1024)
 def root_of(folder: str) -> Path:
-    """Return the folder above `folder` if that is for one kind of interface, or itself."""
-    here = Path(folder)
-    return here.parent if here.name in KIND_FOLDERS else here
+    """Return the parent of a folder for one kind of interface; any other folder itself."""
+    path = Path(folder)
+    return path.parent if path.name in KIND_FOLDERS else path
 
 
 def _similar(path: Path, root: Root) -> str | None:
@@ -266,43 +272,46 @@ def walk(
     """Yield each interface file and package.xml below a folder, in no particular order.
 
     Paths begin as the folder's does. `folders` gets the status of each folder from before it was
-    listed.
-    Files whose extensions have capitals, which are no interface files for ROS 2, are among them.
+    listed. Files whose extensions have capitals, which ROS 2 does not read, are included.
 
-    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, the given
-    one excepted; links to folders are followed, each folder once.
+    Hidden folders, `SKIPPED` ones and folders with a `CLOSING` file are left out, except `folder`
+    itself; links to folders are followed, each folder once.
     """
     waiting = [folder]
-    seen: set[tuple[int, int]] = set()
+    visited: set[tuple[int, int]] = set()
     while waiting:
-        here = waiting.pop()
+        current = waiting.pop()
         try:
-            status = os.stat(place := root.path(here))  # noqa: PTH116 - no Path is needed
+            status = os.stat(place := root.path(current))  # noqa: PTH116 - no Path is needed
             if folders is not None:
-                folders[root.absolute(here)] = status
+                folders[root.absolute(current)] = status
             entries = sorted(os.scandir(place), key=lambda entry: entry.name)
         except OSError as error:
-            report.add(unreadable(here.as_posix(), error))
+            report.add(unreadable(current.as_posix(), error))
             continue
         identity = (status.st_dev, status.st_ino)
-        if (identity in seen and status.st_ino) or (
-            here != folder and any(entry.name in CLOSING for entry in entries)
+        if (identity in visited and status.st_ino) or (
+            current != folder and any(entry.name in CLOSING for entry in entries)
         ):
             continue
-        seen.add(identity)
+        visited.add(identity)
         for entry in entries:
             if _is_folder(entry):
                 if not entry.name.startswith(".") and entry.name not in SKIPPED:
-                    waiting.append(here / entry.name)
+                    waiting.append(current / entry.name)
             elif not entry.name.startswith(".") and _is_wanted(entry.name):
-                yield here / entry.name
+                yield current / entry.name
 
 
 def _is_closed(folder: Path, inside: Iterable[str]) -> bool:
-    """Return whether `walk` would not reach a folder that lies in another."""
+    """Return whether `walk` would not reach a folder within another."""
     for name in inside:
         folder /= name
-        if name.startswith(".") or name in SKIPPED or any(is_file(folder / one) for one in CLOSING):
+        if (
+            name.startswith(".")
+            or name in SKIPPED
+            or any(is_file(folder / marker) for marker in CLOSING)
+        ):
             return True
     return False
 
@@ -329,7 +338,7 @@ _UNKNOWN = (-1, 0, 0, 0)
 
 def snapshot(paths: Iterable[str], include: Iterable[str], root: Root) -> dict[str, Stamp]:
     """Return the stamp of each input file, of its package.xml and of files along -I."""
-    files = [file.path for file in look((*paths, *include), root, Report()).files]
+    files = [file.path for file in list_files((*paths, *include), root, Report()).files]
     manifests = {path.parent.parent / MANIFEST for path in files}
     return stamps((*files, *sorted(manifests)))
 
@@ -339,7 +348,7 @@ def stamps(paths: Iterable[Path]) -> dict[str, Stamp]:
     return {path.as_posix(): _stamp(path) for path in paths}
 
 
-class Picture:
+class DiskSnapshot:
     """The stamps of folders before they were listed, and of files when they were read.
 
     All paths are absolute. Reading began at a time in nanoseconds.
@@ -352,12 +361,12 @@ class Picture:
         self._stamps = {path: _stamp_of(status) for path, status in folders.items()}
         for path in files:
             stamp = _stamp(path)
-            # what changed since then was perhaps read before that
+            # a file that changed since then may have been read before its change
             is_new = any(begun - TICK <= at <= now for at in stamp[:2])
             self._stamps[path] = _UNKNOWN if is_new else stamp
 
-    def is_true(self) -> bool:
-        """Return whether they surely still are the same."""
+    def is_current(self) -> bool:
+        """Return whether all of them are certainly unchanged."""
         return all(stamp == _stamp(path) for path, stamp in self._stamps.items())
 
 

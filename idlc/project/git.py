@@ -1,6 +1,6 @@
 """The interface files of a git revision, in a folder of their own.
 
-Repositories are others': what their settings name is not run, and nothing is fetched.
+Repositories are not trusted: programs that their settings name are not run, nothing is fetched.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import one_line
 from idlc.project.files import reason
-from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, look
+from idlc.project.find import CLOSING, KINDS, Exclusions, InterfaceFile, list_files
 from idlc.project.root import MANIFEST, Root
 
-#: Bytes; the longest answer of git's that is read. A few kilobytes can name billions of files.
+#: Bytes; the longest answer of git that is read. A few kilobytes can name billions of files.
 MOST = 128 << 20
-#: Seconds; how long one answer may take. Settings can include a pipe, names can hold patterns.
+#: Seconds that one answer may take. Settings can include a pipe, names can hold patterns.
 PATIENCE = 120.0
 _HASH = re.compile(rb"[0-9a-f]{40}(?:[0-9a-f]{24})?")
 _ENTRY = re.compile(rb"(100\d{3}|120000|160000) \w+ ([0-9a-f]+)\t(.+)", re.DOTALL)
 _LINK, _SUBMODULE = b"120000", b"160000"
-#: What a repository's own settings could otherwise have git run. Older gits know some of it only.
+#: Settings that could otherwise have git run programs. Older versions know some of them only.
 _SETTINGS = {
     "safe.bareRepository": "explicit",
     "core.fsmonitor": "false",
@@ -58,15 +58,15 @@ _SHALLOW = "this clone is shallow: `git fetch --unshallow` completes it"
 _PARTIAL = "this clone is partial: `git fetch --refetch --no-filter` completes it"
 _NAMES = "`git branch --all` and `git tag` list the names of revisions; `git fetch` renews them"
 _DAMAGED = "`git fsck` lists what is missing or damaged"
-#: How git begins the sentences that say what is wrong.
+#: Prefixes of git's error messages.
 _BAD = ("fatal: ", "error: ")
 
 
 class GitError(Exception):
-    """Git could not answer; the text says why, and `hint` what to do.
+    """Git could not answer; the text is the reason, and `hint` the remedy.
 
-    Without one, something is missing or damaged in the repository; an empty one is for what cannot
-    be repaired there.
+    Without a hint, something is missing or damaged in the repository; an empty one is for problems
+    that cannot be repaired there.
     """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
@@ -77,9 +77,9 @@ class GitError(Exception):
 class Revision(NamedTuple):
     """A revision's interface files below `folder`, laid out as in the repository at `top`.
 
-    `submodules` are the paths of those that it has, of which nothing is below `folder`. `skipped`
-    are the paths that git does not check out, as in a sparse checkout. Paths of the working tree
-    are seen from `root`.
+    `submodules` are the paths of its submodules, whose files are not below `folder`. `skipped` are
+    the paths that git does not check out, as in a sparse checkout. Paths of the working tree are
+    relative to `root`.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Revision(NamedTuple):
     skipped: frozenset[str] = frozenset()
 
     def counterpart(self, path: str) -> str | None:
-        """Return where a path of the working tree is in the revision; `None` outside of it."""
+        """Return the path in the revision for one of the working tree; `None` outside of it."""
         try:
             return (
                 self.folder / self.root.absolute(path).resolve().relative_to(self.top)
@@ -102,17 +102,19 @@ class Revision(NamedTuple):
         self, paths: Iterable[str], exclude: Exclusions, report: Report
     ) -> tuple[InterfaceFile, ...]:
         """Return the interface files that paths of the working tree meant; there may be none."""
-        there = [place for path in paths if (place := self.counterpart(path))]
-        places = [place for place in there if Path(place).exists()]
-        found = look(places, self.root, report, exclude.seen_from(self.folder, self.top)).files
-        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in found)
+        counterparts = [place for path in paths if (place := self.counterpart(path))]
+        places = [place for place in counterparts if Path(place).exists()]
+        listed = list_files(
+            places, self.root, report, exclude.seen_from(self.folder, self.top)
+        ).files
+        return tuple(msgspec.structs.replace(file, shown=self._shown(file.path)) for file in listed)
 
     def holds(self, path: Path) -> bool:
         """Return whether a file of the working tree is in this repository, not in another."""
         return _top(path) == self.top
 
     def unknown(self, paths: Iterable[str]) -> Iterator[str]:
-        """Yield the submodules below paths that are none any more: what they held is not known."""
+        """Yield the submodules below paths that are none any more: their files are not known."""
         places = [Path(place) for path in paths if (place := self.counterpart(path))]
         for name in self.submodules:
             now = self.top / name
@@ -124,11 +126,11 @@ class Revision(NamedTuple):
     def is_skipped(self, shown: str) -> bool:
         """Return whether git keeps a file of the revision, or a link to it, out of the tree."""
         path = PurePath(shown.removeprefix(self._shown(self.folder)[:-1]))
-        names = (one.as_posix() for one in (path, *path.parents))
+        names = (ancestor.as_posix() for ancestor in (path, *path.parents))
         return any(name in self.skipped for name in names) and not os.path.lexists(self.top / path)
 
     def _shown(self, path: Path) -> str:
-        """Return how a file of the revision is called in messages."""
+        """Return the name of a file of the revision in messages."""
         return f"git:{self.name}:{path.relative_to(self.folder).as_posix()}"
 
 
@@ -140,7 +142,7 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
     """
     with TemporaryDirectory(prefix="idlc-") as place:
         folder = Path(place).resolve()
-        (folder / ".git").mkdir()  # what is above is not part of the repository
+        (folder / ".git").mkdir()  # folders above are not part of the repository
         hint, top = "", Path()
         try:
             top = _repository(root.absolute(path))
@@ -148,14 +150,14 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
             identity = _commit(name, top)
             hint = _DAMAGED
             entries = _extract(top, identity, folder)
-            submodules = tuple(one.path for one in entries if one.mode == _SUBMODULE)
+            submodules = tuple(entry.path for entry in entries if entry.mode == _SUBMODULE)
             skipped = _skipped(top, entries)
         except GitError as error:
             message = f"cannot read `git:{name}`: {one_line(str(error))}"
             if error.hint is None and hint:
                 hint = _completing(top) or hint
-            said = hint if error.hint is None else error.hint
-            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=said or None))
+            advice = hint if error.hint is None else error.hint
+            report.add(codes.NO_SUCH_REVISION.of(path, message, hint=advice or None))
             revision = None
         else:
             revision = Revision(name, top, folder, root, submodules, skipped)
@@ -163,7 +165,7 @@ def checked_out(name: str, path: str, root: Root, report: Report) -> Iterator[Re
 
 
 def _completing(top: Path) -> str:
-    """Return how to complete a clone that lacks things on purpose; empty for any other one."""
+    """Return the hint that completes a shallow or partial clone; empty for any other clone."""
     with suppress(GitError):
         if _git(top, ["rev-parse", "--is-shallow-repository"]).strip() == b"true":
             return _SHALLOW
@@ -173,18 +175,18 @@ def _completing(top: Path) -> str:
 
 
 def is_revision(name: str, path: str, root: Root) -> bool:
-    """Return whether a name means a revision of the repository that holds `path`, and no file."""
+    """Return whether a name is a revision of the repository that holds `path`, and no file."""
     return not os.path.lexists(root.path(name)) and commit(name, root.absolute(path)) is not None
 
 
 def commit(name: str, path: Path) -> str | None:
-    """Return which commit a name means in the repository that holds `path`, if it means one."""
+    """Return the commit of a name in the repository that holds `path`; `None` if it has none."""
     with suppress(GitError):
         return _commit(name, _repository(path))
     return None
 
 
-def places(path: Path) -> tuple[Path, ...]:
+def reference_folders(path: Path) -> tuple[Path, ...]:
     """Return the folders in which git keeps HEAD and branches, for the working tree of `path`."""
     with suppress(GitError):
         top = _repository(path)
@@ -194,10 +196,10 @@ def places(path: Path) -> tuple[Path, ...]:
 
 
 def setting(name: str, folder: Path) -> str:
-    """Return a setting of git that holds in a folder, on one line; empty if there is none."""
+    """Return a setting of git for a folder, on one line; empty if there is none."""
     with suppress(GitError):
-        found = _git(_top(folder) or folder, ["config", "--get", name])
-        return one_line(found.decode("utf-8", errors="replace").strip())
+        value = _git(_top(folder) or folder, ["config", "--get", name])
+        return one_line(value.decode("utf-8", errors="replace").strip())
     return ""
 
 
@@ -207,7 +209,9 @@ def _top(path: Path) -> Path | None:
     Git would also take a tracked folder for a repository that only looks like the inside of one.
     """
     real = path.resolve()
-    return next((one for one in (real, *real.parents) if os.path.lexists(one / ".git")), None)
+    return next(
+        (folder for folder in (real, *real.parents) if os.path.lexists(folder / ".git")), None
+    )
 
 
 def _repository(path: Path) -> Path:
@@ -222,17 +226,17 @@ def _repository(path: Path) -> Path:
 
 
 def _commit(name: str, top: Path) -> str:
-    found = b""
+    identity = b""
     if name and not name.startswith("-"):
         words = ["rev-parse", "--verify", "--quiet", f"{name}^{{commit}}"]
-        found = _git(top, words, otherwise="no such revision").rstrip()
-    if not _HASH.fullmatch(found):
+        identity = _git(top, words, otherwise="no such revision").rstrip()
+    if not _HASH.fullmatch(identity):
         raise GitError("no such revision")
-    return found.decode()
+    return identity.decode()
 
 
 def _program() -> str:
-    """Return the git on PATH; what lies in the working folder is not the user's."""
+    """Return the git on PATH; a program in the working folder is not trusted."""
     name = "git.exe" if os.name == "nt" else "git"
     for entry in map(Path, os.get_exec_path()):
         if entry.is_absolute() and os.access(entry / name, os.X_OK) and (entry / name).is_file():
@@ -240,24 +244,24 @@ def _program() -> str:
     raise GitError("there is no `git` on PATH", "")
 
 
-def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "") -> bytes:
-    """Return what git prints; raise GitError, with git's own words, if it fails.
+def _git(top: Path, words: Sequence[str], input_: bytes = b"", otherwise: str = "") -> bytes:
+    """Return git's output; raise GitError, with git's own message, if it fails.
 
-    Without words of its own, `otherwise` is the reason.
+    `otherwise` is the reason if git gives none.
     """
     options = [word for pair in _SETTINGS.items() for word in ("-c", "=".join(pair))]
     command = [_program(), *options, *words]
     kept = {name: value for name, value in os.environ.items() if name not in _ELSEWHERE}
     try:
-        with TemporaryFile() as asked, TemporaryFile() as said:
-            asked.write(given)
-            asked.seek(0)
+        with TemporaryFile() as stdin, TemporaryFile() as stderr:
+            stdin.write(input_)
+            stdin.seek(0)
             with subprocess.Popen(  # noqa: S603 - no shell, and no option can be smuggled in
                 command,
                 cwd=top,
-                stdin=asked,
+                stdin=stdin,
                 stdout=subprocess.PIPE,
-                stderr=said,
+                stderr=stderr,
                 env=kept | _ENVIRONMENT,
             ) as process:
                 assert process.stdout is not None
@@ -270,8 +274,8 @@ def _git(top: Path, words: Sequence[str], given: bytes = b"", otherwise: str = "
                 if len(answer) > MOST:
                     process.kill()
                     raise GitError(f"more than {MOST >> 20} MiB of files", "")
-            said.seek(0)
-            lines = list(filter(None, said.read(10_000).decode("utf-8", "replace").splitlines()))
+            stderr.seek(0)
+            lines = list(filter(None, stderr.read(10_000).decode("utf-8", "replace").splitlines()))
     except (OSError, ValueError) as error:
         raise GitError(f"git cannot be run: {reason(error)}", "") from None
     if process.returncode:
@@ -288,43 +292,45 @@ def _extract(top: Path, commit: str, root: Path) -> list[_Entry]:
     listed = _git(top, ["ls-tree", "-r", "-z", "--full-tree", commit])
     *lines, rest = listed.split(b"\0")
     entries = [_entry(line) for line in lines]
-    wanted = [one for one in entries if _is_wanted(one)]
-    names = list(dict.fromkeys(one.identity for one in wanted))
+    selected = [entry for entry in entries if _is_wanted(entry)]
+    names = list(dict.fromkeys(entry.identity for entry in selected))
     contents = dict(zip(names, _contents(top, names), strict=True))
     if rest:
         raise GitError("git's list of files ends in the middle")
     try:
-        for mode, identity, path in wanted:
+        for mode, identity, path in selected:
             target = root / path
             target.parent.mkdir(parents=True, exist_ok=True)
             if mode != _LINK:
                 target.write_bytes(contents[identity])
-        _link(root, {path: contents[identity] for mode, identity, path in wanted if mode == _LINK})
+        _link(
+            root, {path: contents[identity] for mode, identity, path in selected if mode == _LINK}
+        )
     except (OSError, ValueError) as error:
         raise GitError(f"its files cannot be written to `{root}`: {reason(error)}", "") from None
     return entries
 
 
 def _skipped(top: Path, entries: Iterable[_Entry]) -> frozenset[str]:
-    """Return what git leaves out of the working tree, if any file of a commit is not there."""
-    if all(os.path.lexists(top / one.path) for one in entries if _is_wanted(one)):
+    """Return the paths that git keeps out of the working tree, if a file of a commit is absent."""
+    if all(os.path.lexists(top / entry.path) for entry in entries if _is_wanted(entry)):
         return frozenset()
     *lines, rest = _git(top, ["ls-files", "-t", "-z"]).split(b"\0")
     if rest or not all(line[1:2] == b" " for line in lines):
         raise GitError("git's list of files is damaged")
-    found = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
-    return frozenset(found)
+    skipped = (line[2:].decode("utf-8", "surrogateescape") for line in lines if line[:1] == b"S")
+    return frozenset(skipped)
 
 
 def _link(root: Path, links: dict[str, bytes]) -> None:
-    """Make a revision's links, but for those that lead out of it."""
-    made = []
+    """Make a revision's links, except links that lead out of it."""
+    created = []
     for path, content in links.items():
         target = root / path
         with suppress(OSError, ValueError):  # not every system has links
             target.symlink_to(os.fsdecode(content))
-            made.append(target)
-    for target in made:
+            created.append(target)
+    for target in created:
         try:
             target.stat()  # the system follows a few links only, so that few are resolved
             is_inside = target.resolve().is_relative_to(root)
@@ -342,16 +348,16 @@ class _Entry(NamedTuple):
 
 def _entry(line: bytes) -> _Entry:
     """Return an entry of a tree."""
-    found = _ENTRY.fullmatch(line)
-    if found is None:
+    match = _ENTRY.fullmatch(line)
+    if match is None:
         raise GitError("git's list of files is damaged")
-    return _Entry(found[1], found[2], found[3].decode("utf-8", "surrogateescape"))
+    return _Entry(match[1], match[2], match[3].decode("utf-8", "surrogateescape"))
 
 
 def _contents(top: Path, names: Sequence[bytes]) -> Iterator[bytes]:
-    """Yield what objects hold, which have to be files."""
-    asked = b"".join(name + b"\n" for name in names)
-    answer = _git(top, ["cat-file", "--batch"], asked) if names else b""
+    """Yield the contents of objects, which have to be files."""
+    request = b"".join(name + b"\n" for name in names)
+    answer = _git(top, ["cat-file", "--batch"], request) if names else b""
     at = 0
     for name in names:
         end = answer.find(b"\n", at)

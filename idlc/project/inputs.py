@@ -1,4 +1,4 @@
-"""Input files by package: which files belong together, and under which name."""
+"""Input files by package, and the names of the packages."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
 from idlc.model.ir import TypeName
 from idlc.project.files import decode, is_folder
-from idlc.project.find import InterfaceFile, find, look
+from idlc.project.find import InterfaceFile, find, list_files
 from idlc.project.lock import digest, meaning
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
@@ -21,25 +21,25 @@ from idlc.project.settings import Scope, load_settings, scope
 
 
 def by_home(files: Iterable[InterfaceFile], root: Root) -> dict[Path, list[InterfaceFile]]:
-    """Return files by the folder that stands for their package."""
-    found: dict[Path, list[InterfaceFile]] = {}
+    """Return files by the home folder of their package."""
+    homes: dict[Path, list[InterfaceFile]] = {}
     for file in files:
         declared = root.manifest(file.root)
-        found.setdefault(declared.parent if declared else file.root, []).append(file)
-    return found
+        homes.setdefault(declared.parent if declared else file.root, []).append(file)
+    return homes
 
 
-def several(homes: Mapping[Path, list[InterfaceFile]], root: Root) -> list[Path]:
+def separate_homes(homes: Mapping[Path, list[InterfaceFile]], root: Root) -> list[Path]:
     """Return the folders of packages if the files below them are no single package.
 
-    Files without a package.xml that were given by several paths are one.
+    Files without a package.xml from several arguments are one.
     """
-    given: dict[str, set[Path]] = {}
+    by_argument: dict[str, set[Path]] = {}
     for home, files in homes.items():
         for file in files:
-            given.setdefault(file.given, set()).add(home)
+            by_argument.setdefault(file.argument, set()).add(home)
     declared = [home for home in homes if root.manifest(home)]
-    if len(declared) > 1 or any(len(found) > 1 for found in given.values()):
+    if len(declared) > 1 or any(len(folders) > 1 for folders in by_argument.values()):
         return sorted(homes)
     return []
 
@@ -49,8 +49,8 @@ def name_of(
 ) -> tuple[str, str]:
     """Return a package's name, and a note about it if that is a guess.
 
-    It is what the nearest package.xml says, else what [tool.idlc] compiles the files into, else
-    what an idlc.lock nearby says of them, else the folder's name.
+    It is the name in the nearest package.xml, else that of the output in [tool.idlc], else the one
+    that an idlc.lock nearby records for these files, else the folder's name.
     """
     declared = scope.root.manifest(home)
     if declared:
@@ -68,30 +68,30 @@ def _by_settings(home: Path, scope: Scope) -> str | None:
     root = scope.root
     if not scope.out or not any(home.is_relative_to(root.absolute(path)) for path in scope.paths):
         return None
-    homes = by_home(look(scope.paths, root, Report(), scope.exclude).files, root)
-    if several(homes, root) or any(map(root.manifest, homes)):
+    homes = by_home(list_files(scope.paths, root, Report(), scope.exclude).files, root)
+    if separate_homes(homes, root) or any(map(root.manifest, homes)):
         return None
     return root.absolute(scope.out).name
 
 
-def places(home: Path, root: Root) -> tuple[Path, ...]:
-    """Return the folders in which an output of a package is looked for."""
+def output_folders(home: Path, root: Root) -> tuple[Path, ...]:
+    """Return the folders in which outputs of a package are searched."""
     return tuple(dict.fromkeys((home, home.parent, root.base)))
 
 
 def _by_lock(home: Path, root: Root, digests: Callable[[], Mapping[str, str]]) -> str | None:
     """Return the one name that locks nearby give to a package with these files."""
     names = {
-        known.package
-        for place in places(home, root)
-        for known in root.locks(place)
-        if digests().keys() <= known.inputs.keys() and digests().items() & known.inputs.items()
+        record.package
+        for place in output_folders(home, root)
+        for record in root.locks(place)
+        if digests().keys() <= record.inputs.keys() and digests().items() & record.inputs.items()
     }
     return names.pop() if len(names) == 1 else None
 
 
 def accept_name(name: str, origin: str, report: Report) -> bool:
-    """Return whether a package can be called so and imported; reports IDL607."""
+    """Return whether a package can have a name and be imported; reports IDL607."""
     from idlc.model.names import why_not_package  # a check needs no emitter
 
     what = why_not_package(name)
@@ -121,10 +121,9 @@ class Input(msgspec.Struct, frozen=True, dict=True):
 
 
 class Inputs(msgspec.Struct, frozen=True):
-    """The files of one package, in order, and the folders that they lie in.
+    """The files of one package, in order, and their folders.
 
-    `home` is the folder that stands for the package. `borrowed` files were
-    found as those of other packages are.
+    `home` is the package's own folder. `borrowed` files were found as a dependency's are.
     """
 
     package: str
@@ -137,20 +136,22 @@ class Inputs(msgspec.Struct, frozen=True):
     def digests(self) -> dict[str, str]:
         """The SHA-256 of each file by its name within the package.
 
-        Of a borrowed one it is that of its meaning: it may be found elsewhere the next time.
+        For a borrowed one it is the digest of its meaning: the next run may find another copy.
         """
         if self.borrowed:
-            return {o.file.key: meaning(o.data.decode(), self.package) for o in self.files}
-        return {one.file.key: digest(one.data) for one in self.files}
+            return {
+                entry.file.key: meaning(entry.data.decode(), self.package) for entry in self.files
+            }
+        return {entry.file.key: digest(entry.data) for entry in self.files}
 
     def is_whole(self, root: Root) -> bool:
-        """Return whether a folder was given, so that what is not in it does not exist."""
-        return any(is_folder(Path(root.path(one.file.given))) for one in self.files)
+        """Return whether an argument is a folder, so that the package has no other interfaces."""
+        return any(is_folder(Path(root.path(entry.file.argument))) for entry in self.files)
 
     @property
     def names(self) -> frozenset[TypeName]:
         """The names of the interfaces that its files define."""
-        files = (one.file for one in self.files)
+        files = (entry.file for entry in self.files)
         return frozenset(TypeName(self.package, file.kind, file.name) for file in files)
 
 
@@ -161,7 +162,7 @@ def load(
     root: Root,
     report: Report,
 ) -> Inputs:
-    """Read a package's files; report IDL609 for each that is there twice."""
+    """Read a package's files; report IDL609 for each duplicate."""
     loaded: dict[str, Input] = {}
     for file in files:
         first = loaded.get(file.key)
@@ -176,7 +177,7 @@ def load(
             )
         elif (data := root.read_bytes(file.path, file.shown, report)) is not None:
             loaded[file.key] = Input(file, data)
-    roots = dict.fromkeys(one.file.root for one in loaded.values())
+    roots = dict.fromkeys(entry.file.root for entry in loaded.values())
     return Inputs(package, tuple(loaded[key] for key in sorted(loaded)), tuple(roots), home)
 
 
@@ -194,49 +195,51 @@ def packages(
         return (load(scope.package, files, home, root, report),)
     homes = by_home(files, root)
     read = [load("", own, home, root, report) for home, own in homes.items()]
-    found = [_named(one, scope, report) for one in read]
-    others = (home for home in sorted(set(empty)) if not homes.keys() & {home, *home.parents})
-    found += [_named(Inputs("", (), (home,), home), scope, report) for home in others]
-    return without_duplicates(found, root, report)
+    named = [_named(package_inputs, scope, report) for package_inputs in read]
+    empty_homes = (home for home in sorted(set(empty)) if not homes.keys() & {home, *home.parents})
+    named += [_named(Inputs("", (), (home,), home), scope, report) for home in empty_homes]
+    return without_duplicates(named, root, report)
 
 
-def _named(given: Inputs, scope: Scope, report: Report) -> Inputs:
+def _named(package_inputs: Inputs, scope: Scope, report: Report) -> Inputs:
     """Return a package with its name; a guess is noted."""
-    name, guess = name_of(given.home, lambda: given.digests, scope, report)
+    name, guess = name_of(package_inputs.home, lambda: package_inputs.digests, scope, report)
     report.notes += [guess] if guess else []
-    return msgspec.structs.replace(given, package=name)
+    return msgspec.structs.replace(package_inputs, package=name)
 
 
-def without_duplicates(found: Iterable[Inputs], root: Root, report: Report) -> tuple[Inputs, ...]:
+def without_duplicates(
+    candidates: Iterable[Inputs], root: Root, report: Report
+) -> tuple[Inputs, ...]:
     """Return packages, the first of each name; report IDL631 for the others."""
     first: dict[str, Inputs] = {}
-    for one in found:
-        other = first.setdefault(one.package, one)
-        if other is not one:
+    for package_inputs in candidates:
+        other = first.setdefault(package_inputs.package, package_inputs)
+        if other is not package_inputs:
             report.add(
                 codes.DUPLICATE_PACKAGE.of(
-                    root.shown(one.home),
-                    f"package `{one.package}` is in `{root.shown(other.home)}` as well",
+                    root.shown(package_inputs.home),
+                    f"package `{package_inputs.package}` is in `{root.shown(other.home)}` as well",
                     hint="remove one, or put a file COLCON_IGNORE into its folder",
                 )
             )
     return tuple(first.values())
 
 
-def near(root: Root) -> Mapping[str, Sequence[Path]]:
-    """Return the folders of the packages that pyproject.toml names, or of the one around."""
+def nearby_packages(root: Root) -> Mapping[str, Sequence[Path]]:
+    """Return the folders of the packages that pyproject.toml names, or of the enclosing one."""
     declared = root.manifest(root.base)
-    around = (str(declared.parent),) if declared else ()
-    return _packages(load_settings(root, Report()).paths or around, root)
+    enclosing = (str(declared.parent),) if declared else ()
+    return _packages(load_settings(root, Report()).paths or enclosing, root)
 
 
-def below(root: Root) -> Mapping[str, Sequence[Path]]:
-    """Return the folders of all packages below the base; this looks at every folder."""
+def packages_below(root: Root) -> Mapping[str, Sequence[Path]]:
+    """Return the folders of all packages below the base; this searches every folder."""
     return _packages((".",), root)
 
 
 def names(root: Root) -> list[str]:
-    """Return what is in the base."""
+    """Return the names of the files and folders in the base."""
     try:
         return sorted(path.name for path in root.base.iterdir())
     except OSError:
@@ -247,7 +250,7 @@ def _packages(paths: Sequence[str], root: Root) -> dict[str, tuple[Path, ...]]:
     """Return folders by package; problems of files are reported when they are compiled."""
     ignored = Report()
     where = scope(load_settings(root, ignored))
-    found: dict[str, tuple[Path, ...]] = {}
-    for one in packages(find(paths, root, ignored, where.exclude), where, ignored):
-        found.setdefault(one.package, one.folders)
-    return found
+    folders: dict[str, tuple[Path, ...]] = {}
+    for package_inputs in packages(find(paths, root, ignored, where.exclude), where, ignored):
+        folders.setdefault(package_inputs.package, package_inputs.folders)
+    return folders

@@ -1,4 +1,4 @@
-"""Where other packages' interfaces are: along -I, in the ament prefixes, in the catalogue."""
+"""Interfaces of other packages: along -I, in the ament prefixes, in the catalogue."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ class Folder:
     def _packages(self) -> dict[str, list[Path]]:
         """Every package at any depth, by name; made only when the direct look-up fails."""
         ignored = Report()
-        found: dict[str, list[Path]] = {}
+        by_name: dict[str, list[Path]] = {}
         files = (path for path in walk(self._path, self._root, ignored) if path.suffix in KINDS)
         for folder in sorted({root_of(str(file.parent)) for file in files}):
             declared = self._root.manifest(folder)
             name = declared_name(declared, self._root, ignored) if declared else None
-            found.setdefault(name or folder.name, []).append(folder)
-        return found
+            by_name.setdefault(name or folder.name, []).append(folder)
+        return by_name
 
 
 class Prefix:
     """An install prefix, which holds interfaces as share/PACKAGE/msg/Name.msg.
 
-    Standard interfaces of another distribution than that which files are read for are not seen.
+    Standard interfaces are ignored if it is of another distribution than files are read for.
     """
 
     def __init__(self, path: Path, distro: Distro) -> None:
@@ -75,8 +75,8 @@ class Prefix:
 
     @cached_property
     def _is_of_another(self) -> bool:
-        found = installed(self._path)
-        return bool(found and found.name and found.name != self._distro.name)
+        distribution = installed(self._path)
+        return bool(distribution and distribution.name and distribution.name != self._distro.name)
 
     def roots(self, package: str) -> Iterator[Path]:
         """Yield the folder of an installed package."""
@@ -86,10 +86,10 @@ class Prefix:
     def packages(self) -> Iterable[str]:
         """Return the names of installed packages that have interfaces."""
         try:
-            found = [path.name for path in self._share.iterdir() if _has_interfaces(path)]
+            names = [path.name for path in self._share.iterdir() if _has_interfaces(path)]
         except OSError:
             return []
-        return [name for name in found if any(self.roots(name))]
+        return [name for name in names if any(self.roots(name))]
 
 
 def _has_interfaces(root: Path) -> bool:
@@ -100,8 +100,9 @@ class Library:
     """Interfaces of all packages that can be found from a root, as `link.Library`.
 
     `folders` are the -I ones; `own` maps the packages being compiled to their folders, so that
-    a single file finds its neighbours, unless they are excluded. `texts` come before all others.
-    Files that cannot be read are reported. `distro` is the distribution that files are read for.
+    a single file finds its neighbours, unless they are excluded. `texts` take precedence over
+    files. Files that cannot be read are reported. `distro` is the distribution that files are read
+    for.
     """
 
     def __init__(
@@ -133,19 +134,19 @@ class Library:
         self.report_to(report)
 
     def report_to(self, report: Report) -> None:
-        """Report what is wrong with what is asked for from now on, known or not."""
+        """Report problems to another report from now on, also for interfaces read before."""
         self._report = report
         for path in self._missing:
             report.add(codes.NO_SUCH_PATH.of(path, f"no such folder: `{path}` (given with -I)"))
 
     def _roots(self, package: str) -> list[Path]:
         """Return the folders that may hold a package's interfaces, in order of precedence."""
-        known = self._known.get(package)
-        if known is None:
-            found = (root for place in self._places for root in place.roots(package))
-            known = [*self._own.get(package, ()), *(root for root in found if is_folder(root))]
-            self._known[package] = known
-        return known
+        roots = self._known.get(package)
+        if roots is None:
+            candidates = (root for place in self._places for root in place.roots(package))
+            roots = [*self._own.get(package, ()), *(root for root in candidates if is_folder(root))]
+            self._known[package] = roots
+        return roots
 
     def path(self, name: ir.TypeName) -> Path | None:
         """Return the file of an interface on disk, or `None`."""
@@ -155,11 +156,11 @@ class Library:
         places = self._roots(name.package)
         paths = (f"{root}/{inside}" for root in places for inside in (f"{name.kind}/{file}", file))
         exclude = self._excluded(name.package)
-        found = (one for one in paths if self._root.is_file(one) and not exclude.has(one))
-        return next(map(Path, found), None)
+        files = (path for path in paths if self._root.is_file(path) and not exclude.has(path))
+        return next(map(Path, files), None)
 
     def _excluded(self, package: str) -> Exclusions:
-        """Return what is left out of a package: of others than the compiled ones, nothing."""
+        """Return the exclusions for a package; they apply to the compiled ones only."""
         return self._exclude if package in self._own else NOTHING
 
     def source(self, name: ir.TypeName) -> Source | None:
@@ -186,32 +187,34 @@ class Library:
 
     def names(self, package: str) -> Iterable[str]:
         """Return the names of a package's messages; empty for an unknown package."""
-        told = [one.name for one in self.texts if (one.package, one.kind) == (package, "msg")]
+        in_texts = [
+            name.name for name in self.texts if (name.package, name.kind) == (package, "msg")
+        ]
         on_disk = [name for kind, name in self._on_disk(package) if kind == "msg"]
-        return [*told, *(on_disk or catalog.names(package, self.distro))]
+        return [*in_texts, *(on_disk or catalog.names(package, self.distro))]
 
     def interfaces(self, package: str) -> tuple[ir.TypeName, ...]:
         """Return every interface of a package, sorted."""
         on_disk = [ir.TypeName(package, kind, name) for kind, name in self._on_disk(package)]
-        known = on_disk or (*catalog.interfaces(self.distro), derive.SERVICE_EVENT_INFO)
-        return tuple(sorted({name for name in (*known, *self.texts) if name.package == package}))
+        listed = on_disk or (*catalog.interfaces(self.distro), derive.SERVICE_EVENT_INFO)
+        return tuple(sorted({name for name in (*listed, *self.texts) if name.package == package}))
 
     def _on_disk(self, package: str) -> list[tuple[ir.Kind, str]]:
         """Return kind and name of each file of a package, from the first place that has any.
 
-        What is being compiled is one place, of however many folders.
+        The package being compiled is one place, whatever the number of its folders.
         """
         if not _NAME.fullmatch(package):
             return []
-        known = self._listed.get(package)
-        if known is None:
-            known = self._listed[package] = self._list(package)
-        return known
+        interfaces = self._listed.get(package)
+        if interfaces is None:
+            interfaces = self._listed[package] = self._list(package)
+        return interfaces
 
     def _list(self, package: str) -> list[tuple[ir.Kind, str]]:
         exclude = self._excluded(package)
         folders = self._own.get(package, ())
-        own = {one for root in folders for one in self._interfaces(root, exclude)}
+        own = {interface for root in folders for interface in self._interfaces(root, exclude)}
         if own:
             return sorted(own)
         roots = (self._interfaces(root, exclude) for root in self._roots(package))
@@ -224,13 +227,13 @@ class Library:
     def packages(self) -> Sequence[str]:
         """Return the names of all packages, sorted."""
         if self._packages is None:
-            found = set(catalog.packages(self.distro)) | set(self._own)
-            found |= {name.package for name in self.texts}
-            self._packages = sorted(found.union(*(place.packages() for place in self._places)))
+            names = set(catalog.packages(self.distro)) | set(self._own)
+            names |= {name.package for name in self.texts}
+            self._packages = sorted(names.union(*(place.packages() for place in self._places)))
         return self._packages
 
     def nearby(self, package: str) -> str | None:
-        """Return what finds a package that lies beside one of those being compiled."""
+        """Return a hint at a package beside one of the compiled packages, if it is there."""
         for own in (folder for folders in self._own.values() for folder in folders):
             declared = self._root.manifest(own)
             beside = (declared.parent if declared else own).parent
@@ -263,23 +266,23 @@ _LISTED = 5
 
 
 class Package(NamedTuple):
-    """A package that is known here; `path` is `None` if it is built in."""
+    """A package in reach; `path` is `None` if it is built in."""
 
     name: str
     interfaces: int
     path: str | None
 
 
-class Meant(NamedTuple):
-    """A type that a text means, and the interface whose file defines it."""
+class ResolvedType(NamedTuple):
+    """A type, and the interface whose file defines it."""
 
     name: ir.TypeName
     interface: ir.TypeName
 
 
 def packages(scope: Scope, report: Report) -> list[Package]:
-    """Return all packages that are known here, those below the base included."""
-    library = _wide(scope, report)
+    """Return all packages in reach, including the packages below the base."""
+    library = _full_library(scope, report)
     return [_package(name, library, scope.root) for name in library.packages()]
 
 
@@ -288,69 +291,75 @@ def _package(name: str, library: Library, root: Root) -> Package:
     return Package(name, len(library.interfaces(name)), root.shown(home) if home else None)
 
 
-def interfaces(wanted: Sequence[str], scope: Scope, report: Report) -> list[str]:
+def interfaces(requested: Sequence[str], scope: Scope, report: Report) -> list[str]:
     """Return the names of all interfaces of packages; reports IDL618."""
-    library = _wide(scope, report)
-    found = []
-    for package in wanted:
-        names = [str(one) for one in library.interfaces(package)]
+    library = _full_library(scope, report)
+    listed = []
+    for package in requested:
+        names = [str(interface) for interface in library.interfaces(package)]
         if not names:
             hint = did_you_mean(package, library.packages()) or "`idlc list` names the packages"
             message = f"no package `{package}` is known here"
             report.add(codes.NO_SUCH_TYPE.of("", message, hint=hint))
-        found += names
-    return found
+        listed += names
+    return listed
 
 
-def _near(scope: Scope, report: Report) -> Library:
+def _nearby_library(scope: Scope, report: Report) -> Library:
     return Library(
-        scope.include, scope.root, report, own=inputs.near(scope.root), distro=scope.distro
+        scope.include,
+        scope.root,
+        report,
+        own=inputs.nearby_packages(scope.root),
+        distro=scope.distro,
     )
 
 
-def _wide(scope: Scope, report: Report) -> Library:
-    own = {**inputs.below(scope.root), **inputs.near(scope.root)}
+def _full_library(scope: Scope, report: Report) -> Library:
+    own = {**inputs.packages_below(scope.root), **inputs.nearby_packages(scope.root)}
     return Library(scope.include, scope.root, report, own=own, distro=scope.distro)
 
 
-def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[Meant, ...]]:
-    """Return the types that a text means, and where they are found; reports IDL618.
+def resolve(text: str, scope: Scope, report: Report) -> tuple[Library, tuple[ResolvedType, ...]]:
+    """Return the types that a text means, and the library that has them; reports IDL618.
 
     `package/kind/Name`, `package/Name` and `Name` mean one type, also with dots or `::`, and
-    `package` means all of its interfaces. Folders below are searched for what is not found else.
+    `package` means all of its interfaces. Folders below the base are searched last.
     """
-    library = _near(scope, report)
-    meant = _meant(text, library)
-    if not meant:
-        library = _wide(scope, Report())
-        meant = _meant(text, library)
-    if len(meant) == 1 or text in library.packages():
-        return library, meant
-    report.add(_several(text, meant) if meant else _nothing(text, library, scope.root))
+    library = _nearby_library(scope, report)
+    types = _candidates(text, library)
+    if not types:
+        library = _full_library(scope, Report())
+        types = _candidates(text, library)
+    if len(types) == 1 or text in library.packages():
+        return library, types
+    report.add(_ambiguous(text, types) if types else _unknown_type(text, library, scope.root))
     return library, ()
 
 
-def _meant(text: str, library: Library) -> tuple[Meant, ...]:
+def _candidates(text: str, library: Library) -> tuple[ResolvedType, ...]:
     """Return every type that a text may mean."""
     match _DIVIDER.split(text):
         case [package, kind, name]:
-            places = [(package, one) for one in ir.KINDS if one == kind]
+            places = [(package, valid) for valid in ir.KINDS if valid == kind]
         case [package, name]:
             # as in interface files, it is a message if there is one
-            if found := _found(ir.TypeName(package, "msg", name), library):
-                return (found,)
+            if resolved := _resolved(ir.TypeName(package, "msg", name), library):
+                return (resolved,)
             places = [(package, kind) for kind in ir.KINDS]
         case [package] if package in library.packages():
-            return tuple(Meant(one, one) for one in library.interfaces(package))
+            return tuple(
+                ResolvedType(interface, interface) for interface in library.interfaces(package)
+            )
         case [name]:
             places = [(package, kind) for package in library.packages() for kind in ir.KINDS]
         case _:
             return ()
     names = (ir.TypeName(package, kind, name) for package, kind in places)
-    return tuple(found for one in names if (found := _found(one, library)))
+    return tuple(resolved for candidate in names if (resolved := _resolved(candidate, library)))
 
 
-def _found(name: ir.TypeName, library: Library) -> Meant | None:
+def _resolved(name: ir.TypeName, library: Library) -> ResolvedType | None:
     """Return a type and its interface, which for a derived type has a shorter name."""
     interface = name
     while library.source(interface) is None:
@@ -358,16 +367,16 @@ def _found(name: ir.TypeName, library: Library) -> Meant | None:
         if not shorter or not rest or name.kind == "msg":
             return None
         interface = interface._replace(name=shorter)
-    return Meant(name, interface)
+    return ResolvedType(name, interface)
 
 
-def _several(text: str, meant: Sequence[Meant]) -> Diagnostic:
-    names = first_few((f"`{one.name}`" for one in meant), _LISTED)
-    message = f"`{text}` may be {len(meant)} types"
+def _ambiguous(text: str, types: Sequence[ResolvedType]) -> Diagnostic:
+    names = first_few((f"`{type_.name}`" for type_ in types), _LISTED)
+    message = f"`{text}` may be {len(types)} types"
     return codes.NO_SUCH_TYPE.of("", message, hint=f"name one of {names}")
 
 
-def _nothing(text: str, library: Library, root: Root) -> Diagnostic:
+def _unknown_type(text: str, library: Library, root: Root) -> Diagnostic:
     if not _DIVIDER.search(text):
         message = f"`{text}` is no file or folder, and no type or package that is known here"
     else:
@@ -377,13 +386,13 @@ def _nothing(text: str, library: Library, root: Root) -> Diagnostic:
 
 
 def _similar(parts: Sequence[str], library: Library, root: Root) -> str | None:
-    """Return the hint that names what is nearest to a type's or package's name."""
+    """Return the hint with the closest name to a type's or package's."""
     if len(parts) == 1:
-        named = {one.name: str(one) for one in _all(library)}
+        named = {interface.name: str(interface) for interface in _all(library)}
         near = closest(parts[0], [*inputs.names(root), *named, *library.packages()])
         return f"did you mean `{named.get(near, near)}`?" if near else None
     package = closest(parts[0], library.packages()) or ""
-    named = {one.name: str(one) for one in library.interfaces(package)}
+    named = {interface.name: str(interface) for interface in library.interfaces(package)}
     if package == parts[0]:
         near = closest(parts[-1], named)
         return (

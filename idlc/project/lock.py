@@ -1,6 +1,6 @@
-"""idlc.lock: what a run was given and what it wrote, so that the next one knows what is its own.
+"""idlc.lock: the inputs and outputs of a run, by which the next run recognizes idlc's own files.
 
-The file is JSON, sorted and indented, and names nothing of the machine that it was made on.
+The file is JSON, sorted and indented, and holds nothing specific to the machine.
 """
 
 from __future__ import annotations
@@ -27,36 +27,36 @@ _OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
 
 
 def may_be_own(path: str) -> bool:
-    """Return whether idlc may have written a file of this path, as a record of unknown origin says.
+    """Return whether idlc may have written a file of this path; it does not leave its folder.
 
-    Such a path stays below its folder.
+    The path is from a record of unknown origin.
     """
     return len(path) < 1000 and _OWN.fullmatch(path) is not None
 
 
 class Obstacle(NamedTuple):
-    """Something in the way of a file: a link, a folder where it belongs, what cannot be read."""
+    """An obstacle to writing a file: a link or folder in its place, or an unreadable file."""
 
     what: str
 
 
 class Tree:
-    """A folder's files by relative path. Folders in it are looked at once."""
+    """A folder's files by relative path. Each folder in it is examined once."""
 
     def __init__(self, root: Path) -> None:
         self._root = str(root)
         self._folders: dict[str, Obstacle | bool] = {"": True}
 
     def read(self, path: str) -> bytes | Obstacle | None:
-        """Return a file's content, what else is there, or `None` for nothing."""
+        """Return a file's content, the obstacle in its place, or `None` if there is nothing."""
         folder = self._folder(path.rpartition("/")[0])
         if folder is not True:
             return folder or None
-        here = f"{self._root}/{path}"
+        whole = f"{self._root}/{path}"
         try:
-            status = os.lstat(here)
+            status = os.lstat(whole)
             if stat.S_ISREG(status.st_mode):
-                return content(here, status.st_size)
+                return content(whole, status.st_size)
             return Obstacle(_is(path, status.st_mode))
         except FileNotFoundError:
             return None
@@ -64,9 +64,9 @@ class Tree:
             return Obstacle(f"`{path}` cannot be read: {reason(error)}")
 
     def renamed(self, old: Iterable[str], new: Iterable[str]) -> dict[str, str]:
-        """Return which of the old files lie under new names that differ in capitals only.
+        """Return the new names of old files that differ from them in capitals only.
 
-        They do where a file system ignores capitals, as those of Windows and macOS.
+        Both are one file where the file system ignores case, as on Windows and macOS.
         """
         names = {path.casefold(): path for path in new}
         pairs = ((path, names.get(path.casefold())) for path in old)
@@ -74,19 +74,19 @@ class Tree:
 
     def _is_one(self, path: str, other: str) -> bool:
         try:
-            first, second = (os.lstat(f"{self._root}/{one}") for one in (path, other))
+            first, second = (os.lstat(f"{self._root}/{name}") for name in (path, other))
         except OSError:
             return False
         return path != other and os.path.samestat(first, second)
 
     def _folder(self, path: str) -> Obstacle | bool:
-        """Return whether a folder is there, or what is there instead of it or above it."""
-        known = self._folders.get(path)
-        if known is None:
+        """Return whether a folder exists, or the obstacle in its place or above it."""
+        status = self._folders.get(path)
+        if status is None:
             above = self._folder(path.rpartition("/")[0])
-            known = self._look(path) if above is True else above
-            self._folders[path] = known
-        return known
+            status = self._look(path) if above is True else above
+            self._folders[path] = status
+        return status
 
     def _look(self, path: str) -> Obstacle | bool:
         try:
@@ -123,7 +123,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     interfaces that were read, by full name, `outputs` the files written, by path below the
     lock: each with a SHA-256. `types` are the package's type hashes. `imports` are the modules of
     other packages that the generated code needs, `vendored` the packages written beside it.
-    `converts_values` is there where the classes convert values as those of Lyrical do.
+    `converts_values` is set where the classes convert values as in Lyrical.
     """
 
     format: int = FORMAT
@@ -140,7 +140,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def digest(data: bytes) -> str:
-    """Return the SHA-256 of a file, of a text one with line ends as idlc writes them.
+    """Return the SHA-256 of a file, for a text with line ends normalized.
 
     On Windows, git checks texts out with other ones.
     """
@@ -150,7 +150,7 @@ def digest(data: bytes) -> str:
 
 
 def is_same(old: bytes | None, new: bytes | None) -> bool:
-    """Return whether a file has a content already, whatever git made of its line ends."""
+    """Return whether a file has a content already, with any line ends."""
     return old == new or (old is not None and new is not None and _plain(old) == new)
 
 

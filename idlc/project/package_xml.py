@@ -1,4 +1,4 @@
-"""Adding dependencies to a package.xml; every byte that is there stays."""
+"""Reading package.xml, and adding dependencies to it, which keeps every other byte."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Facts(msgspec.Struct, frozen=True):
     """A package with a package.xml.
 
     `modules` are its Python files by dotted name, tests excluded. `inputs` are the digests of its
-    interface files by name within the package, empty without `outputs`; `whole` is whether these
-    files are all that it has. `generates` is whether its CMakeLists.txt
-    generates interfaces that are installed, `native` whether it has C or C++ sources, `marker`
-    whether resource/NAME exists. `known` are the names of ROS packages that can be found.
+    interface files by name within the package, empty without `outputs`; `whole` is whether the
+    package has no others. `generates` is whether its CMakeLists.txt generates interfaces that are
+    installed, `native` whether it has C or C++ sources, `marker` whether resource/NAME exists.
+    `available` are the names of ROS packages that can be found.
     `files` are the paths of interface files in the package's folder by name within the package.
     `folders` are those with files by dotted name, and whether they are Python packages.
     """
@@ -65,17 +65,17 @@ class Facts(msgspec.Struct, frozen=True):
     marker: bool = False
     whole: bool = False
     outputs: tuple[GeneratedOutput, ...] = ()
-    known: frozenset[str] = frozenset()
+    available: frozenset[str] = frozenset()
     files: Mapping[str, str] = {}
     folders: Mapping[str, bool] = {}
 
     def declared(self, *tags: str) -> dict[str, Statement]:
         """Return the statements with one of these tags by their text, the first of each."""
-        found: dict[str, Statement] = {}
+        by_text: dict[str, Statement] = {}
         for statement in self.statements:
             if statement.tag in tags:
-                found.setdefault(statement.text, statement)
-        return found
+                by_text.setdefault(statement.text, statement)
+        return by_text
 
     @property
     def build_type(self) -> str:
@@ -84,7 +84,7 @@ class Facts(msgspec.Struct, frozen=True):
 
     @property
     def place(self) -> Span:
-        """Where problems with the whole package.xml are shown: at its name."""
+        """The span for problems with the whole package.xml: its name."""
         named = self.declared("name")
         return next(iter(named.values())).span if named else Span(self.manifest, 0, 0)
 
@@ -125,7 +125,7 @@ class Element(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """The elements of a package.xml in order, those of its `<export>` included."""
+    """The elements of a package.xml in order, including its `<export>`."""
 
     format: str
     elements: tuple[Element, ...]
@@ -141,9 +141,9 @@ class Manifest(NamedTuple):
 
 
 def read(data: bytes, encoding: str | None = None) -> Manifest:
-    """Return what the bytes of a file say; raises NotXmlError.
+    """Parse the bytes of a package.xml; raises NotXmlError.
 
-    `encoding` is for bytes that are not as the file's own declaration says.
+    `encoding` overrides the file's own declaration.
     """
     reader = _Reader(data, encoding)
     try:
@@ -152,19 +152,22 @@ def read(data: bytes, encoding: str | None = None) -> Manifest:
         raise NotXmlError(str(error).partition(":")[0], error.lineno, error.offset) from error
     except (ValueError, LookupError) as error:  # an unknown encoding
         raise NotXmlError(str(error).partition(":")[0]) from error
-    return Manifest(reader.format, tuple(sorted(reader.found, key=lambda one: one.start)))
+    return Manifest(
+        reader.format, tuple(sorted(reader.elements, key=lambda element: element.start))
+    )
 
 
 class _Reader:
     """Collects elements while expat reads.
 
-    `open` are the tags of the open elements, `begun` start, attributes and texts of those that may.
+    `open` are the tags of the open elements, `begun` start, attributes and texts of those elements
+    among them that are at one of the depths to collect.
     """
 
     def __init__(self, data: bytes, encoding: str | None) -> None:
         self.data = data
         self.format = ""
-        self.found: list[Element] = []
+        self.elements: list[Element] = []
         self.open: list[str] = []
         self.begun: list[tuple[int, dict[str, str], list[str]]] = []
         self.parser = expat.ParserCreate(encoding)
@@ -188,7 +191,7 @@ class _Reader:
             if (parents := tuple(self.open)) in _PARENTS:
                 end = self.data.find(b">", self.parser.CurrentByteIndex) + 1
                 text = "".join(texts).strip()
-                self.found.append(Element(parents, tag, text, start, end, attributes))
+                self.elements.append(Element(parents, tag, text, start, end, attributes))
 
     def _text(self, text: str) -> None:
         for _, _, texts in self.begun:
@@ -196,7 +199,7 @@ class _Reader:
 
 
 def statements(source: Source) -> tuple[Statement, ...]:
-    """Return what the text of a package.xml says, in order; empty if it is not XML."""
+    """Return the statements of a package.xml, in order; empty if it is not XML."""
     data = source.text.encode("utf-8")
     try:
         manifest = read(data, "utf-8")
@@ -261,12 +264,12 @@ def _broken(data: bytes, name: str, error: NotXmlError) -> Diagnostic:
 
 
 def read_statements(path: Path, name: str, root: Root, report: Report) -> tuple[Statement, ...]:
-    """Return what a package.xml says, in order; empty for a file that cannot be read as XML."""
+    """Read the statements of a package.xml, in order; empty if it cannot be read as XML."""
     source = root.read_source(path, name, report)
     return () if source is None else statements(source)
 
 
-#: Tags by which a package is there when a node runs.
+#: Tags that make a package available when a node runs.
 AT_RUN_TIME = frozenset({"depend", "exec_depend", "run_depend"})
 AT_TEST_TIME = AT_RUN_TIME | {"test_depend"}
 GROUP = "rosidl_interface_packages"
@@ -282,8 +285,8 @@ def add_dependencies(
 ) -> Outcome:
     """Return the file with the dependencies that it lacks.
 
-    `depends` are needed to build and run, `executes` to run, `tests` for testing; with `group` the
-    package says that it has interfaces.
+    `depends` are needed to build and run, `executes` to run, `tests` for testing; `group` declares
+    that the package has interfaces.
     """
     data = text.encode("utf-8")
     manifest = _manifest(data)
@@ -309,7 +312,7 @@ def add_dependencies(
 
 
 def _manifest(data: bytes) -> Manifest | None:
-    """Return what a package.xml says; `None` if it is not well-formed or another document."""
+    """Parse a package.xml; `None` if it is not well-formed or another document."""
     try:
         manifest = read(data, "utf-8")
     except NotXmlError:
@@ -340,7 +343,7 @@ def _with(data: bytes, tag: str, name: str) -> bytes:
 
 
 def _line_end(data: bytes, at: int) -> int:
-    """Return where a line ends that has nothing but a comment after `at`; `at` otherwise."""
+    """Return the end of a line that has nothing but a comment after `at`; `at` otherwise."""
     end = data.find(b"\n", at)
     end = len(data) if end < 0 else end
     rest = data[at:end].strip()

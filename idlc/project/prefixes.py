@@ -28,17 +28,17 @@ def ament_prefixes() -> tuple[Path, ...]:
 
 def modules_folder() -> str:
     """Return the folder of a prefix in which the Python of ROS 2 here looks for modules."""
-    found = (
+    folders = (
         path.parent.relative_to(prefix).as_posix()
         for prefix in ament_prefixes()
         for path in sorted(prefix.glob("lib/python3*/site-packages/rclpy"))
     )
     own = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
-    return next(found, own)
+    return next(folders, own)
 
 
 def runs_nodes() -> bool:
-    """Return whether this Python has rclpy; that of pipx, uv or pre-commit has idlc alone."""
+    """Return whether this Python has rclpy; environments of pipx or pre-commit have idlc alone."""
     return bool(python_folders("rclpy"))
 
 
@@ -49,11 +49,11 @@ def python_folders(package: str) -> list[Path]:
 
 
 def machine() -> str:
-    """Return the processor that programs here are for, such as `x86_64`; empty if not on Linux."""
+    """Return the processor of this Python, such as `x86_64`; empty if not on Linux."""
     whole = sys.maxsize > 1 << 32  # a 32-bit Python on a 64-bit kernel
     if sys.platform != "linux" or not whole:
         return ""
-    import platform  # slow to import, for what few runs ask
+    import platform  # slow to import, and few runs need it
 
     return platform.machine()
 
@@ -61,8 +61,8 @@ def machine() -> str:
 def wheel_platform() -> str:
     """Return the platform tag of wheels with libraries for this machine.
 
-    The libraries need none of the system's, so they run wherever the generated code does: the tags
-    are those of the oldest systems that have a Python for it.
+    The libraries need no library of the system, so they run wherever the generated code does: the
+    tags name the oldest systems with a supported Python.
     """
     import platform
 
@@ -70,7 +70,7 @@ def wheel_platform() -> str:
     return f"{libc}_{machine()}"
 
 
-#: What is taken where nothing of ROS 2 is installed.
+#: The distribution where nothing of ROS 2 is installed.
 DEFAULT = distros.DEFAULT.name
 #: The distribution of each release of rosidl, which is in every installation of ROS 2.
 _BY_VERSION = {
@@ -85,9 +85,9 @@ _TELLING = "share/rosidl_runtime_c/package.xml"
 
 
 class Distribution(NamedTuple):
-    """A distribution, by the name that ROS_DISTRO has for it; `why` says by what it is known.
+    """A distribution, by the name that ROS_DISTRO has for it; `why` is the evidence.
 
-    One that this idlc does not know has an empty name.
+    An unknown distribution has an empty name.
     """
 
     name: str
@@ -97,22 +97,24 @@ class Distribution(NamedTuple):
 def distribution(prefixes: Iterable[Path] | None = None) -> Distribution:
     """Return the distribution that is installed in prefixes, by default in those of ROS 2.
 
-    The first that tells is right, or the one that ROS_DISTRO names if there are several. Where
-    nothing is installed, ROS_DISTRO alone counts: it is often set wrongly.
+    The first one found wins, or the one that ROS_DISTRO names if there are several. ROS_DISTRO
+    decides only where nothing is installed: it is often set wrongly.
     """
     places = ament_prefixes() if prefixes is None else prefixes
-    found = list(filter(None, map(installed, places)))
-    wanted = os.environ.get("ROS_DISTRO", "")
-    if not found and wanted:
+    distributions = list(filter(None, map(installed, places)))
+    requested = os.environ.get("ROS_DISTRO", "")
+    if not distributions and requested:
         return Distribution(
-            wanted if wanted in _BY_VERSION.values() else "", f"ROS_DISTRO={wanted}"
+            requested if requested in _BY_VERSION.values() else "", f"ROS_DISTRO={requested}"
         )
-    chosen = [one for one in found if one.name == wanted] or found
+    chosen = [
+        candidate for candidate in distributions if candidate.name == requested
+    ] or distributions
     return chosen[0] if chosen else Distribution(DEFAULT, "no ROS 2 is installed here")
 
 
 def installed(prefix: Path) -> Distribution | None:
-    """Return the distribution that a prefix itself holds; `None` for one that does not tell."""
+    """Return the distribution in a prefix itself; `None` if it has no rosidl."""
     version = declared_version(prefix / _TELLING)
     if not version:
         return None
@@ -137,7 +139,7 @@ class InstalledPackage(NamedTuple):
         return self.root.shown(self.prefix / "lib" / name)
 
     def content(self, name: str) -> bytes | None:
-        """Return the content of one of its libraries, `None` where there is none to be read."""
+        """Return the content of one of its libraries, `None` if it has no such file."""
         path = self.prefix / "lib" / name
         return read_bytes(path, self.root.shown(path), Report()) if is_file(path) else None
 
@@ -154,14 +156,14 @@ def prefixes(folder: Path) -> list[Path]:
 
 
 def installed_packages(prefix: Path, root: Root) -> Iterator[InstalledPackage]:
-    """Yield the packages of a prefix that are registered as packages with interfaces."""
+    """Yield the packages of a prefix that its index lists as packages with interfaces."""
     for name in _registered(prefix, "rosidl_interfaces"):
         if is_file(prefix / INDEX / "packages" / name):
             yield InstalledPackage(prefix, name, root)
 
 
 def inconsistencies(prefix: Path) -> Iterator[tuple[str, str]]:
-    """Yield each package whose entries in the index and files do not match, and what is wrong."""
+    """Yield each package whose entries in the index do not match its files, and the problem."""
     interfaces = _registered(prefix, "rosidl_interfaces")
     packages = set(_registered(prefix, "packages"))
     for name in interfaces:

@@ -1,6 +1,6 @@
-"""The folder that paths are seen from, with the texts that an editor has open.
+"""The folder that paths are relative to, with the texts that an editor has open.
 
-It is passed to whatever reads files, so that nothing depends on the working folder of the process.
+It is passed to all code that reads files, so that none depends on the process's working folder.
 """
 
 from __future__ import annotations
@@ -54,15 +54,15 @@ class Root:
         return Root(self.base)
 
     def path(self, path: str | Path) -> str:
-        """Return where to open a path; `..` after a link is left to the operating system."""
+        """Return the path to open; `..` after a link is left to the operating system."""
         return os.path.join(self._base, path)  # noqa: PTH118 - a Path costs more than the look
 
     def absolute(self, path: str | Path) -> Path:
-        """Return an absolute path without `..` and with links as they are."""
+        """Return an absolute path without `..`, in which links are not resolved."""
         return Path(os.path.normpath(self.path(path)))
 
     def shown(self, path: Path) -> str:
-        """Return a path as a person knows it: relative to the base where it is below that."""
+        """Return a path for messages: relative to the base if it is below the base."""
         whole = str(path)
         if whole.startswith(self._above):  # as `relative_to` says, in a fraction of the time
             return whole[len(self._above) :].replace(os.sep, "/")
@@ -72,14 +72,14 @@ class Root:
             return path.as_posix()
 
     def relative(self, path: Path) -> str:
-        """Return a path as one would type it in the base, with `..` where it leads out of it.
+        """Return a path relative to the base, with `..` where it leads out of it.
 
         Raises ValueError for a path on another drive.
         """
         return os.path.relpath(path, self._base)
 
     def read_bytes(self, path: str | Path, name: str, report: Report) -> bytes | None:
-        """Return what counts as a file's bytes; report as `files.read_bytes` does."""
+        """Return a file's bytes, or its open text; report as `files.read_bytes` does."""
         data = self._texts.get(self.absolute(path)) if self._texts else None
         if data is None:
             return files.read_bytes(Path(self.path(path)), name, report)
@@ -89,22 +89,22 @@ class Root:
         return data
 
     def read_source(self, path: str | Path, name: str, report: Report) -> Source | None:
-        """Return what counts as a file's text; report what stands in the way."""
+        """Return a file's text, or its open text; report why there is none."""
         data = self.read_bytes(path, name, report)
         return None if data is None else files.decode(data, name, report)
 
     def is_file(self, path: str | Path) -> bool:
-        """Return whether there is such a file, on disk or only in the editor."""
+        """Return whether a file exists, on disk or only in the editor."""
         if is_file(self.path(path)):
             return True
         return bool(self._texts) and self.absolute(path) in self._texts
 
     def is_open(self, path: Path) -> bool:
-        """Return whether another text counts than that of an absolute path's file."""
+        """Return whether an open text counts instead of the file at an absolute path."""
         return path in self._texts
 
     def unsaved_below(self, folder: Path) -> Iterator[Path]:
-        """Yield what lies below an absolute folder in the editor only."""
+        """Yield the paths below an absolute folder that exist in the editor only."""
         for path in self._texts:
             if path.is_relative_to(folder) and not is_file(path):
                 yield path
@@ -123,11 +123,11 @@ class Root:
 
 
 def _nearest_manifest(folder: Path) -> Path | None:
-    for here in map(str, (folder, *folder.parents)):
-        path = os.path.join(here, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
+    for directory in map(str, (folder, *folder.parents)):
+        path = os.path.join(directory, MANIFEST)  # noqa: PTH118 - a Path costs more than the look
         if is_file(path):
             return Path(path)
-        if os.path.exists(os.path.join(here, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
+        if os.path.exists(os.path.join(directory, ".git")):  # noqa: PTH110, PTH118 - or a worktree's file
             break
     return None
 
@@ -138,5 +138,5 @@ def _locks(folder: Path) -> Iterator[lock.Lock]:
     except OSError:
         return
     for package in packages:
-        if (found := lock.load_lock(package, "", Report())) is not None:
-            yield found
+        if (record := lock.load_lock(package, "", Report())) is not None:
+            yield record

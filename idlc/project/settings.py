@@ -1,4 +1,4 @@
-"""`[tool.idlc]` of the nearest pyproject.toml: what would otherwise be typed each time.
+"""`[tool.idlc]` of the nearest pyproject.toml: defaults for options of the command line.
 
 Paths in it are relative to the file's folder. A mistake is reported as IDL611.
 """
@@ -39,8 +39,8 @@ Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
 
-class Place(NamedTuple):
-    """A table of a file: its name, how messages call it, and its number among those of one name."""
+class TableLocation(NamedTuple):
+    """The location of a table: file, name, name in messages, number among tables of the name."""
 
     source: Source
     table: str
@@ -48,7 +48,7 @@ class Place(NamedTuple):
     number: int = 0
 
     def wrong(self, key: str, message: str, report: Report, hint: str | None = None) -> None:
-        """Report what is wrong with a setting, where it stands."""
+        """Report a problem with a setting, at its location in the file."""
         span = self._span(key)
         report.add(
             BAD_CONFIG.of(self.source.path, message, hint=hint)
@@ -57,23 +57,23 @@ class Place(NamedTuple):
         )
 
     def no_url(self, key: str, value: str, report: Report) -> None:
-        """Report a URL: what a file of somebody else names is not fetched."""
+        """Report a URL: files, which others may have written, do not cause downloads."""
         if "://" in value:
             message = f"`{key}` in {self.shown} is a URL"
             self.wrong(key, message, report, "URLs are opened if they are typed")
 
     def _span(self, key: str) -> Span | None:
-        """Return where a key of the table stands, else the table's header, else any such key."""
+        """Return the span of a key of the table, else of its header, else of any such key."""
         text = self.source.text
         name = r"[ \t]*\.[ \t]*".join(map(re.escape, self.table.split(".")))
         headers = [*re.finditer(rf"(?m)^[ \t]*\[+[ \t]*({name})[ \t]*\]", text)]
         if self.number < len(headers):
             header = headers[self.number]
             after = re.compile(r"(?m)^[ \t]*\[").search(text, header.end())
-            found = _key(key).search(text, header.end(), after.start() if after else len(text))
-            return Span(self.source, *(found or header).span(1))
-        found = _key(key).search(text)
-        return Span(self.source, *found.span(1)) if found else None
+            match = _key(key).search(text, header.end(), after.start() if after else len(text))
+            return Span(self.source, *(match or header).span(1))
+        match = _key(key).search(text)
+        return Span(self.source, *match.span(1)) if match else None
 
 
 def _key(name: str) -> re.Pattern[str]:
@@ -81,33 +81,33 @@ def _key(name: str) -> re.Pattern[str]:
 
 
 def read_table(
-    table: Mapping[str, Any], shape: type[_Shape], place: Place, report: Report
+    table: Mapping[str, Any], shape: type[_Shape], place: TableLocation, report: Report
 ) -> _Shape | None:
-    """Return a table as a Struct; what is wrong is reported and left out.
+    """Return a table as a Struct; invalid settings are reported and left out.
 
-    `None` means that something without a default is missing.
+    `None` means that a setting without a default is missing.
     """
     fields = {field.encode_name: field for field in msgspec.structs.fields(shape)}
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for key, value in table.items():
         if key not in fields:
-            listed = ", ".join(f"`{known}`" for known in fields)
+            listed = ", ".join(f"`{name}`" for name in fields)
             hint = did_you_mean(key, fields) or f"the settings are {listed}"
             place.wrong(key, f"unknown setting `{key}` in {place.shown}", report, hint)
             continue
         read = read_value(value, fields[key].type, key, place, report)
         if read is not None:
-            found[fields[key].name] = read
+            values[fields[key].name] = read
     missing = [key for key, field in fields.items() if field.required and key not in table]
     for key in missing:
         what = _meta(fields[key].type).description
         place.wrong(key, f"{place.shown} needs `{key}`, {what}", report)
     required = {field.name for field in fields.values() if field.required}
-    return shape(**found) if required <= found.keys() else None
+    return shape(**values) if required <= values.keys() else None
 
 
-def read_value(value: object, type_: Any, key: str, place: Place, report: Report) -> Any:
-    """Return a value as one of the types above; report one that is of another, return `None`."""
+def read_value(value: object, type_: Any, key: str, place: TableLocation, report: Report) -> Any:
+    """Return a value as one of the types above; report any other value and return `None`."""
     try:
         return msgspec.convert(value, type_)
     except msgspec.ValidationError:
@@ -117,7 +117,7 @@ def read_value(value: object, type_: Any, key: str, place: Place, report: Report
 
 
 def _meta(type_: Any) -> Meta:
-    return next(one for one in get_args(type_) if isinstance(one, Meta))
+    return next(argument for argument in get_args(type_) if isinstance(argument, Meta))
 
 
 SETTINGS_FILE = "pyproject.toml"
@@ -126,7 +126,7 @@ _COSTLY = 10_000_000
 
 
 class Settings(msgspec.Struct, frozen=True, rename="kebab"):
-    """`[tool.idlc]` as it is written; `command_table` reads the tables of commands."""
+    """`[tool.idlc]` as written in the file; `command_table` reads the tables of commands."""
 
     paths: Texts = ()
     include: Texts = ()
@@ -141,12 +141,10 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
 
 
 class Config(msgspec.Struct, frozen=True):
-    """The settings found; what is absent is empty or `None`. Paths are as one would type them.
+    """The settings for the base of `root`, to which paths are relative; absent ones are empty.
 
-    They are those that hold in the base of `root`.
-
-    `tables` holds the tables of single commands; `source` is the file, `folder` where it lies;
-    `exclude` is relative to that.
+    `tables` holds the tables of single commands; `source` is the file, `folder` the file's folder,
+    to which `exclude` is relative.
     """
 
     root: Root
@@ -164,7 +162,7 @@ class Config(msgspec.Struct, frozen=True):
 
 
 def load_settings(root: Root, report: Report) -> Config:
-    """Return the settings that hold in the base of a root."""
+    """Return the settings for the base of a root."""
     for folder in (root.base, *root.base.parents):
         path = folder / SETTINGS_FILE
         if root.is_file(path):
@@ -216,33 +214,33 @@ def _broken(source: Source, message: str) -> Diagnostic:
 
 
 def _checked(table: object, source: Source, folder: Path, root: Root, report: Report) -> Config:
-    """Return the settings in a table; report each that is unknown or of the wrong type."""
-    place = Place(source, "tool.idlc", "[tool.idlc]")
+    """Return the settings in a table; report unknown ones and wrong types."""
+    place = TableLocation(source, "tool.idlc", "[tool.idlc]")
     if not isinstance(table, dict):
         place.wrong("idlc", "`tool.idlc` must be a table", report)
         return Config(root)
-    found = read_table(table, Settings, place, report)
-    assert found is not None
-    for path in found.paths:
+    settings = read_table(table, Settings, place, report)
+    assert settings is not None
+    for path in settings.paths:
         place.no_url("paths", path, report)
     return Config(
         root,
-        paths=tuple(_typed(folder, path, root) for path in found.paths),
-        out=_typed(folder, found.out, root) if found.out else None,
-        package=found.package or None,
-        include=tuple(_typed(folder, path, root) for path in found.include),
-        exclude=found.exclude,
-        vendor_deps=found.vendor_deps,
-        distro=_distros(found.distro, place, report),
-        templates=_typed(folder, found.templates, root) if found.templates else None,
-        tables={"breaking": found.breaking, "check": found.check},
+        paths=tuple(_typed(folder, path, root) for path in settings.paths),
+        out=_typed(folder, settings.out, root) if settings.out else None,
+        package=settings.package or None,
+        include=tuple(_typed(folder, path, root) for path in settings.include),
+        exclude=settings.exclude,
+        vendor_deps=settings.vendor_deps,
+        distro=_distros(settings.distro, place, report),
+        templates=_typed(folder, settings.templates, root) if settings.templates else None,
+        tables={"breaking": settings.breaking, "check": settings.check},
         source=source,
         folder=folder,
     )
 
 
-def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tuple[str, ...]:
-    """Return the names of distributions; report those that are unknown."""
+def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
+    """Return the names of distributions; report unknown ones."""
     names = listed(value) if isinstance(value, str) else value
     for name in names:
         if name and name not in BY_NAME:
@@ -252,7 +250,7 @@ def _distros(value: str | tuple[str, ...], place: Place, report: Report) -> tupl
 
 
 def _typed(folder: Path, path: str, root: Root) -> str:
-    """Return a path in the file as one would type it in the base."""
+    """Return a path in the file relative to the base."""
     whole = folder / path
     try:
         return Path(root.relative(whole)).as_posix() if folder != root.base else path
@@ -262,21 +260,21 @@ def _typed(folder: Path, path: str, root: Root) -> str:
 
 def command_table(
     config: Config, name: str, shape: type[_Shape], report: Report
-) -> tuple[_Shape, Place | None]:
+) -> tuple[_Shape, TableLocation | None]:
     """Return the table of a command and its place, without one where there is no file."""
     if config.source is None:
         return shape(), None
-    place = Place(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
-    found = read_table(config.tables.get(name, {}), shape, place, report)
-    assert found is not None
-    return found, place
+    place = TableLocation(config.source, f"tool.idlc.{name}", f"[tool.idlc.{name}]")
+    table = read_table(config.tables.get(name, {}), shape, place, report)
+    assert table is not None
+    return table, place
 
 
 class Scope(msgspec.Struct, frozen=True):
-    """The package's name if it was given, folders with other packages, files that are left out.
+    """Options of a lookup: the package's name if set, folders with other packages, exclusions.
 
-    Paths are seen from `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its name
-    may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
+    Paths are relative to `root`. `out` is the folder that [tool.idlc] compiles `paths` into; its
+    name may be the package's. `distros` are the distributions of ROS 2 that files are read for, one
     except for `check`; none means the one that is installed.
     """
 
@@ -301,7 +299,7 @@ def scope(
     exclude: Sequence[str] = (),
     distro: str | None = None,
 ) -> Scope:
-    """Return what was typed, with what pyproject.toml says; `distro` is a list with commas."""
+    """Combine options of the command line with settings; `distro` is a list with commas."""
     left_out = [exclusion(exclude, settings.root.base)] if exclude else []
     if settings.exclude and settings.folder is not None:
         left_out.append(exclusion(settings.exclude, settings.folder))

@@ -1,4 +1,4 @@
-"""The environment of all templates, and the files that they make."""
+"""The environment of all templates, and rendered files."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def environment() -> jinja2.Environment:
 
 @cache
 def html() -> jinja2.Environment:
-    """Return the same for pages: whatever is placed is text, its control characters spelled out."""
+    """Return the environment of pages: values are escaped, control characters spelled out."""
     return environment().overlay(autoescape=True, finalize=_text)
 
 
@@ -49,14 +49,14 @@ def _text(value: object) -> object:
 
 
 def verbatim(name: str) -> str:
-    """Return a file of the templates' folder that is no template."""
+    """Return the content of a file in the templates' folder that is no template."""
     loader = environment().loader
     assert loader is not None
     return loader.get_source(environment(), name)[0]
 
 
-def keep() -> None:
-    """Let templates be compiled once: to compile them takes longer than to fill them in."""
+def keep_compiled() -> None:
+    """Cache compiled templates: compiling them takes longer than rendering."""
     if environment().bytecode_cache is not None:
         return
     place = cache_folder()
@@ -75,7 +75,7 @@ class _Compiled(jinja2.FileSystemBytecodeCache):
     def load_bytecode(self, bucket: jinja2.bccache.Bucket) -> None:
         try:
             super().load_bytecode(bucket)
-        except Exception:  # what pickle and marshal raise for a damaged file
+        except Exception:  # pickle and marshal raise any for a damaged file
             bucket.reset()
 
     def dump_bytecode(self, bucket: jinja2.bccache.Bucket) -> None:

@@ -1,8 +1,8 @@
-"""Carrying a plan out: all or nothing, each file whole at any moment, the lock last.
+"""Plans for writing files: all or nothing, each file whole at any moment, the lock last.
 
-Everything is first written into a staging folder, then moved into place file by file. When a
-move fails the earlier ones are undone. When the process is killed the staging folder stays; the
-next run reads from it which files are idlc's own.
+All files are first written into a staging folder, then moved into place one by one. When a move
+fails the earlier ones are undone. When the process is killed the staging folder stays; the next
+run reads from it which files are idlc's own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import NamedTuple
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Report
 from idlc.project import lock
-from idlc.project.atomic import alone, create, move_over, uninterrupted
+from idlc.project.atomic import create, exclusive, move_over, uninterrupted
 from idlc.project.files import is_folder, reason
 from idlc.project.lock import FILE, Obstacle, Tree, digest, is_same
 
@@ -45,8 +45,8 @@ class Change(NamedTuple):
 class Plan(NamedTuple):
     """Changes in the order in which to make them, and the digests of all files afterwards.
 
-    `record` is what the changes were planned against: the lock's content, if there was one. It
-    lies in `home`, which is empty or ends with a slash.
+    `record` is the lock's content when the changes were planned, if there was a lock. The lock is
+    in `home`, which is empty or ends with a slash.
     """
 
     out: Path
@@ -66,10 +66,10 @@ def plan(
     force: bool = False,
     home: str = "",
 ) -> Plan | None:
-    """Return what to change so that `out` holds `files`; report and return `None` if it must not.
+    """Return the changes after which `out` holds `files`; `None` after a report if it must not.
 
-    `owned` are the files that idlc wrote and the digests that it gave them. A file that is not
-    owned, or was edited since, is only replaced with `force`. `name` is how messages call `out`.
+    `owned` are the files that idlc wrote and the digests that they had. A file that is not owned,
+    or was edited since, is only replaced with `force`. `name` is the name of `out` in messages.
     Reports IDL613 and IDL614.
     """
     tree = Tree(out)
@@ -85,16 +85,16 @@ def plan(
         if isinstance(old, Obstacle):
             refused += [_in_the_way(name, path, old)] if new is not None else []
             continue
-        ground = _ground(path, old, owned)
-        if ground is Ground.USERS:
+        ground = _ownership(path, old, owned)
+        if ground is Ownership.USERS:
             continue
         if new is not None:
             outputs[path] = digest(new)
         if not is_same(old, new):
-            if ground is not Ground.OWN and not force:
+            if ground is not Ownership.OWN and not force:
                 diff = _diff(old, new) if len(refused) < DIFFS else ""
                 refused.append(_refusal(f"{name}/{path}", ground, diff, removed=new is None))
-            changes.append(Change(path, old, new, backup=ground is not Ground.OWN))
+            changes.append(Change(path, old, new, backup=ground is not Ownership.OWN))
     if isinstance(record, Obstacle):
         refused.append(_in_the_way(name, home + FILE, record))
     report.extend(refused)
@@ -103,8 +103,8 @@ def plan(
     return Plan(out, tuple(changes), outputs, record, home)
 
 
-class Ground(enum.Enum):
-    """The file in a place that is to be written, replaced or removed."""
+class Ownership(enum.Enum):
+    """The ownership of a file that is to be written, replaced or removed."""
 
     OWN = "nothing, or what idlc wrote"
     EDITED = "what idlc wrote, edited since"
@@ -112,12 +112,12 @@ class Ground(enum.Enum):
     USERS = "a file that idlc did not write, and that stays"
 
 
-def _ground(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ground:
+def _ownership(path: str, old: bytes | None, owned: Mapping[str, frozenset[str]]) -> Ownership:
     if old is None or digest(old) in owned.get(path, ()):
-        return Ground.OWN
+        return Ownership.OWN
     if path in owned:
-        return Ground.EDITED
-    return Ground.USERS if path in YIELDING else Ground.FOREIGN
+        return Ownership.EDITED
+    return Ownership.USERS if path in YIELDING else Ownership.FOREIGN
 
 
 def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
@@ -128,8 +128,8 @@ def _in_the_way(name: str, path: str, obstacle: Obstacle) -> Diagnostic:
     )
 
 
-def _refusal(shown: str, ground: Ground, diff: str, *, removed: bool) -> Diagnostic:
-    if ground is Ground.FOREIGN:
+def _refusal(shown: str, ground: Ownership, diff: str, *, removed: bool) -> Diagnostic:
+    if ground is Ownership.FOREIGN:
         return codes.FOREIGN_FILE.of(
             shown,
             f"`{shown}` is in the way and was not written by idlc",
@@ -151,7 +151,7 @@ def _diff(old: bytes | None, new: bytes | None) -> str:
 
 
 def difference(old: bytes, new: bytes) -> Iterator[str]:
-    """Yield a unified diff from what is on disk to what idlc would write, cut when long."""
+    """Yield a unified diff from the file on disk to idlc's, cut when long."""
     import difflib
 
     lines = list(
@@ -166,33 +166,35 @@ def _lines(data: bytes) -> list[str]:
     return data.decode("utf-8", errors="replace").splitlines()
 
 
-def emptied(changes: Iterable[Change]) -> list[str]:
-    """Return the folders that removed files were in, the deepest first."""
-    found = {
+def emptied_folders(changes: Iterable[Change]) -> list[str]:
+    """Return the folders of removed files, the deepest first."""
+    folders = {
         str(folder)
         for change in changes
         if change.new is None
         for folder in PurePosixPath(change.path).parents
         if folder.parts
     }
-    return sorted(found, key=lambda folder: (-folder.count("/"), folder))
+    return sorted(folders, key=lambda folder: (-folder.count("/"), folder))
 
 
 STAGE = ".idlc-stage-"
 
 
-def owned(out: Path, known: lock.Lock | None) -> dict[str, frozenset[str]]:
+def owned_files(out: Path, existing: lock.Lock | None) -> dict[str, frozenset[str]]:
     """Return the files that idlc wrote below `out`, each with the digests that it may have."""
-    found = {path: frozenset((one,)) for path, one in (known.outputs if known else {}).items()}
+    digests = {
+        path: frozenset((value,)) for path, value in (existing.outputs if existing else {}).items()
+    }
     for journal in journals(out):
         with contextlib.suppress(ValueError):
-            for path, one in lock.decode(journal).outputs.items():
-                found[path] = found.get(path, frozenset()) | {one}
-    return found
+            for path, value in lock.decode(journal).outputs.items():
+                digests[path] = digests.get(path, frozenset()) | {value}
+    return digests
 
 
 def journals(out: Path) -> Iterator[bytes]:
-    """Yield what killed runs wrote down about the files that they were moving into place."""
+    """Yield the journals of killed runs, which list the files that they were moving into place."""
     for stage in _abandoned(out):
         with contextlib.suppress(OSError):
             yield (stage / lock.FILE).read_bytes()
@@ -227,7 +229,7 @@ def _in_use(stage: Path) -> bool:
 def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
     """Make the changes and write the lock; report IDL612 and return `False` on a failure.
 
-    After a failure every file is as it was, or the report says which are not.
+    After a failure every file is as it was, or the report names the others.
     """
     if not plan.changes and plan.record == new_lock:
         with contextlib.suppress(OSError):  # a package that cannot be written may be right
@@ -242,16 +244,16 @@ def apply(plan: Plan, new_lock: bytes, name: str, report: Report) -> bool:
 def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
     """Make all changes or none; report IDL612 and return `False` on a failure."""
     out = plan.out
-    with alone(out):
+    with exclusive(out):
         try:
             transaction = _Transaction(out, plan.home)
         except OSError as error:
             report.add(_failure(name, error))
             return False
-        left, changed = _left(out, plan.changes)
+        left, changed = _pending(out, plan.changes)
         if changed is not None:
             transaction.undo()
-            report.add(_meanwhile(name, changed))
+            report.add(_changed_meanwhile(name, changed))
             return False
         try:
             transaction.run(left, journal)
@@ -268,8 +270,8 @@ def _carry_out(plan: Plan, journal: bytes, name: str, report: Report) -> bool:
     return True
 
 
-def _left(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
-    """Return the changes that nobody else has made meanwhile, and the first that cannot be made."""
+def _pending(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], str | None]:
+    """Return the changes that no other process has made meanwhile, and the first conflict."""
     tree = Tree(out)
     left = []
     for change in changes:
@@ -282,7 +284,7 @@ def _left(out: Path, changes: tuple[Change, ...]) -> tuple[tuple[Change, ...], s
     return tuple(left), None
 
 
-def _meanwhile(name: str, path: str) -> Diagnostic:
+def _changed_meanwhile(name: str, path: str) -> Diagnostic:
     return codes.CANNOT_WRITE.of(
         f"{name}/{path}",
         f"`{name}/{path}` was changed while idlc was running",
@@ -308,7 +310,7 @@ def _outcome(torn: list[str], name: str) -> str:
 
 
 def sweep(out: Path) -> None:
-    """Remove what killed runs left."""
+    """Remove the staging folders of killed runs."""
     for stage in _abandoned(out):
         _remove(stage)
 
@@ -323,14 +325,14 @@ def _remove(stage: Path) -> None:
 
 
 class _Transaction:
-    """Moves staged files into place and remembers how to go back."""
+    """Moves staged files into place, and can undo that."""
 
     def __init__(self, out: Path, home: str) -> None:
         self._out = out
         self._stage = out / home / f"{STAGE}{os.getpid()}"
-        self._made: list[Path] = []
+        self._created: list[Path] = []
         self._done: list[tuple[str, bytes | None]] = []
-        self._there: set[str] = set()
+        self._folders: set[str] = set()
         self.current = ""
         self._make_folder(out)
 
@@ -341,10 +343,10 @@ class _Transaction:
             folder = folder.parent
         for path in reversed(missing):
             path.mkdir()
-            self._made.append(path)
+            self._created.append(path)
 
     def run(self, changes: tuple[Change, ...], journal: bytes) -> None:
-        """Make all changes, in order; raises what stopped it."""
+        """Make all changes, in order; raises the first failure."""
         self._make_folder(self._stage)
         create(f"{self._stage}/{lock.FILE}", journal)
         for number, change in enumerate(changes):
@@ -375,9 +377,9 @@ class _Transaction:
 
     def _make_parent(self, path: str) -> None:
         folder = path.rpartition("/")[0]
-        if folder not in self._there:
+        if folder not in self._folders:
             self._make_folder(self._out / folder)
-            self._there.add(folder)
+            self._folders.add(folder)
 
     def _keep(self, path: str, content: bytes) -> None:
         """Write a copy of a file beside it, under a name that is free."""
@@ -394,13 +396,13 @@ class _Transaction:
                 for cached in (target.parent / "__pycache__").glob(f"{target.stem}.*.pyc"):
                     with contextlib.suppress(OSError):
                         cached.unlink()
-        for folder in emptied(changes):
+        for folder in emptied_folders(changes):
             for path in (self._out / folder / "__pycache__", self._out / folder):
                 with contextlib.suppress(OSError):
                     path.rmdir()
 
     def undo(self) -> list[str]:
-        """Go back to the state before; return the files for which that failed."""
+        """Restore all files; return those for which that failed."""
         torn = []
         for path, old in reversed(self._done):
             target = self._out / path
@@ -416,7 +418,7 @@ class _Transaction:
                 torn.append(path)
         if not torn:
             _remove(self._stage)
-        for folder in reversed(self._made):
+        for folder in reversed(self._created):
             with contextlib.suppress(OSError):
                 folder.rmdir()
         return torn

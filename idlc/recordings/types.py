@@ -180,7 +180,7 @@ class LocalTypes:
     """The types that are defined locally, without any recording."""
 
     def __init__(self, scope: Scope, report: Report) -> None:
-        self.near = inputs.near(scope.root)
+        self.near = inputs.nearby_packages(scope.root)
         self.library = Library(
             scope.include, scope.root, report, own=self.near, distro=scope.distro
         )

@@ -23,7 +23,7 @@ from idlc.project.lock import Obstacle, Tree, is_same
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
-from idlc.project.templates import keep
+from idlc.project.templates import keep_compiled
 from idlc.project.write import Change, Plan, apply_changes, difference
 from idlc.scaffold.roles import ROLES
 from idlc.scaffold.roles.role import Endpoint, Role
@@ -186,7 +186,7 @@ def templates(settings: Settings, report: Report) -> Templates:
 @contextmanager
 def rendering(subject: str, report: Report) -> Iterator[None]:
     """Report problems of a user's template within; other exceptions are bugs of idlc."""
-    keep()
+    keep_compiled()
     with stage("scaffold", subject):
         try:
             yield

@@ -12,7 +12,7 @@ from idlc.diagnostics.report import Report
 from idlc.generate.native.inspect import inspect
 from idlc.generate.native.layouts import LAYOUTS
 from idlc.generate.native.library import MACHINES, libraries
-from idlc.project.find import look
+from idlc.project.find import list_files
 from idlc.project.inputs import load
 from idlc.project.prefixes import Distribution
 from idlc.project.root import Root
@@ -54,7 +54,7 @@ def said(capsys):
 def made(machine="x86_64", layout="jazzy"):
     """Return the content of the package's library for other machines and distributions."""
     scope = Scope(Root.here())
-    files = look(("arm",), scope.root, Report()).files
+    files = list_files(("arm",), scope.root, Report()).files
     given = load("arm", files, files[0].root, scope.root, Report())
     ((_, model),) = models_of((given,), scope, Report())
     return libraries(model, MACHINES[machine], LAYOUTS[layout])[LIBRARY.removeprefix("lib/")]

@@ -86,7 +86,7 @@ class Client:
         return (self.top / name).as_uri()
 
     def tell(self, method, **params):
-        self.server.take(method, params)
+        self.server.handle_notification(method, params)
 
     def open(self, name, text):
         self.texts[name] = text

@@ -32,7 +32,7 @@ class Client:
 
     def open(self, name, text):
         item = {"uri": self.uri(name), "languageId": "rosmsg", "version": 1, "text": text}
-        self.server.take("textDocument/didOpen", {"textDocument": item})
+        self.server.handle_notification("textDocument/didOpen", {"textDocument": item})
 
     def problems(self, name):
         """Return the codes of a file's problems."""

@@ -155,7 +155,7 @@ def test_what_is_read_anew_for_a_request_is_told(tmp_path, name):
     (folder / "base/msg/Bad.msg").write_text("flot64 x\n")
     client.server.told.clear()
     client.ask_rename(robot, 0, 6, "Waypoint")
-    client.server.settle()
+    client.server.publish_problems()
     assert (folder / "base/msg/Bad.msg").as_uri() in str(client.server.told)
 
 

@@ -283,7 +283,7 @@ def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, 
         assert found.code == "IDL901"
         assert "ZeroDivisionError: as the test asked for" in found.message
     uri, message = opened(workspace, "flot64 x\n")
-    server.take(message["method"], message["params"])
+    server.handle_notification(message["method"], message["params"])
     (found,) = diagnostics(server.state)[uri]
     assert found.code == "IDL201"
 

@@ -34,8 +34,8 @@ WINDOWS = sys.platform == "win32"
 def test_a_run_waits_for_another_one(tmp_path):
     """The real lock of this system, with another process."""
     code = (
-        "import sys\nfrom pathlib import Path\nfrom idlc.project.atomic import alone\n"
-        "with alone(Path('out')), alone(Path('out/demo')):\n"
+        "import sys\nfrom pathlib import Path\nfrom idlc.project.atomic import exclusive\n"
+        "with exclusive(Path('out')), exclusive(Path('out/demo')):\n"
         "    print('in', flush=True)\n"
         "    sys.stdin.readline()\n"
     )
@@ -108,15 +108,15 @@ def test_the_lock_of_windows(kernel, tmp_path):
         with atomic.only_writer_on_windows():
             entered.set()
 
-    with atomic.alone(tmp_path / "a"):
-        with atomic.alone(tmp_path / "a/b"):
+    with atomic.exclusive(tmp_path / "a"):
+        with atomic.exclusive(tmp_path / "a/b"):
             assert kernel.calls.count("CreateMutexW") == 1, "it does not wait for itself"
         thread = threading.Thread(target=other)
         thread.start()
         assert not entered.wait(0.3)
     thread.join(10)
     assert entered.is_set()
-    with contextlib.suppress(KeyError), atomic.alone(tmp_path):
+    with contextlib.suppress(KeyError), atomic.exclusive(tmp_path):
         raise KeyError
     assert not kernel.mutex.locked()
 

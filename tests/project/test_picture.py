@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from idlc.project.find import Picture
+from idlc.project.find import DiskSnapshot
 
 #: In nanoseconds; files that are written now are as if they were that old.
 SECOND = 1_000_000_000
@@ -19,7 +19,7 @@ def file(tmp_path):
 
 
 def picture(file, begun):
-    return Picture({file.parent: file.parent.stat()}, [file, file.with_name("absent")], begun)
+    return DiskSnapshot({file.parent: file.parent.stat()}, [file, file.with_name("absent")], begun)
 
 
 def replace(file):
@@ -38,26 +38,26 @@ CHANGES = {
 
 def test_nothing_changed(file):
     one = picture(file, time.time_ns() + SECOND)
-    assert one.is_true()
+    assert one.is_current()
     file.read_text()
-    assert one.is_true()
+    assert one.is_current()
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_what_changes_is_noticed(file, change):
     one = picture(file, time.time_ns() + SECOND)
     change(file)
-    assert not one.is_true()
+    assert not one.is_current()
 
 
 def test_what_may_have_changed_while_it_was_read_is_not_trusted(file):
     """Whichever text was read, the time is that of the last."""
     begun = time.time_ns()
     file.write_text("int8 b\n")
-    assert not picture(file, begun).is_true()
+    assert not picture(file, begun).is_current()
 
 
 def test_times_in_the_future_are_like_others(file):
     future = time.time_ns() + 1000 * SECOND
     os.utime(file, ns=(future, future))
-    assert picture(file, time.time_ns() + SECOND).is_true()
+    assert picture(file, time.time_ns() + SECOND).is_current()

@@ -33,7 +33,7 @@ def tree(folder: Path) -> dict[str, str]:
 def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False) -> bool:
     known = load_lock(out, "out", report)
     content = {path: text.encode() for path, text in files.items()}
-    planned = plan(out, "out", content, write.owned(out, known), report, force=force)
+    planned = plan(out, "out", content, write.owned_files(out, known), report, force=force)
     if planned is None:
         return False
     record = lock.Lock(

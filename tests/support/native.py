@@ -6,7 +6,7 @@ from pathlib import Path
 from idlc.check.compiler import models_of
 from idlc.diagnostics.report import Report
 from idlc.generate.native.library import MACHINES, libraries
-from idlc.project.find import look
+from idlc.project.find import list_files
 from idlc.project.inputs import packages
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -32,7 +32,9 @@ def model_of(folder):
     """Return the model of the package in a folder; what it refers to is found in the wheels."""
     report = Report()
     scope = Scope(Root.here())
-    found = packages(look((str(folder),), scope.root, report, scope.exclude).files, scope, report)
+    found = packages(
+        list_files((str(folder),), scope.root, report, scope.exclude).files, scope, report
+    )
     ((_, model),) = models_of(found, scope, report)
     assert not report.had_errors, list(report)
     return model

@@ -96,12 +96,12 @@ class Server:
 
     def tell(self, method: str, params: object) -> None:
         """Send a notification."""
-        self._server.take(method, self._converter.unstructure(params))
-        self._server.settle()
+        self._server.handle_notification(method, self._converter.unstructure(params))
+        self._server.publish_problems()
 
-    def settle(self) -> None:
+    def publish_problems(self) -> None:
         """Let the server say what a loop does after messages."""
-        self._server.settle()
+        self._server.publish_problems()
 
     def rest(self) -> None:
         """Send nothing for a while."""

@@ -70,7 +70,7 @@ def facts(package: Inputs, ros_packages: Callable[[], Iterable[str]], scope: Sco
             if (place := root.absolute(entry.file.path)).is_relative_to(folder)
         },
         folders=_by_name(folder, files),
-        known=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
+        available=_LIBRARIES.union(ros_packages()) if modules else _LIBRARIES,
     )
 
 

@@ -56,7 +56,7 @@ def _packages_with_interfaces(model: Model) -> set[str]:
 
 def _or_misspelt(diagnostic: Diagnostic, facts: Facts, model: Model, package: str) -> Diagnostic:
     """Return a problem with the edit that declares a package, or with the misspelt declaration."""
-    existing = _packages_with_interfaces(model) | facts.known
+    existing = _packages_with_interfaces(model) | facts.available
     for name, statement in facts.declared(*_NEEDED).items():
         if name not in existing and closest_package(name, [package]):
             line = f"<{statement.tag}>{package}</{statement.tag}>"
@@ -159,7 +159,7 @@ def declared_imports(facts: Facts, model: Model, report: Report) -> None:
     for source in facts.modules.values():
         for module, node in imported_modules(source):
             package = module.partition(".")[0]
-            if package in facts.known and package not in declared:
+            if package in facts.available and package not in declared:
                 declared.add(package)
                 tag = "depend" if package in used else "exec_depend"
                 line = f"<{tag}>{package}</{tag}>"

@@ -22,16 +22,16 @@ from idlc.editor.state import ServerState
 from idlc.editor.workspace import Snapshot
 
 _FIX, _FIX_ALL, _UPDATE = "quickfix", "source.fixAll.idlc", UPDATE_KIND
-#: Hints that name what should stand there instead.
+#: Hints that name the text to write instead.
 _MEANT = re.compile(r"(?:did you mean|write|use) `")
-#: Hints that name what a file should be called.
+#: Hints that name the file to rename to.
 _OTHER_FILE = re.compile(r"call it `((\w+)\.\w+)`")
 #: Of the names in a hint, so many are tried.
 MOST = 3
 
 
-class Action(Part, frozen=True):
-    """Something that can be done."""
+class CodeAction(Part, frozen=True):
+    """A code action."""
 
     title: str
     kind: str
@@ -41,10 +41,10 @@ class Action(Part, frozen=True):
     command: dict[str, object] | None = None
 
 
-class Guilty(NamedTuple):
-    """A problem of a document."""
+class ProblemInContext(NamedTuple):
+    """A problem of a document, with the snapshot and the state that its edits need."""
 
-    problem: Diagnostic
+    diagnostic: Diagnostic
     snapshot: Snapshot
     path: Path
     state: ServerState
@@ -52,74 +52,80 @@ class Guilty(NamedTuple):
     @property
     def shown(self) -> Shown:
         """The problem as the client has it."""
-        return shown(self.problem, self.snapshot, self.state)
+        return shown(self.diagnostic, self.snapshot, self.state)
 
-    def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> Action:
+    def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> CodeAction:
         """Return an action on this problem."""
         change = workspace_edit(edits, self.snapshot, self.state)
-        return Action(title, _FIX, change, (self.shown,), best)
+        return CodeAction(title, _FIX, change, (self.shown,), best)
 
 
-def actions(state: ServerState, asked: AskedActions) -> list[Action]:
-    """Return what can be done about the problems in a range, and about all of a document."""
+def actions(state: ServerState, params: AskedActions) -> list[CodeAction]:
+    """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
-    path = state.path(asked.text_document.uri)
-    all_ = [Guilty(one, snapshot, at, state) for at, one, snapshot in problems(state) if at == path]
-    found: list[Action] = []
-    if _wanted(_FIX, asked.context.only):
-        for one in all_:
-            if _touch(one.shown.range, asked.range):
-                found += _about(one)
-    if _wanted(_FIX_ALL, asked.context.only) and path is not None:
-        found += _everything(all_, asked.text_document.uri, state)
-    if _wanted(_UPDATE, asked.context.only):
-        command = commands.command(state, asked.text_document.uri)
-        found += [Action(str(command["title"]), _UPDATE, command=command)] if command else []
-    return found
+    path = state.path(params.text_document.uri)
+    all_ = [
+        ProblemInContext(diagnostic, snapshot, at, state)
+        for at, diagnostic, snapshot in problems(state)
+        if at == path
+    ]
+    offered: list[CodeAction] = []
+    if _is_requested(_FIX, params.context.only):
+        for problem in all_:
+            if _touch(problem.shown.range, params.range):
+                offered += _about(problem)
+    if _is_requested(_FIX_ALL, params.context.only) and path is not None:
+        offered += _everything(all_, params.text_document.uri, state)
+    if _is_requested(_UPDATE, params.context.only):
+        command = commands.command(state, params.text_document.uri)
+        offered += [CodeAction(str(command["title"]), _UPDATE, command=command)] if command else []
+    return offered
 
 
-def _wanted(kind: str, only: tuple[str, ...] | None) -> bool:
-    return only is None or any(f"{kind}.".startswith(f"{one}.") for one in only)
+def _is_requested(kind: str, only: tuple[str, ...] | None) -> bool:
+    return only is None or any(f"{kind}.".startswith(f"{other}.") for other in only)
 
 
-def _touch(one: Range, other: Range) -> bool:
-    places = ((end.line, end.character) for end in (one.start, one.end, other.start, other.end))
+def _touch(range_: Range, other: Range) -> bool:
+    places = (
+        (end.line, end.character) for end in (range_.start, range_.end, other.start, other.end)
+    )
     start, end, first, last = places
     return start <= last and first <= end
 
 
-def _about(one: Guilty) -> Iterator[Action]:
-    problem = one.problem
-    if problem.edits:
-        hint = problem.hint or f"fix {problem.code}"
-        yield one.action(hint[:1].upper() + hint[1:], problem.edits, best=True)
-    elif problem.span is not None:
-        best = bool(_MEANT.match(problem.hint or ""))
-        for title, edit in _offers(problem.hint or "", problem.span):
-            if _helps(one, edit):
-                yield one.action(title, [edit], best=best)
-    if can_move_files(one.state) and (moved := _moved(one)):
+def _about(problem: ProblemInContext) -> Iterator[CodeAction]:
+    diagnostic = problem.diagnostic
+    if diagnostic.edits:
+        hint = diagnostic.hint or f"fix {diagnostic.code}"
+        yield problem.action(hint[:1].upper() + hint[1:], diagnostic.edits, best=True)
+    elif diagnostic.span is not None:
+        best = bool(_MEANT.match(diagnostic.hint or ""))
+        for title, edit in _offers(diagnostic.hint or "", diagnostic.span):
+            if _helps(problem, edit):
+                yield problem.action(title, [edit], best=best)
+    if can_move_files(problem.state) and (moved := _moved(problem)):
         yield moved
-    remark = _remark(one) if problem.severity is Severity.WARNING else None
-    if remark is not None and _helps(one, remark):
-        yield one.action(f"Ignore {problem.code} here", [remark])
+    remark = _remark(problem) if diagnostic.severity is Severity.WARNING else None
+    if remark is not None and _helps(problem, remark):
+        yield problem.action(f"Ignore {diagnostic.code} here", [remark])
 
 
-def _moved(one: Guilty) -> Action | None:
+def _moved(problem: ProblemInContext) -> CodeAction | None:
     """Return the action that gives a file the name that a hint says, if nothing has it."""
-    hint = _OTHER_FILE.match(one.problem.hint or "")
-    if hint is None or os.path.lexists(one.path.with_name(hint[1])):
+    hint = _OTHER_FILE.match(problem.diagnostic.hint or "")
+    if hint is None or os.path.lexists(problem.path.with_name(hint[1])):
         return None
     title = f"Rename the file to `{hint[1]}`"
-    arguments = [one.state.uri(one.path), hint[2]]
+    arguments = [problem.state.uri(problem.path), hint[2]]
     command: dict[str, object] = {"title": title, "command": RENAME_FILE, "arguments": arguments}
-    return Action(title, _FIX, diagnostics=(one.shown,), command=command)
+    return CodeAction(title, _FIX, diagnostics=(problem.shown,), command=command)
 
 
 def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
-    """Yield edits that a hint may mean, with their titles; some do not help.
+    """Yield edits that a hint may suggest, with their titles; some do not help.
 
-    A text in backticks stands for the span; if it has several words, for the line's definition.
+    A text in backticks replaces the span; if it has several words, the line's definition.
     """
     source = span.source
     number, _ = source.position(span.start)
@@ -144,44 +150,44 @@ def _offers(hint: str, span: Span) -> Iterator[tuple[str, Edit]]:
 
 
 def _instead(span: Span, word: str) -> Edit:
-    """Return the edit that puts a word in the place of a span, or of the name in a type."""
+    """Return the edit that replaces a span, or the name in a type, with a word."""
     package, slash, _ = span.text.rpartition("/")
     if slash and "/" not in word:
         span = span.at(len(package) + 1, len(span.text))
     return Edit(span, word)
 
 
-def _helps(one: Guilty, edit: Edit) -> bool:
-    """Return whether there is less wrong after an edit, as a check of the new text says."""
-    workspace = one.state.workspace_of(one.path)
+def _helps(problem: ProblemInContext, edit: Edit) -> bool:
+    """Return whether a check of the text after an edit finds fewer problems."""
+    workspace = problem.state.workspace_of(problem.path)
     text, _ = apply(edit.span.source.text, [edit])
-    after = workspace.snapshot_with(one.path, text) if workspace else None
+    after = workspace.snapshot_with(problem.path, text) if workspace else None
     if after is None:
         return False
-    before = _count(one.snapshot.problems)
+    before = _count(problem.snapshot.problems)
     return _count(after.problems) < before
 
 
-def _count(found: Iterable[Diagnostic]) -> tuple[int, int]:
-    """Return how many errors there are, and how many problems."""
-    severities = [one.severity for one in found]
+def _count(diagnostics: Iterable[Diagnostic]) -> tuple[int, int]:
+    """Return the numbers of errors and of all problems."""
+    severities = [diagnostic.severity for diagnostic in diagnostics]
     return severities.count(Severity.ERROR), len(severities)
 
 
-def _remark(one: Guilty) -> Edit | None:
+def _remark(problem: ProblemInContext) -> Edit | None:
     """Return the edit that adds a remark to the line of a problem, or to the head of its file."""
-    if one.path not in one.snapshot.interfaces:
+    if problem.path not in problem.snapshot.interfaces:
         return None
-    source = one.snapshot.interfaces[one.path][1]
-    code, span = one.problem.code, one.problem.span
+    source = problem.snapshot.interfaces[problem.path][1]
+    code, span = problem.diagnostic.code, problem.diagnostic.span
     if span is None or not span.text:
         return Edit(Span(source, 0, 0), f"# idlc: ignore[{code}] TODO: say why\n")
     number, _ = source.position(span.start)
     start, line = source.line_starts[number - 1], source.line_text(number)
     comment = line.find("#")
-    known = re.search(REMARK, line[comment:]) if comment >= 0 else None
-    if known is not None:
-        at = start + comment + known.end(1)
+    existing = re.search(REMARK, line[comment:]) if comment >= 0 else None
+    if existing is not None:
+        at = start + comment + existing.end(1)
         return Edit(Span(source, at, at), f", {code}")
     end = start + len(line.rstrip())
     sign = "  # " if comment < 0 else " "
@@ -189,14 +195,14 @@ def _remark(one: Guilty) -> Edit | None:
     return Edit(Span(source, end, start + len(line)), f"{sign}idlc: ignore({code}) TODO: say why")
 
 
-def _everything(all_: list[Guilty], uri: str, state: ServerState) -> Iterator[Action]:
-    """Yield the action that makes every fix of a document, as `idlc check --fix` does."""
-    fixed = [one for one in all_ if one.problem.edits]
+def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> Iterator[CodeAction]:
+    """Yield the action that applies every fix of a document, as `idlc check --fix` does."""
+    fixed = [problem for problem in all_ if problem.diagnostic.edits]
     edits = [
         edit
-        for one in fixed
-        for edit in one.problem.edits
-        if one.snapshot.path_of(edit.span.source) == one.path
+        for problem in fixed
+        for edit in problem.diagnostic.edits
+        if problem.snapshot.path_of(edit.span.source) == problem.path
     ]
     if not edits:
         return
@@ -204,4 +210,4 @@ def _everything(all_: list[Guilty], uri: str, state: ServerState) -> Iterator[Ac
     new = tidied(old.path, old.text, apply(old.text, edits)[0])
     change = of_documents({uri: differences(old.text, new, state.encoding)}, state)
     title = "Fix all that can be fixed without harm"
-    yield Action(title, _FIX_ALL, change, tuple(one.shown for one in fixed))
+    yield CodeAction(title, _FIX_ALL, change, tuple(problem.shown for problem in fixed))

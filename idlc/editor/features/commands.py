@@ -27,10 +27,10 @@ _ERROR, _INFO = 1, 3
 
 def command(state: ServerState, uri: str) -> dict[str, object] | None:
     """Return the command for a document whose generated package is out of date."""
-    found = _generated(state, uri)
-    if found is None or not found[0].is_needed(*found[1]):
+    generation = _generated(state, uri)
+    if generation is None or not generation[0].is_needed(*generation[1]):
         return None
-    title = f"Update the generated package in {found[0].options.out}"
+    title = f"Update the generated package in {generation[0].options.out}"
     return {"title": title, "command": UPDATE_GENERATED, "arguments": [uri]}
 
 
@@ -50,12 +50,12 @@ def _generated(
 
 
 def update(state: ServerState, uri: str) -> None:
-    """Do what `idlc gen` does, and say what that was; raises RequestError."""
-    found = _generated(state, uri)
-    if found is None:
+    """Generate as `idlc gen` does, and report the outcome; raises RequestError."""
+    generation = _generated(state, uri)
+    if generation is None:
         raise RequestError(REQUEST_FAILED, "[tool.idlc] does not say where to generate it")
-    run, (package, _, _) = found
-    unsaved = sorted(f"`{one.name}`" for one in _unsaved(state, package))
+    run, (package, _, _) = generation
+    unsaved = sorted(f"`{path.name}`" for path in _unsaved(state, package))
     if unsaved:
         names = first_few(unsaved, NAMED)
         raise RequestError(REQUEST_FAILED, f"save first, what is on disk is compiled: {names}")
@@ -72,31 +72,42 @@ def update(state: ServerState, uri: str) -> None:
 
 def _unsaved(state: ServerState, package: str) -> Iterator[Path]:
     """Yield the files of a package that hold another text than their documents."""
-    for one in state.documents:
-        known = state.known(one.uri)
-        if known and one.path and known.interface.name.package == package and not one.is_on_disk():
-            yield one.path
+    for document in state.documents:
+        context = state.context(document.uri)
+        if (
+            context
+            and document.path
+            and context.interface.name.package == package
+            and not document.is_on_disk()
+        ):
+            yield document.path
 
 
 def _failure(report: Report) -> str:
-    errors = [one for one in report if one.severity is Severity.ERROR]
-    found = first_few((f"{one.where[0]}: {one.code}: {one.message}" for one in errors), NAMED)
-    return f"idlc gen: nothing was written: {found}"
+    errors = [diagnostic for diagnostic in report if diagnostic.severity is Severity.ERROR]
+    listed = first_few(
+        (
+            f"{diagnostic.where[0]}: {diagnostic.code}: {diagnostic.message}"
+            for diagnostic in errors
+        ),
+        NAMED,
+    )
+    return f"idlc gen: nothing was written: {listed}"
 
 
 def _success(done: Iterable[Generated]) -> str:
     return "idlc gen: " + first_few(map(_done, done), NAMED)
 
 
-def _done(one: Generated) -> str:
-    done = [f"{one.written} written"] if one.written else []
-    done += [f"{one.removed} removed"] if one.removed else []
-    return f"{one.package}: {', '.join(done) or 'unchanged'} in {one.out}"
+def _done(generated: Generated) -> str:
+    done = [f"{generated.written} written"] if generated.written else []
+    done += [f"{generated.removed} removed"] if generated.removed else []
+    return f"{generated.package}: {', '.join(done) or 'unchanged'} in {generated.out}"
 
 
-def execute(state: ServerState, asked: Command) -> None:
-    """Carry a command out."""
-    match asked.command, *asked.arguments:
+def execute(state: ServerState, params: Command) -> None:
+    """Run a command."""
+    match params.command, *params.arguments:
         case capabilities.ADD_DEPENDENCY, str(uri), str(package):
             _declare(state, uri, package)
         case capabilities.RENAME_FILE, str(uri), str(new):
@@ -104,24 +115,24 @@ def execute(state: ServerState, asked: Command) -> None:
         case capabilities.UPDATE_GENERATED, str(uri):
             update(state, uri)
         case _:
-            raise RequestError(INVALID_PARAMS, f"there is no command `{asked.command}` for these")
+            raise RequestError(INVALID_PARAMS, f"there is no command `{params.command}` for these")
 
 
 def _rename(state: ServerState, uri: str, new: str) -> None:
     state.forget()
-    known = state.known(uri)
-    edit = rename.rename_interface(known, uri, new, known, state) if known else None
+    context = state.context(uri)
+    edit = rename.rename_interface(context, uri, new, context, state) if context else None
     if edit is not None:
         state.ask("workspace/applyEdit", {"label": f"rename to {new}", "edit": edit})
 
 
 def _declare(state: ServerState, uri: str, package: str) -> None:
     state.notice_changes()  # or the edit may be of an older package.xml
-    known = state.known(uri)
+    context = state.context(uri)
     path = state.path(uri)
     workspace = state.workspace_of(path) if path else None
     edit = workspace.dependency(path, package) if workspace and path else None
-    if known is not None and edit is not None:
-        change = workspace_edit([edit], known.snapshot, state)
+    if context is not None and edit is not None:
+        change = workspace_edit([edit], context.snapshot, state)
         label = f"declare {package}"
         state.ask("workspace/applyEdit", {"label": label, "edit": change})

@@ -1,6 +1,6 @@
 """Completions of a line: types, names, values, units and codes.
 
-Only the line and the lists of what there is are looked at, so that it comes while one types.
+Only the line and lists of names are read, so that completions arrive while the user types.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MOST_ELEMENTS = 36
 
 
 def suggested_field_name(type_: str) -> str:
-    """Return what a field that holds a message is called first."""
+    """Return the name that is suggested first for a field that holds a message."""
     return names.snake_case(type_.rpartition("/")[2].partition("[")[0])
 
 
@@ -77,7 +77,7 @@ def suggested_constants(lines: list[str], line: int, type_: str) -> Iterator[tup
 
 
 def units_for(name: str) -> tuple[str, ...]:
-    """Return units, first the one that a field's name asks for."""
+    """Return units, first the one that a field's name suggests."""
     own = expects_unit(name)
     return tuple(dict.fromkeys((*([own] if own else []), *sorted(set(QUANTITIES.values())))))
 
@@ -97,7 +97,7 @@ MOST = 200
 
 
 class Item(Part, frozen=True):
-    """Something that may come next."""
+    """A completion item."""
 
     label: str
     kind: int
@@ -111,7 +111,7 @@ class Item(Part, frozen=True):
 
 
 class Items(Part, frozen=True, omit_defaults=False):
-    """All that may come next; more letters may show others."""
+    """All completions at a position; more letters may show others."""
 
     is_incomplete: bool
     items: tuple[Item, ...]
@@ -139,8 +139,10 @@ class Typed(NamedTuple):
         return self.undeclared[package]
 
     def after(self, start: int) -> str:
-        """Return what was typed after a place in the line."""
-        places = accumulate((units(one, self.encoding) for one in self.before), initial=0)
+        """Return the text that was typed after a position in the line."""
+        places = accumulate(
+            (units(character, self.encoding) for character in self.before), initial=0
+        )
         return self.before[list(places).index(start) :]
 
     def replacing(self, length: int, text: str) -> TextEdit:
@@ -150,27 +152,27 @@ class Typed(NamedTuple):
         return TextEdit(Range(Position(self.line, start), Position(self.line, end)), text)
 
 
-def complete(state: ServerState, asked: AtPosition) -> Items:
-    """Return what may come next at a position."""
-    document = state.documents.get(asked.text_document.uri)
+def complete(state: ServerState, params: AtPosition) -> Items:
+    """Return the completions at a position."""
+    document = state.documents.get(params.text_document.uri)
     path = document.path if document else None
     workspace = state.workspace_of(path) if path else None
     if document is None or path is None or workspace is None:
         return Items(False, ())
     lines = lines_of(document.text)
-    line, at = in_lines(lines, asked.position, state.encoding)
+    line, at = in_lines(lines, params.position, state.encoding)
     typed = Typed(document, path, workspace, line, lines[line][:at], state.encoding, {})
     items = tuple(_items(typed, state))
-    starts = {one.text_edit.range.start.character for one in items}
+    starts = {item.text_edit.range.start.character for item in items}
     words = {start: typed.after(start).lower() for start in starts}
-    return Items(len(items) >= MOST, tuple(one for one in items if _fits(one, words)))
+    return Items(len(items) >= MOST, tuple(item for item in items if _fits(item, words)))
 
 
 def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
-    """Return an item with the text of its type as documentation, if it stands for a type."""
+    """Return an item with the text of its type as documentation, if it completes a type."""
     match item.get("data"):
-        case [str(uri), str(package), str(name)] if known := state.known(uri):
-            source = known.snapshot.source(ir.TypeName(package, "msg", name))
+        case [str(uri), str(package), str(name)] if context := state.context(uri):
+            source = context.snapshot.source(ir.TypeName(package, "msg", name))
             lines = source.text.splitlines() if source else []
             return {**item, "documentation": Markup(code(shortened(lines)))} if lines else item
         case _:
@@ -178,9 +180,12 @@ def resolve(state: ServerState, item: dict[str, object]) -> dict[str, object]:
 
 
 def _fits(item: Item, words: Mapping[int, str]) -> bool:
-    """Return whether what an item replaces has its letters in that order; not all editors look."""
+    """Return whether an item has the letters of the text that it replaces, in their order.
+
+    Not all editors filter items themselves.
+    """
     letters = iter((item.filter_text or item.label).lower())
-    return all(one in letters for one in words[item.text_edit.range.start.character])
+    return all(letter in letters for letter in words[item.text_edit.range.start.character])
 
 
 def _items(typed: Typed, state: ServerState) -> Iterator[Item]:
@@ -201,7 +206,7 @@ def _items(typed: Typed, state: ServerState) -> Iterator[Item]:
 
 
 def _types(typed: Typed, word: str, state: ServerState) -> Iterator[Item]:
-    """Yield what may begin a line, or go on with its first word."""
+    """Yield completions of the first word of a line."""
     if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
         for size in BOUNDS:
             yield Item(size, _VALUE, typed.replacing(len(bound[1]), size))
@@ -211,20 +216,20 @@ def _types(typed: Typed, word: str, state: ServerState) -> Iterator[Item]:
     package, slash, _ = word.partition("/")
     workspace = typed.workspace
     if slash:
-        for one in workspace.names(package):
-            yield _type(typed, word, f"{package}/{one}", package, "0", state)
+        for message in workspace.names(package):
+            yield _type(typed, word, f"{package}/{message}", package, "0", state)
         return
     name = workspace.name_of(typed.path)
     own = name.package
-    for one in (*ir.PRIMITIVES, *STRINGS):
-        size = counted(ir.PRIMITIVES[one].size, "byte") if one in ir.PRIMITIVES else "text"
-        yield Item(one, _KEYWORD, typed.replacing(len(word), one), size, f"1{one}")
-    for one in workspace.names(own):
-        if name != (own, "msg", one):
-            yield _type(typed, word, one, own, "0", state)
-    for one in workspace.packages():
-        edit = typed.replacing(len(word), f"{one}/")
-        yield Item(f"{one}/", _MODULE, edit, sort_text=f"3{one}", command=_AGAIN)
+    for type_ in (*ir.PRIMITIVES, *STRINGS):
+        size = counted(ir.PRIMITIVES[type_].size, "byte") if type_ in ir.PRIMITIVES else "text"
+        yield Item(type_, _KEYWORD, typed.replacing(len(word), type_), size, f"1{type_}")
+    for message in workspace.names(own):
+        if name != (own, "msg", message):
+            yield _type(typed, word, message, own, "0", state)
+    for other in workspace.packages():
+        edit = typed.replacing(len(word), f"{other}/")
+        yield Item(f"{other}/", _MODULE, edit, sort_text=f"3{other}", command=_AGAIN)
     if word:
         yield from _elsewhere(typed, word, own, state)
     if not typed.before and name.kind != "msg":
@@ -267,7 +272,7 @@ def _type(
 
 
 def _names(typed: Typed, type_: str, word: str) -> Iterator[Item]:
-    """Yield what a field of a type is often called."""
+    """Yield usual names for a field of a type."""
     if "/" in type_ or type_[:1].isupper():
         name = suggested_field_name(type_)
         yield Item(name, _FIELD, typed.replacing(len(word), name))

@@ -1,4 +1,4 @@
-"""Problems, for clients that ask: of a document, or of all that have any."""
+"""Problems for clients that request them: of a document, or of all that have any."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from idlc.editor.publish import Shown, diagnostics
 from idlc.editor.state import ServerState
 
 
-def document(state: ServerState, asked: OfDocument) -> dict[str, object]:
+def document(state: ServerState, params: OfDocument) -> dict[str, object]:
     """Return the problems of a document.
 
-    All of them each time: Neovim forgets them with a document that it reads again, but not that
-    they were told.
+    All of them each time: Neovim forgets them with a document that it reads again, but not their
+    result id.
     """
-    return _report(diagnostics(state).get(asked.text_document.uri, []), None)
+    return _report(diagnostics(state).get(params.text_document.uri, []), None)
 
 
-def workspace(state: ServerState, asked: AskedWorkspace) -> dict[str, object]:
-    """Return the problems of every document that has any, or had some when it was told."""
-    found = diagnostics(state)
-    before = {one.uri: one.value for one in asked.previous_result_ids}
+def workspace(state: ServerState, params: AskedWorkspace) -> dict[str, object]:
+    """Return the problems of every document that has any, or had some in the last answer."""
+    by_uri = diagnostics(state)
+    before = {previous.uri: previous.value for previous in params.previous_result_ids}
     items = []
-    for uri in sorted({*found, *before}):
+    for uri in sorted({*by_uri, *before}):
         opened = state.documents.get(uri)
-        report = _report(found.get(uri, []), before.get(uri))
+        report = _report(by_uri.get(uri, []), before.get(uri))
         items.append({"uri": uri, "version": opened.version if opened else None, **report})
     return {"items": items}
 
 
-def _report(found: list[Shown], before: str | None) -> dict[str, object]:
-    now = f"{crc32(msgspec.json.encode(found)):08x}-{len(found)}"
+def _report(problems: list[Shown], before: str | None) -> dict[str, object]:
+    now = f"{crc32(msgspec.json.encode(problems)):08x}-{len(problems)}"
     if now == before:
         return {"kind": "unchanged", "resultId": now}
-    return {"kind": "full", "resultId": now, "items": found}
+    return {"kind": "full", "resultId": now, "items": problems}

@@ -1,4 +1,4 @@
-"""Layout, as `idlc fmt` has it: of a document, of a range, and as one types."""
+"""Formatting as `idlc fmt` does it: of a document, of a range, and while the user types."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ from idlc.editor.protocol.parts import AtPosition, OfDocument, OfRange, TextEdit
 from idlc.editor.state import ServerState
 
 
-def document(state: ServerState, asked: OfDocument) -> list[TextEdit]:
-    """Return the edits that lay a document out; none where it has syntax errors."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
+def document(state: ServerState, params: OfDocument) -> list[TextEdit]:
+    """Return the edits that format a document; none where it has syntax errors."""
+    context = state.context(params.text_document.uri)
+    if context is None:
         return []
-    new = laid_out(known.source, known.interface.name, Report())
-    return [] if new is None else differences(known.source.text, new, state.encoding)
+    new = laid_out(context.source, context.interface.name, Report())
+    return [] if new is None else differences(context.source.text, new, state.encoding)
 
 
-def part(state: ServerState, asked: OfRange) -> list[TextEdit]:
+def part(state: ServerState, params: OfRange) -> list[TextEdit]:
     """Return those edits that touch the lines of a range."""
-    first, last = asked.range.start.line, asked.range.end.line
-    if asked.range.end.character == 0 and last > first:
+    first, last = params.range.start.line, params.range.end.line
+    if params.range.end.character == 0 and last > first:
         last -= 1
     return [
         edit
-        for edit in document(state, OfDocument(asked.text_document))
+        for edit in document(state, OfDocument(params.text_document))
         if edit.range.start.line <= last and max(edit.range.end.line - 1, first) >= first
     ]
 
 
-def typed(state: ServerState, asked: AtPosition) -> list[TextEdit]:
+def typed(state: ServerState, params: AtPosition) -> list[TextEdit]:
     """Return those edits that touch the line before the one that was begun."""
-    before = asked.position.line - 1
+    before = params.position.line - 1
     return [
         edit
-        for edit in document(state, OfDocument(asked.text_document))
+        for edit in document(state, OfDocument(params.text_document))
         if edit.range.start.line == before == edit.range.end.line - 1
     ]

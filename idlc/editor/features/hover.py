@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from idlc.documents.show import outline
 from idlc.editor.documents import is_built_in
-from idlc.editor.elements import Element, section_names, spot
+from idlc.editor.elements import Element, section_names, spot_at
 from idlc.editor.protocol.parts import AtPosition, Markup, Part, Range
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Snapshot
@@ -27,55 +27,55 @@ class Hover(Part, frozen=True):
     range: Range | None = None
 
 
-def hover(state: ServerState, asked: AtPosition) -> Hover | None:
-    """Return what is known of what stands at a position; of the file itself between definitions."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
+def hover(state: ServerState, params: AtPosition) -> Hover | None:
+    """Return the description of the element at a position; between definitions, of the file."""
+    context = state.context(params.text_document.uri)
+    if context is None:
         return None
-    found = spot(state, known, asked.position)
-    snapshot = known.snapshot
-    if found is None or found.part == "comment":
-        return Hover(Markup("\n\n".join(_interface(known.interface, snapshot))))
-    element = found.element
-    if found.part == "type" and element.target is not None:
-        there = next(
+    spot = spot_at(state, context, params.position)
+    snapshot = context.snapshot
+    if spot is None or spot.part == "comment":
+        return Hover(Markup("\n\n".join(_interface(context.interface, snapshot))))
+    element = spot.element
+    if spot.part == "type" and element.target is not None:
+        interface = next(
             (
-                one.interfaces[element.target]
-                for one in snapshot.models.values()
-                if element.target in one.interfaces
+                model.interfaces[element.target]
+                for model in snapshot.models.values()
+                if element.target in model.interfaces
             ),
             None,
         )
-        if there is None:
+        if interface is None:
             return None
-        return Hover(Markup("\n\n".join(_interface(there, snapshot))), state.range(found.span))
+        return Hover(Markup("\n\n".join(_interface(interface, snapshot))), state.range(spot.span))
     if element.meaning is None:
         return None
-    text = "\n\n".join(filter(None, _definition(element, known.interface, snapshot)))
-    return Hover(Markup(text), state.range(found.span))
+    text = "\n\n".join(filter(None, _definition(element, context.interface, snapshot)))
+    return Hover(Markup(text), state.range(spot.span))
 
 
 def _definition(element: Element, interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
-    one = element.meaning
-    assert one is not None
-    if isinstance(one, ir.Constant):
-        yield code([f"{spell(one.type)} {one.name}={spell_value(one.value)}"])
+    meaning = element.meaning
+    assert meaning is not None
+    if isinstance(meaning, ir.Constant):
+        yield code([f"{spell(meaning.type)} {meaning.name}={spell_value(meaning.value)}"])
     else:
-        default = f" {spell_value(one.default.value)}" if one.default else ""
-        yield code([f"{spell(one.type)} {one.name}{default}"])
-    yield prose(one.comment)
-    says_range = one.unit is not None and is_range(one.unit)
-    facts = [f"{'range' if says_range else 'unit'}: `{one.unit}`"] if one.unit else []
-    facts += _limits(one.type, has_range=says_range)
-    if isinstance(one, ir.Field):
-        facts += [f"default: `{spell_value(one.default.value)}`"] if one.default else []
+        default = f" {spell_value(meaning.default.value)}" if meaning.default else ""
+        yield code([f"{spell(meaning.type)} {meaning.name}{default}"])
+    yield prose(meaning.comment)
+    says_range = meaning.unit is not None and is_range(meaning.unit)
+    facts = [f"{'range' if says_range else 'unit'}: `{meaning.unit}`"] if meaning.unit else []
+    facts += _limits(meaning.type, has_range=says_range)
+    if isinstance(meaning, ir.Field):
+        facts += [f"default: `{spell_value(meaning.default.value)}`"] if meaning.default else []
         placed = placed_fields(element.message, interface, snapshot)
-        facts += [_bytes(each) for each in placed[0] if each.field is one] if placed else []
+        facts += [_bytes(each) for each in placed[0] if each.field is meaning] if placed else []
     yield "  \n".join(facts)
 
 
 def _limits(type_: ir.FieldType, *, has_range: bool) -> list[str]:
-    """Return which values a type has, where that is not all of a float or text."""
+    """Return the limits of a type's values, where it is not any float or text."""
     facts = []
     element = ir.element_of(type_)
     if isinstance(element, ir.Primitive) and element.info.low is not None and not has_range:
@@ -94,13 +94,13 @@ def _bytes(placed: Placed) -> str:
 def placed_fields(
     message: ir.Message, interface: ir.Interface, snapshot: Snapshot
 ) -> tuple[list[Placed], Extent] | None:
-    """Return where the fields of a section stand in its bytes, `None` if there are errors."""
+    """Return the offsets of the fields of a section in its bytes, `None` if there are errors."""
     model = snapshot.model_of(interface)
     return layout(message, model.messages) if model else None
 
 
 def _interface(interface: ir.Interface, snapshot: Snapshot) -> Iterator[str]:
-    """Yield what an interface is."""
+    """Yield the paragraphs that describe an interface."""
     yield f"**{interface.name}**"
     model = snapshot.model_of(interface)
     if model is None:
@@ -131,7 +131,7 @@ def shortened(lines: list[str]) -> list[str]:
 
 
 def code(lines: list[str]) -> str:
-    """Return lines as code; what they hold cannot end it."""
+    """Return lines as a code block, with a fence that they cannot end."""
     text = "\n".join(lines)
     fence = "`" * max(3, 1 + max((len(run) for run in _runs(text)), default=0))
     return f"{fence}rosmsg\n{text}\n{fence}"
@@ -142,11 +142,11 @@ def _runs(text: str) -> Iterator[str]:
     return iter(re.findall("`+", text))
 
 
-#: What begins a heading, list, quotation, table, rule, or fenced code at the start of a line.
+#: The start of a heading, list, quotation, table, rule or fenced code, at the start of a line.
 _BLOCK = r"^\s*(?:[#>+=~|:*_-]|\d+(?=[.)]))"
 #: Text in backticks, which is code in Markdown as in comments.
 _CODE = r"(?<!`)`[^`]+`(?!`)"
-#: What Markdown may take for something else than text: the beginning of a span suffices.
+#: Characters that Markdown may not take for text: the beginning of a span suffices.
 _MARKS = (
     r"\\(?=[!-/:-@\[-`{-~])|\\$|`|<(?=[\w/!?])|&(?=[\w#])|\](?=[(\[:])"
     r"|(?<![^\W_])_+(?=\S)|[*~]+(?=\S)"
@@ -154,9 +154,9 @@ _MARKS = (
 
 
 def prose(lines: tuple[str, ...]) -> str:
-    """Return a comment as it was written, as Markdown that shows it so.
+    """Return a comment as Markdown that shows it as it was written.
 
-    Only what Markdown would take for something else is escaped, as some editors show each escape.
+    Only characters with a meaning in Markdown are escaped, as some editors show each escape.
     """
     escape = re.compile(rf"{_CODE}|{_BLOCK}|{_MARKS}")
     return "  \n".join(escape.sub(_escaped, line) for line in lines)
@@ -168,4 +168,6 @@ def _escaped(match: re.Match[str]) -> str:
         return text
     blanks = text[: len(text) - len(text.lstrip())]
     mark = text.lstrip()
-    return blanks + (f"{mark}\\" if mark.isdigit() else "".join(f"\\{one}" for one in mark))
+    return blanks + (
+        f"{mark}\\" if mark.isdigit() else "".join(f"\\{character}" for character in mark)
+    )

@@ -1,4 +1,4 @@
-"""Where something is defined, and where it is used."""
+"""Definitions, references, highlights, and the texts of built-in interfaces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
-from idlc.editor.elements import Element, elements, snapshots, spot, text_of, users, uses
+from idlc.editor.elements import Element, elements, snapshots, spot_at, text_of, users, uses
 from idlc.editor.protocol.framing import INVALID_PARAMS, RequestError
 from idlc.editor.protocol.parts import (
     AskedContent,
@@ -20,7 +20,7 @@ from idlc.editor.protocol.parts import (
     Position,
     Range,
 )
-from idlc.editor.state import Known, ServerState
+from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.model import catalog, ir
 from idlc.model.distros import BY_NAME
@@ -32,18 +32,18 @@ from idlc.project.root import MANIFEST, Root
 _TOP = Range(Position(0, 0), Position(0, 0))
 
 
-def named_package(state: ServerState, asked: AtPosition) -> str | None:
+def named_package(state: ServerState, params: AtPosition) -> str | None:
     """Return the package that is named at a position of a package.xml."""
-    path = state.path(asked.text_document.uri)
+    path = state.path(params.text_document.uri)
     source = _source(path, state) if path and path.name == MANIFEST else None
     if source is None:
         return None
-    offset = state.offset(source, asked.position)
+    offset = state.offset(source, params.position)
     return next((name for name, at in _packages(source) if at.start <= offset <= at.end), None)
 
 
 def manifest_definition(package: str, state: ServerState) -> Location | None:
-    """Return the package.xml of a package, or what is built in of it."""
+    """Return the package.xml of a package, or one of its built-in interfaces."""
     for snapshot in snapshots(state):
         if path := _file(package, snapshot):
             return Location(state.uri(path), _TOP)
@@ -54,9 +54,11 @@ def manifest_definition(package: str, state: ServerState) -> Location | None:
     return None
 
 
-def manifest_references(package: str, asked: AskedReferences, state: ServerState) -> list[Location]:
-    """Return where a package's messages are used, and where other packages declare it."""
-    found = [
+def manifest_references(
+    package: str, params: AskedReferences, state: ServerState
+) -> list[Location]:
+    """Return the uses of a package's messages, and the declarations in other packages."""
+    locations = [
         state.location(at, snapshot)
         for snapshot, at, used in uses(state)
         if used.package == package
@@ -65,9 +67,9 @@ def manifest_references(package: str, asked: AskedReferences, state: ServerState
         source = _source(path, state)
         for name, at in _packages(source) if source else ():
             is_own = source is not None and source.text[: at.start].rstrip().endswith("<name>")
-            if name == package and (asked.context.include_declaration or not is_own):
-                found.append(Location(state.uri(path), state.range(at)))
-    return found
+            if name == package and (params.context.include_declaration or not is_own):
+                locations.append(Location(state.uri(path), state.range(at)))
+    return locations
 
 
 def _source(path: Path, state: ServerState) -> Source | None:
@@ -77,11 +79,11 @@ def _source(path: Path, state: ServerState) -> Source | None:
 
 def _packages(source: Source) -> Iterator[tuple[str, Span]]:
     """Yield the packages that a package.xml names, and where."""
-    for one in statements(source):
-        if one.text and (one.tag == "name" or one.tag.endswith("depend")):
-            start = source.text.find(one.text, one.span.end - 1)
+    for statement in statements(source):
+        if statement.text and (statement.tag == "name" or statement.tag.endswith("depend")):
+            start = source.text.find(statement.text, statement.span.end - 1)
             if start >= 0:
-                yield one.text, Span(source, start, start + len(one.text))
+                yield statement.text, Span(source, start, start + len(statement.text))
 
 
 def _manifests(state: ServerState) -> Iterator[Path]:
@@ -97,61 +99,61 @@ def _file(package: str, snapshot: Snapshot) -> Path | None:
     home = snapshot.library.home(package)
     declared = snapshot.root.manifest(home) if home else None
     installed = (prefix / "share" / package / MANIFEST for prefix in ament_prefixes())
-    found = (declared and snapshot.folder / declared, *installed)
-    return next((one for one in found if one and is_file(one)), None)
+    paths = (declared and snapshot.folder / declared, *installed)
+    return next((path for path in paths if path and is_file(path)), None)
 
 
 _READ, _WRITE = 2, 3
 
 
 class Highlight(Part, frozen=True):
-    """A range that is about the same thing as the cursor's; `kind` 3 is where it is defined."""
+    """A range with the same subject as the cursor's; `kind` 3 marks the definition."""
 
     range: Range
     kind: int
 
 
-class Thing(NamedTuple):
+class Subject(NamedTuple):
     """The subject of a position: a definition, or the interface of that name."""
 
-    known: Known
+    context: InterfaceContext
     name: ir.TypeName
     element: Element | None
 
 
-def thing(state: ServerState, asked: AtPosition) -> Thing | None:
-    """Return what a position is about; between definitions, that is the file's interface."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
+def subject_at(state: ServerState, params: AtPosition) -> Subject | None:
+    """Return the subject of a position; between definitions, the file's interface."""
+    context = state.context(params.text_document.uri)
+    if context is None:
         return None
-    found = spot(state, known, asked.position)
-    if found is None or found.part == "comment":
-        return Thing(known, known.interface.name, None)
-    if found.part == "type":
-        target = found.element.target
-        return Thing(known, target, None) if target else None
-    return Thing(known, known.interface.name, found.element)
+    spot = spot_at(state, context, params.position)
+    if spot is None or spot.part == "comment":
+        return Subject(context, context.interface.name, None)
+    if spot.part == "type":
+        target = spot.element.target
+        return Subject(context, target, None) if target else None
+    return Subject(context, context.interface.name, spot.element)
 
 
-def definition(state: ServerState, asked: AtPosition) -> Location | None:
-    """Return where the thing at a position is defined."""
-    if package := named_package(state, asked):
+def definition(state: ServerState, params: AtPosition) -> Location | None:
+    """Return the definition of the subject at a position."""
+    if package := named_package(state, params):
         return manifest_definition(package, state)
-    found = thing(state, asked)
-    if found is None:
+    subject = subject_at(state, params)
+    if subject is None:
         return None
-    if found.element is not None:
-        return state.location(found.element.name, found.known.snapshot)
-    return top(found.name, found.known.snapshot, state)
+    if subject.element is not None:
+        return state.location(subject.element.name, subject.context.snapshot)
+    return top(subject.name, subject.context.snapshot, state)
 
 
-def type_definition(state: ServerState, asked: AtPosition) -> Location | None:
-    """Return where the type of the field at a position is defined."""
-    found = thing(state, asked)
-    if found is None:
+def type_definition(state: ServerState, params: AtPosition) -> Location | None:
+    """Return the definition of the type of the field at a position."""
+    subject = subject_at(state, params)
+    if subject is None:
         return None
-    target = found.element.target if found.element else found.name
-    return top(target, found.known.snapshot, state) if target else None
+    target = subject.element.target if subject.element else subject.name
+    return top(target, subject.context.snapshot, state) if target else None
 
 
 def top(name: ir.TypeName, snapshot: Snapshot, state: ServerState) -> Location | None:
@@ -160,32 +162,35 @@ def top(name: ir.TypeName, snapshot: Snapshot, state: ServerState) -> Location |
     return state.location(Span(source, 0, 0), snapshot) if source else None
 
 
-def references(state: ServerState, asked: AskedReferences) -> list[Location]:
-    """Return where the thing at a position is used, in all folders, and where it is defined."""
-    if package := named_package(state, asked):
-        return manifest_references(package, asked, state)
-    found = thing(state, asked)
-    if found is None:
+def references(state: ServerState, params: AskedReferences) -> list[Location]:
+    """Return the uses of the subject at a position in all folders, and its definition."""
+    if package := named_package(state, params):
+        return manifest_references(package, params, state)
+    subject = subject_at(state, params)
+    if subject is None:
         return []
-    if found.element is not None:
-        spans = list(mentions(found.element, found.known))
-        if not asked.context.include_declaration:
+    if subject.element is not None:
+        spans = list(mentions(subject.element, subject.context))
+        if not params.context.include_declaration:
             del spans[0]
-        return [state.location(span, found.known.snapshot) for span in spans]
-    first = top(found.name, found.known.snapshot, state)
-    declared = [first] if first and asked.context.include_declaration else []
-    snapshot, path = found.known.snapshot, found.known.snapshot.path_of(found.known.source)
-    used = [state.location(span, one) for one, span in users(found.name, snapshot, state)]
+        return [state.location(span, subject.context.snapshot) for span in spans]
+    first = top(subject.name, subject.context.snapshot, state)
+    declared = [first] if first and params.context.include_declaration else []
+    snapshot, path = (
+        subject.context.snapshot,
+        subject.context.snapshot.path_of(subject.context.source),
+    )
+    used = [state.location(span, holder) for holder, span in users(subject.name, snapshot, state)]
     workspace = state.workspace_of(path)
-    span = workspace.declaration(path, found.name.package) if workspace else None
+    span = workspace.declaration(path, subject.name.package) if workspace else None
     used += [state.location(span, snapshot)] if span else []
     return list(dict.fromkeys((*declared, *used)))
 
 
-def mentions(element: Element, known: Known) -> Iterator[Span]:
-    """Yield where a field or constant is defined, and where comments of its file name it.
+def mentions(element: Element, context: InterfaceContext) -> Iterator[Span]:
+    """Yield the definition of a field or constant, and its mentions in comments of the file.
 
-    A constant is named by its name. Fields are called like words, so they count in backticks only.
+    Comments mention constants by name. Field names are often words, so they need backticks.
     """
     yield element.name
     name = re.escape(element.body.name.text)
@@ -193,41 +198,41 @@ def mentions(element: Element, known: Known) -> Iterator[Span]:
         return
     is_constant = isinstance(element.meaning, ir.Constant)
     pattern = re.compile(rf"\b{name}\b" if is_constant else rf"(?<=`){name}(?=`)")
-    for span in comments(known):
+    for span in comments(context):
         for match in pattern.finditer(span.text):
             yield span.at(*match.span())
 
 
-def comments(known: Known) -> Iterator[Span]:
+def comments(context: InterfaceContext) -> Iterator[Span]:
     """Yield every comment of a file."""
     from idlc.language.parse import parse
 
-    for section in parse(known.source).sections:
+    for section in parse(context.source).sections:
         for line in section.lines:
             if line.comment:
                 start = line.start + len(line.code)
-                yield Span(known.source, start, start + len(line.comment))
+                yield Span(context.source, start, start + len(line.comment))
 
 
-def highlights(state: ServerState, asked: AtPosition) -> list[Highlight]:
-    """Return the places of the document that are about the thing at a position."""
-    found = thing(state, asked)
-    if found is None:
+def highlights(state: ServerState, params: AtPosition) -> list[Highlight]:
+    """Return the ranges of the document that have the same subject as a position."""
+    subject = subject_at(state, params)
+    if subject is None:
         return []
-    if found.element is not None:
-        first, *others = mentions(found.element, found.known)
-        places = [Highlight(state.range(span), _READ) for span in others]
+    if subject.element is not None:
+        first, *mentioned = mentions(subject.element, subject.context)
+        places = [Highlight(state.range(span), _READ) for span in mentioned]
         return [Highlight(state.range(first), _WRITE), *places]
     return [
-        Highlight(state.range(one.type), _READ)
-        for one in elements(found.known.source, found.known.interface)
-        if one.target == found.name
+        Highlight(state.range(element.type), _READ)
+        for element in elements(subject.context.source, subject.context.interface)
+        if element.target == subject.name
     ]
 
 
-def built_in_text(_state: ServerState, asked: AskedContent) -> dict[str, str]:
+def built_in_text(_state: ServerState, params: AskedContent) -> dict[str, str]:
     """Return the text of `idlc:/jazzy/std_msgs/msg/Header.msg`."""
-    scheme, _, path = asked.uri.partition(":")
+    scheme, _, path = params.uri.partition(":")
     distro, _, name = path.strip("/").partition("/")
     stem, _, _kind = name.rpartition(".")
     source = None
@@ -236,5 +241,5 @@ def built_in_text(_state: ServerState, asked: AskedContent) -> dict[str, str]:
         if kind in ir.KINDS:
             source = catalog.source(ir.TypeName(package, kind, interface), BY_NAME[distro])
     if source is None:
-        raise RequestError(INVALID_PARAMS, f"there is no document `{asked.uri}`")
+        raise RequestError(INVALID_PARAMS, f"there is no document `{params.uri}`")
     return {"text": source.text}

@@ -1,4 +1,4 @@
-"""Other names for fields, constants and interfaces, with all that uses them."""
+"""Renaming fields, constants and interfaces, with everything that uses them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,15 @@ from idlc.compare.packages import compare, renamed_interface
 from idlc.diagnostics.report import Edit, Report, apply, first_few
 from idlc.diagnostics.source import Span
 from idlc.diagnostics.terminal import counted
-from idlc.editor.elements import Element, document_edit, of_documents, snapshots, spot, users, uses
+from idlc.editor.elements import (
+    Element,
+    document_edit,
+    of_documents,
+    snapshots,
+    spot_at,
+    users,
+    uses,
+)
 from idlc.editor.features.navigation import mentions
 from idlc.editor.protocol import uris
 from idlc.editor.protocol.framing import REQUEST_FAILED, RequestError
@@ -27,7 +35,7 @@ from idlc.editor.protocol.parts import (
     Range,
     TextEdit,
 )
-from idlc.editor.state import Known, Renaming, ServerState
+from idlc.editor.state import InterfaceContext, Renaming, ServerState
 from idlc.model import ir, names
 from idlc.project.files import is_file
 from idlc.project.root import Root
@@ -53,7 +61,7 @@ class Renamed(Part, frozen=True):
 
 
 class Annotated(TextEdit, frozen=True):
-    """An edit that the user is asked about."""
+    """An edit that the user confirms."""
 
     annotation_id: str
 
@@ -66,18 +74,18 @@ class Move(Part, frozen=True, tag="rename", tag_field="kind"):
     annotation_id: str | None = None
 
 
-def prepare(state: ServerState, asked: AtPosition) -> Renamed | None:
+def prepare(state: ServerState, params: AtPosition) -> Renamed | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
-    state.notice_changes()  # of which a client may not have told yet
-    known = state.known(asked.text_document.uri)
-    found = spot(state, known, asked.position) if known else None
-    if known is None or found is None:
+    state.notice_changes()  # which a client may not have reported yet
+    context = state.context(params.text_document.uri)
+    spot = spot_at(state, context, params.position) if context else None
+    if context is None or spot is None:
         return None
-    if found.part == "name" and found.element.meaning is not None:
-        return Renamed(state.range(found.span), found.span.text)
-    target = found.element.target
-    if found.part == "type" and target is not None and _home(target, known, state):
-        span = _last(found.element.type)
+    if spot.part == "name" and spot.element.meaning is not None:
+        return Renamed(state.range(spot.span), spot.span.text)
+    target = spot.element.target
+    if spot.part == "type" and target is not None and _home(target, context, state):
+        span = _last(spot.element.type)
         return Renamed(state.range(span), span.text)
     return None
 
@@ -92,71 +100,73 @@ def can_move_files(state: ServerState) -> bool:
     return state.supports("workspace", "workspaceEdit", "resourceOperations", "rename")
 
 
-def _home(name: ir.TypeName, asking: Known, state: ServerState) -> Known | None:
-    """Return the interface that a file means by a name, if it is one of the workspace's.
+def _home(
+    name: ir.TypeName, asking: InterfaceContext, state: ServerState
+) -> InterfaceContext | None:
+    """Return the interface that a file refers to by a name, if it is one of the workspace's.
 
-    Where its folder knows it from elsewhere, as what is installed, another folder may have it.
+    Where its folder finds the name elsewhere, as in an install prefix, another folder may have it.
     """
-    for snapshot in sorted(snapshots(state), key=lambda one: one is not asking.snapshot):
+    for snapshot in sorted(snapshots(state), key=lambda snapshot: snapshot is not asking.snapshot):
         for interface, source in snapshot.interfaces.values():
             if interface.name == name:
-                return Known(snapshot, interface, source)
+                return InterfaceContext(snapshot, interface, source)
     return None
 
 
-def rename(state: ServerState, asked: AskedRename) -> dict[str, object] | None:
-    """Return the edits that rename what stands at a position, and say what they break."""
+def rename(state: ServerState, params: AskedRename) -> dict[str, object] | None:
+    """Return the edits that rename the element at a position, annotated with what they break."""
     state.forget()
-    known = state.known(asked.text_document.uri)
-    found = spot(state, known, asked.position) if known else None
-    if known is None or found is None or prepare(state, asked) is None:
+    context = state.context(params.text_document.uri)
+    spot = spot_at(state, context, params.position) if context else None
+    if context is None or spot is None or prepare(state, params) is None:
         raise RequestError(REQUEST_FAILED, "there is no name of this workspace here")
-    if found.part == "type":
-        target = found.element.target
-        home = _home(target, known, state) if target else None
+    if spot.part == "type":
+        target = spot.element.target
+        home = _home(target, context, state) if target else None
         assert home is not None
-        return rename_interface(home, asked.text_document.uri, asked.new_name, known, state)
-    return _rename_definition(found.element, known, asked.new_name, state)
+        return rename_interface(home, params.text_document.uri, params.new_name, context, state)
+    return _rename_definition(spot.element, context, params.new_name, state)
 
 
 def _rename_definition(
-    element: Element, known: Known, new: str, state: ServerState
+    element: Element, context: InterfaceContext, new: str, state: ServerState
 ) -> dict[str, object]:
     is_constant = isinstance(element.meaning, ir.Constant)
     valid = names.is_constant_name(new) if is_constant else names.is_field_name(new)
     if not valid:
         hint = names.CONSTANT_HINT if is_constant else names.FIELD_HINT
         raise RequestError(REQUEST_FAILED, f"`{new}` cannot be such a name: {hint}")
-    others = element.message.constants if is_constant else element.message.fields
-    if any(one.name == new and one is not element.meaning for one in others):
+    siblings = element.message.constants if is_constant else element.message.fields
+    if any(definition.name == new and definition is not element.meaning for definition in siblings):
         raise RequestError(REQUEST_FAILED, f"there is a `{new}` already")
-    edits = [Edit(span, new) for span in mentions(element, known)]
-    uri = state.uri(known.snapshot.path_of(known.source))
-    changed = {uri: [TextEdit(state.range(one.span), one.text) for one in edits]}
-    changes = _changes(known, apply(known.source.text, edits)[0], state)
+    edits = [Edit(span, new) for span in mentions(element, context)]
+    uri = state.uri(context.snapshot.path_of(context.source))
+    changed = {uri: [TextEdit(state.range(edit.span), edit.text) for edit in edits]}
+    changes = _changes(context, apply(context.source.text, edits)[0], state)
     title = f"Rename {element.body.name.text} to {new}"
-    return _answer(changed, None, title, changes, known, state)
+    return _answer(changed, None, title, changes, context, state)
 
 
-def _changes(known: Known, text: str, state: ServerState) -> Iterable[Change] | None:
-    """Return what another text for a file breaks, `None` if one of the versions has errors."""
-    path = known.snapshot.path_of(known.source)
+def _changes(context: InterfaceContext, text: str, state: ServerState) -> Iterable[Change] | None:
+    """Return the changes that a new text of a file makes; `None` if a version has errors."""
+    path = context.snapshot.path_of(context.source)
     workspace = state.workspace_of(path)
     after = workspace.snapshot_with(path, text) if workspace else None
     interface = after.interfaces[path][0] if after and path in after.interfaces else None
     if after is None or interface is None:
         return None
-    old, new = known.snapshot.model_of(known.interface), after.model_of(interface)
+    old, new = context.snapshot.model_of(context.interface), after.model_of(interface)
     name = {interface.name}
     return compare(old.only(name), new.only(name)).changes if old and new else None
 
 
 def rename_interface(
-    home: Known, uri: str, new: str, asking: Known, state: ServerState
+    home: InterfaceContext, uri: str, new: str, asking: InterfaceContext, state: ServerState
 ) -> dict[str, object] | None:
     """Return the edits for another name of an interface, with the renaming of its file.
 
-    It was asked for in the document `uri`, which `asking` is about.
+    The request came from the document `uri`, whose context is `asking`.
     """
     old = home.interface.name
     path = home.snapshot.path_of(home.source)
@@ -177,10 +187,12 @@ def rename_interface(
     edits = _edits_of_users(home, new, report, state)
     if problem := next(iter(report), None):
         raise RequestError(REQUEST_FAILED, f"nothing is renamed: {BUILD}: {problem.message}")
-    here = state.path(uri)
+    document_path = state.path(uri)
     used = users(old, home.snapshot, state)
-    spans = (_last(one) for snapshot, one in used if snapshot.path_of(one.source) == here)
-    own = dict.fromkeys(Edit(Span(asking.source, one.start, one.end), new) for one in spans)
+    spans = (
+        _last(span) for snapshot, span in used if snapshot.path_of(span.source) == document_path
+    )
+    own = dict.fromkeys(Edit(Span(asking.source, span.start, span.end), new) for span in spans)
     state.renaming = Renaming(path, target, uri, apply(asking.source.text, list(own))[0])
     move = Move(state.uri(path), uris.from_path(target))
     renamed = msgspec.structs.replace(home.interface, name=old._replace(name=new))
@@ -188,24 +200,24 @@ def rename_interface(
     return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, state)
 
 
-def files(state: ServerState, asked: AskedFileRenames) -> dict[str, object] | None:
+def files(state: ServerState, params: AskedFileRenames) -> dict[str, object] | None:
     """Return the edits that follow from interface files getting other names.
 
-    Some clients also ask this about a file that an answer of `rename` has them move. Documents
-    that are open have the edits of that answer by then. What else it edits may be in buffers that
-    the client does not tell of, so it is not edited again.
+    Some clients also request this for a file that an answer of `rename` has them move. Open
+    documents have the edits of that answer by then. Other files that it edits may be in buffers
+    that the client does not report, so they are not edited again.
     """
     state.forget()
     edits: dict[str, list[TextEdit]] = {}
     report = Report()
-    for one in {each.old_uri: each for each in asked.files}.values():
-        old, new = uris.to_path(one.old_uri), uris.to_path(one.new_uri)
-        known = state.known(one.old_uri)
-        if not (old and new and known and _is_other_name(old, new)):
+    for file in {each.old_uri: each for each in params.files}.values():
+        old, new = uris.to_path(file.old_uri), uris.to_path(file.new_uri)
+        context = state.context(file.old_uri)
+        if not (old and new and context and _is_other_name(old, new)):
             continue
         is_own = state.renaming is not None and _is_under_way(state.renaming, old, new, state)
-        found = _edits_of_users(known, new.stem, report, state)
-        for uri, some in found.items():
+        by_uri = _edits_of_users(context, new.stem, report, state)
+        for uri, some in by_uri.items():
             if not is_own or state.documents.get(uri):
                 edits.setdefault(uri, []).extend(some)
     for problem in report:
@@ -216,28 +228,28 @@ def files(state: ServerState, asked: AskedFileRenames) -> dict[str, object] | No
 
 
 def _is_other_name(old: Path, new: Path) -> bool:
-    """Return whether a file gets another name by which an interface can be called."""
+    """Return whether a file gets another name that an interface can have."""
     is_valid = names.is_message_name(new.stem)
     return is_valid and old.parent == new.parent and old.suffix == new.suffix
 
 
 def _is_under_way(renaming: Renaming, old: Path, new: Path, state: ServerState) -> bool:
-    """Return whether the client makes the edits of an answer, and now moves this file for it."""
+    """Return whether the client applies the edits of an answer, and now moves this file for it."""
     if (renaming.old, renaming.new) != (old, new):
         return False
-    known = state.known(renaming.uri)
-    return known is not None and known.source.text == renaming.text
+    context = state.context(renaming.uri)
+    return context is not None and context.source.text == renaming.text
 
 
 def _edits_of_users(
-    known: Known, new: str, report: Report, state: ServerState
+    context: InterfaceContext, new: str, report: Report, state: ServerState
 ) -> dict[str, list[TextEdit]]:
     """Return the edits of all files that name an interface: its users, and CMakeLists.txt.
 
     Two folders may hold the same file, also by a link: it is edited once, where it is open.
     """
-    old, path = known.interface.name, known.snapshot.path_of(known.source)
-    used = users(old, known.snapshot, state)
+    old, path = context.interface.name, context.snapshot.path_of(context.source)
+    used = users(old, context.snapshot, state)
     places = [(snapshot.path_of(span.source), _last(span)) for snapshot, span in used]
     places += [(Path(span.source.path), span) for span in _in_cmake(old, path, report, state)]
     places.sort(key=lambda place: state.documents.at(place[0]) is None)
@@ -250,14 +262,14 @@ def _edits_of_users(
 
 
 def _in_cmake(name: ir.TypeName, path: Path, report: Report, state: ServerState) -> Iterator[Span]:
-    """Yield where CMakeLists.txt of a package names an interface file."""
+    """Yield the spans in which a package's CMakeLists.txt names an interface file."""
     cmake = path.parent.parent / BUILD
     root = Root(cmake.parent, state.documents.texts())
     if not root.is_file(cmake):
         return
     source = root.read_source(cmake, str(cmake), report)
     pattern = re.compile(rf"(?<![\w/]){name.kind}/({re.escape(name.name)})\.{name.kind}(?![.-]?\w)")
-    for place in (place for one in calls(source) for place in one.places) if source else ():
+    for place in (place for call in calls(source) for place in call.places) if source else ():
         if match := pattern.search(place.text):
             yield Span(place.source, place.start + match.start(1), place.start + match.end(1))
 
@@ -267,11 +279,11 @@ def _answer(
     move: Move | None,
     title: str,
     changes: Iterable[Change] | None,
-    known: Known,
+    context: InterfaceContext,
     state: ServerState,
 ) -> dict[str, object]:
-    """Return the edits, which say what they break before anybody makes them."""
-    what, is_broken = _what_breaks(changes, known, state)
+    """Return the edits, annotated with what they break, which the user sees before applying."""
+    what, is_broken = _what_breaks(changes, context, state)
     support = ("workspace", "workspaceEdit")
     if not (
         state.supports(*support, "changeAnnotationSupport")
@@ -280,7 +292,7 @@ def _answer(
         state.notify("window/showMessage", {"type": 2, "message": f"{title}: {what}"})
         if move is None:
             return of_documents(edits, state)
-        return {"documentChanges": [*(document_edit(*one, state) for one in edits.items()), move]}
+        return {"documentChanges": [*(document_edit(*item, state) for item in edits.items()), move]}
     marked = (
         document_edit(uri, (Annotated(e.range, e.new_text, _ANNOTATION) for e in some), state)
         for uri, some in edits.items()
@@ -291,16 +303,16 @@ def _answer(
 
 
 def _what_breaks(
-    changes: Iterable[Change] | None, known: Known, state: ServerState
+    changes: Iterable[Change] | None, context: InterfaceContext, state: ServerState
 ) -> tuple[str, bool]:
-    """Return what a rename breaks, in words, and whether it breaks something."""
+    """Return a sentence on what a rename breaks, and whether it breaks anything."""
     if changes is None:
         return "there are errors, so idlc cannot say what this breaks", True
-    broken = {level for one in changes for level in one.levels}
+    broken = {level for change in changes for level in change.levels}
     levels = ", ".join(level for level in LEVELS if level in broken)
     if not levels:
         return "breaks nothing that is sent", False
-    name = known.interface.name
+    name = context.interface.name
     holders: dict[ir.TypeName, set[ir.TypeName]] = {}
     for snapshot, span, target in uses(state):
         holder = snapshot.interfaces[snapshot.path_of(span.source)][0].name
@@ -308,7 +320,7 @@ def _what_breaks(
     direct = sorted(map(str, holders.get(name, ())))
     what = f"breaks {levels} for whoever uses `{name}`"
     what += f": {first_few(direct, NAMED)}" if direct else ""
-    if "hash" in broken and known.snapshot.library.distro.has_hashes:
+    if "hash" in broken and context.snapshot.library.distro.has_hashes:
         reached = {name}
         waiting = [name]
         while waiting:

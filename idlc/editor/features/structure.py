@@ -1,4 +1,4 @@
-"""The parts of a file: what can be folded, what is selected next, and what leads elsewhere."""
+"""The parts of a file: symbols, folding ranges, selection ranges and links."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from idlc.diagnostics.source import Span
 from idlc.editor.documents import is_built_in
 from idlc.editor.elements import Element, elements, section_names, snapshots, text_of
 from idlc.editor.protocol.parts import AskedSymbols, AtPositions, Location, OfDocument, Part, Range
-from idlc.editor.state import CONTENT, Known, ServerState
+from idlc.editor.state import CONTENT, InterfaceContext, ServerState
 from idlc.language.parse import parse
 from idlc.model import ir
 from idlc.model.ir import spell
@@ -30,7 +30,7 @@ class Symbol(Part, frozen=True):
     children: tuple[Symbol, ...] = ()
 
 
-class Found(Part, frozen=True):
+class InterfaceSymbol(Part, frozen=True):
     """An interface of any folder."""
 
     name: str
@@ -39,15 +39,15 @@ class Found(Part, frozen=True):
     container_name: str
 
 
-def document(state: ServerState, asked: OfDocument) -> list[Symbol]:
+def document(state: ServerState, params: OfDocument) -> list[Symbol]:
     """Return the definitions of a file, by section where it has several."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
+    context = state.context(params.text_document.uri)
+    if context is None:
         return []
-    found = list(elements(known.source, known.interface))
-    names = section_names(known.interface)
+    definitions = list(elements(context.source, context.interface))
+    names = section_names(context.interface)
     if not names:
-        return [_symbol(one, state) for one in found]
+        return [_symbol(element, state) for element in definitions]
     return [
         Symbol(
             name,
@@ -55,39 +55,45 @@ def document(state: ServerState, asked: OfDocument) -> list[Symbol]:
             _NAMESPACE,
             state.range(span),
             state.range(Span(span.source, span.start, span.start)),
-            tuple(_symbol(one, state) for one in found if span.start <= one.line.start < span.end),
+            tuple(
+                _symbol(element, state)
+                for element in definitions
+                if span.start <= element.line.start < span.end
+            ),
         )
-        for name, span in zip(names, sections(known), strict=False)
+        for name, span in zip(names, sections(context), strict=False)
     ]
 
 
-def sections(known: Known) -> list[Span]:
-    """Return the places of the sections of a file, without the lines between them."""
-    file = parse(known.source)
+def sections(context: InterfaceContext) -> list[Span]:
+    """Return the spans of the sections of a file, without the lines between them."""
+    file = parse(context.source)
     starts = [section.start for section in file.sections]
-    ends = [*file.separators, len(known.source.text)]
-    return [Span(known.source, *place) for place in zip(starts, ends, strict=True)]
+    ends = [*file.separators, len(context.source.text)]
+    return [Span(context.source, *place) for place in zip(starts, ends, strict=True)]
 
 
-def _symbol(one: Element, state: ServerState) -> Symbol:
-    kind = _CONSTANT if isinstance(one.meaning, ir.Constant) else _FIELD
-    type_ = one.body.type.whole.text
-    if one.meaning is not None:
-        type_ = spell(one.meaning.type)
-    name = one.body.name.text or "?"
-    return Symbol(name, type_, kind, state.range(one.whole), state.range(one.name))
+def _symbol(element: Element, state: ServerState) -> Symbol:
+    kind = _CONSTANT if isinstance(element.meaning, ir.Constant) else _FIELD
+    type_ = element.body.type.whole.text
+    if element.meaning is not None:
+        type_ = spell(element.meaning.type)
+    name = element.body.name.text or "?"
+    return Symbol(name, type_, kind, state.range(element.whole), state.range(element.name))
 
 
-def workspace(state: ServerState, asked: AskedSymbols) -> list[Found]:
+def workspace(state: ServerState, params: AskedSymbols) -> list[InterfaceSymbol]:
     """Return the interfaces in whose full names the letters of a word occur in this order."""
-    found: dict[Found, None] = {}
+    symbols: dict[InterfaceSymbol, None] = {}
     for snapshot in snapshots(state):
         for interface, source in snapshot.interfaces.values():
-            if _fits(asked.query.lower(), str(interface.name).lower()):
+            if _fits(params.query.lower(), str(interface.name).lower()):
                 where = state.location(Span(source, 0, 0), snapshot)
                 kind = _KINDS[interface.name.kind]
-                found[Found(interface.name.name, kind, where, interface.name.package)] = None
-    return list(found)[:MOST]
+                symbols[
+                    InterfaceSymbol(interface.name.name, kind, where, interface.name.package)
+                ] = None
+    return list(symbols)[:MOST]
 
 
 def _fits(word: str, name: str) -> bool:
@@ -118,27 +124,27 @@ class Link(Part, frozen=True):
     tooltip: str
 
 
-def folds(state: ServerState, asked: OfDocument) -> list[Fold]:
+def folds(state: ServerState, params: OfDocument) -> list[Fold]:
     """Return the sections of a service or action, and comments of several lines."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
+    context = state.context(params.text_document.uri)
+    if context is None:
         return []
-    found = [Fold(first, last, "comment") for first, last in _comments(known, state)]
-    parts = sections(known)
+    regions = [Fold(first, last, "comment") for first, last in _comments(context, state)]
+    parts = sections(context)
     for span in parts if len(parts) > 1 else ():
         place = state.range(Span(span.source, span.start, span.start + len(span.text.rstrip())))
         if place.end.line > place.start.line:
-            found.append(Fold(place.start.line, place.end.line, "region"))
-    return found
+            regions.append(Fold(place.start.line, place.end.line, "region"))
+    return regions
 
 
-def _comments(known: Known, state: ServerState) -> Iterator[tuple[int, int]]:
+def _comments(context: InterfaceContext, state: ServerState) -> Iterator[tuple[int, int]]:
     """Yield the first and last line of each run of comment lines."""
     lines = []
-    for section in parse(known.source).sections:
+    for section in parse(context.source).sections:
         for line in section.lines:
             if line.comment and not line.code.strip():
-                start = state.range(Span(known.source, line.start, line.start)).start
+                start = state.range(Span(context.source, line.start, line.start)).start
                 lines.append(start.line)
     while lines:
         first = last = lines.pop(0)
@@ -148,43 +154,49 @@ def _comments(known: Known, state: ServerState) -> Iterator[tuple[int, int]]:
             yield first, last
 
 
-def selections(state: ServerState, asked: AtPositions) -> list[Selection]:
-    """Return for each position what is around it: a part, its line, its section, the file."""
-    known = state.known(asked.text_document.uri)
-    if known is None:
-        return [Selection(Range(one, one)) for one in asked.positions]
-    whole = Span(known.source, 0, len(known.source.text))
-    spans = [whole, *sections(known)]
-    for one in elements(known.source, known.interface):
-        line = Span(known.source, one.line.start, max(one.comment.end, one.whole.end))
-        parts = [line, one.whole, one.span(one.body.type.whole), one.type, one.name]
-        spans += [*parts, *([one.value] if one.value else []), one.comment]
-    found = []
-    for position in asked.positions:
-        offset = state.offset(known.source, position)
-        around = sorted(
+def selections(state: ServerState, params: AtPositions) -> list[Selection]:
+    """Return for each position the ranges around it: a part, its line, its section, the file."""
+    context = state.context(params.text_document.uri)
+    if context is None:
+        return [Selection(Range(position, position)) for position in params.positions]
+    whole = Span(context.source, 0, len(context.source.text))
+    spans = [whole, *sections(context)]
+    for element in elements(context.source, context.interface):
+        line = Span(context.source, element.line.start, max(element.comment.end, element.whole.end))
+        parts = [
+            line,
+            element.whole,
+            element.span(element.body.type.whole),
+            element.type,
+            element.name,
+        ]
+        spans += [*parts, *([element.value] if element.value else []), element.comment]
+    answers = []
+    for position in params.positions:
+        offset = state.offset(context.source, position)
+        enclosing = sorted(
             {(s.start, s.end) for s in spans if s.start <= offset <= s.end and s.end > s.start},
             key=lambda place: place[0] - place[1],
         )
         selected: Selection | None = None
-        last = (0, len(known.source.text))
-        for start, end in around:
+        last = (0, len(context.source.text))
+        for start, end in enclosing:
             if last[0] <= start and end <= last[1]:
-                selected = Selection(state.range(Span(known.source, start, end)), selected)
+                selected = Selection(state.range(Span(context.source, start, end)), selected)
                 last = start, end
-        found.append(selected or Selection(Range(position, position)))
-    return found
+        answers.append(selected or Selection(Range(position, position)))
+    return answers
 
 
-def links(state: ServerState, asked: OfDocument) -> list[Link]:
+def links(state: ServerState, params: OfDocument) -> list[Link]:
     """Return the types of a file that lead to other files."""
-    known = state.known(asked.text_document.uri)
+    context = state.context(params.text_document.uri)
     shows_texts = state.supports("workspace", CONTENT)
-    found = []
-    for one in elements(known.source, known.interface) if known else ():
-        source = text_of(one.target, known.snapshot) if one.target and known else None
-        # a file of the cache is only made when somebody goes there
-        if source is not None and known and (shows_texts or not is_built_in(source)):
-            uri = state.location(Span(source, 0, 0), known.snapshot).uri
-            found.append(Link(state.range(one.type), uri, f"open {one.target}"))
-    return found
+    resolved = []
+    for element in elements(context.source, context.interface) if context else ():
+        source = text_of(element.target, context.snapshot) if element.target and context else None
+        # a file of the cache is only written when the user opens it
+        if source is not None and context and (shows_texts or not is_built_in(source)):
+            uri = state.location(Span(source, 0, 0), context.snapshot).uri
+            resolved.append(Link(state.range(element.type), uri, f"open {element.target}"))
+    return resolved

@@ -1,4 +1,4 @@
-"""The capabilities of client and server, as they tell them to each other."""
+"""The capabilities that client and server announce to each other."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ TYPES += ["keyword", "namespace"]
 MODIFIERS = ["declaration", "readonly", "defaultLibrary"]
 
 
-#: What positions can be counted in, and what holds if nothing was agreed on.
+#: The encodings in which positions can be counted, and the default of the protocol.
 ENCODINGS = ("utf-8", "utf-16", "utf-32")
 DEFAULT_ENCODING = "utf-16"
 #: The command that declares a package in package.xml, for what is completed.
 ADD_DEPENDENCY = "idlc.addDependency"
 #: The command that gives a document's file, and its interface, another name.
 RENAME_FILE = "idlc.renameFile"
-#: The command that does what `idlc gen` does for a document, and the kind of action that offers it.
+#: The command that runs `idlc gen` for a document, and the kind of action that offers it.
 UPDATE_GENERATED = "idlc.updateGenerated"
 UPDATE_KIND = "source.updateGenerated.idlc"
 
 
 def encoding(client: dict[str, Any]) -> str:
-    """Return the first encoding of positions that a client offers and the server knows."""
+    """Return the first encoding of positions that a client offers and the server supports."""
     general = client.get("general")
     offered = general.get("positionEncodings") if isinstance(general, dict) else None
-    known = [one for one in offered or () if one in ENCODINGS]
-    return known[0] if known else DEFAULT_ENCODING
+    supported = [name for name in offered or () if name in ENCODINGS]
+    return supported[0] if supported else DEFAULT_ENCODING
 
 
 def answer(client: dict[str, Any]) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Messages in a stream of bytes: a header that says how long each is, and JSON."""
+"""Messages in a stream of bytes: a header with the length, and JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REQUEST_FAILED = -32803
 
 
 class RequestError(Exception):
-    """A request that cannot be answered: a code, and why in words for people."""
+    """A request that cannot be answered: a code, and the reason in words for people."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
@@ -32,18 +32,18 @@ _LENGTH = re.compile(rb"content-length\s*:\s*(\d{1,15})\s*", re.IGNORECASE)
 
 
 class TooLongError(Exception):
-    """A message was too long, and was left out."""
+    """A message was too long and was skipped."""
 
 
 def read(stream: BinaryIO) -> bytes | None:
     """Return the next message, `None` at the end of the stream; raises TooLongError.
 
-    What is no header is passed over until there is one.
+    Lines that are no header are skipped.
     """
     length = None
     while line := stream.readline(MAX_LINE):
-        if found := _LENGTH.fullmatch(line):
-            length = int(found[1])
+        if match := _LENGTH.fullmatch(line):
+            length = int(match[1])
         elif line in (b"\r\n", b"\n") and length is not None:
             return _body(stream, length)
     return None
@@ -62,6 +62,6 @@ def _body(stream: BinaryIO, length: int) -> bytes | None:
 
 
 def write(stream: BinaryIO, body: bytes) -> None:
-    """Write a message, at once."""
+    """Write a message and flush the stream."""
     stream.write(b"Content-Length: %d\r\n\r\n" % len(body) + body)
     stream.flush()

@@ -1,4 +1,4 @@
-"""The parts of the Language Server Protocol (3.17) that are used, as msgspec reads and writes them.
+"""Structures of the Language Server Protocol (3.17) that the server reads and writes.
 
 Names are the protocol's, with underscores in Python.
 """
@@ -39,7 +39,7 @@ class Location(Part, frozen=True):
 
 
 class TextEdit(Part, frozen=True):
-    """A range and what takes its place."""
+    """A range and the text that replaces it."""
 
     range: Range
     new_text: str
@@ -164,7 +164,7 @@ class GivenProblem(Part, frozen=True):
 
 
 class ActionContext(Part, frozen=True):
-    """Which actions are asked for; all without `only`."""
+    """The kinds of actions that are requested; all without `only`."""
 
     diagnostics: tuple[GivenProblem, ...] = ()
     only: tuple[str, ...] | None = None
@@ -228,7 +228,7 @@ class Initialize(Part, frozen=True):
 
 
 class FolderChanges(Part, frozen=True):
-    """The folders that were added to the workspace, and those that were removed."""
+    """The folders that were added to the workspace, and the removed ones."""
 
     added: tuple[Folder, ...]
     removed: tuple[Folder, ...]
@@ -259,7 +259,7 @@ class DidChangeSettings(Part, frozen=True):
     settings: Any = None
 
 
-#: completionItem/resolve: what the server sent, and what else a client has in it.
+#: completionItem/resolve: the item as the server sent it, with additions of the client.
 CompletionItem = dict[str, Any]
 
 

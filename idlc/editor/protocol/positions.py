@@ -1,4 +1,4 @@
-"""Places in a text, as the protocol counts them and as Python does.
+"""Positions in a text, as the protocol counts them and as Python does.
 
 The protocol's lines end at LF, CR LF or CR and nowhere else; its characters are bytes of UTF-8,
 units of UTF-16 or code points, as client and server agreed. Spans count code points of a text.
@@ -30,7 +30,7 @@ def lines_of(text: str) -> list[str]:
 
 
 def units(text: str, encoding: str) -> int:
-    """Return how long a text is in an encoding."""
+    """Return the length of a text in an encoding."""
     if encoding == "utf-32" or text.isascii():
         return len(text)
     if encoding == "utf-8":
@@ -39,9 +39,9 @@ def units(text: str, encoding: str) -> int:
 
 
 def characters(line: str, count: int, encoding: str) -> int:
-    """Return how many characters of a line `count` units are; its end is not passed.
+    """Return the number of characters in the first `count` units of a line, without its end.
 
-    What lies within a character means its start.
+    A position within a character means its start.
     """
     content = line.rstrip("\r\n")
     if encoding == "utf-32" or content.isascii():
@@ -55,7 +55,7 @@ def characters(line: str, count: int, encoding: str) -> int:
 
 
 def in_lines(lines: Sequence[str], position: Position, encoding: str) -> tuple[int, int]:
-    """Return the line and the character that a position means; the last if it is beyond."""
+    """Return the line and the character of a position; the last if it is beyond."""
     if position.line >= len(lines):
         return len(lines) - 1, len(lines[-1])
     line = lines[position.line]

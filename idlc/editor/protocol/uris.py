@@ -12,7 +12,7 @@ _ERRORS = "surrogateescape"
 
 
 def to_path(uri: str) -> Path | None:
-    """Return the absolute path that a URI means, `None` for one that is no file's."""
+    """Return the absolute path that a URI means, `None` for one that is not of a file."""
     text = path_text(uri, on_windows=os.name == "nt")
     # on Windows, a URI may lack the drive
     return Path(os.path.abspath(text)) if text else None  # noqa: PTH100 - keeps links

@@ -16,7 +16,7 @@ import libcst as cst
 from idlc.check.package.installation import wiring
 from idlc.diagnostics.report import apply
 from idlc.diagnostics.source import Source
-from idlc.project.edits import Edited, Outcome, Refused, Script, split, taken
+from idlc.project.edits import Edited, Outcome, Refused, Script, already_taken, split
 from idlc.scaffold.edits.python_text import appended, assignments, constants, parsed, quoted, string
 
 Edit: TypeAlias = Callable[[str], Outcome]
@@ -101,7 +101,7 @@ def _present(lines: list[str], script: Script) -> Outcome | None:
         if name == script.name and target:
             if script.same(line):
                 return Edited("")
-            return taken(script, target, IN_SETUP_CFG)
+            return already_taken(script, target, IN_SETUP_CFG)
     return None
 
 
@@ -337,7 +337,7 @@ def _in_list(value: cst.List | cst.Tuple, script: Script, strings: Mapping[str, 
     for item in values:
         name, target = split(string(item, strings) or "")
         if name == script.name:
-            return taken(script, target, IN_SETUP).why
+            return already_taken(script, target, IN_SETUP).why
     return value, appended(value, cst.Element(quoted(script.line, values)))
 
 
@@ -408,7 +408,7 @@ def _in_pyproject(text: str, project: dict[str, Any], script: Script) -> Outcome
     if script.name in scripts:
         if script.same(f"{script.name} = {scripts[script.name]}"):
             return Edited(text)
-        refused = taken(script, str(scripts[script.name]), where)
+        refused = already_taken(script, str(scripts[script.name]), where)
         return refused._replace(line=_line(script))
     ending = "\r\n" if "\r\n" in text else "\n"
     lines = text.splitlines(keepends=True)
