@@ -266,7 +266,7 @@ def test_an_interrupt_ends_it_quietly():
         assert b"Traceback" not in server.stderr.read()
 
 
-@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.look"])
+@pytest.mark.parametrize("where", ["idlc.model.link.link", "idlc.editor.workspace.list_files"])
 def test_what_is_wrong_in_idlc_itself_is_a_problem_and_no_end(where, workspace, monkeypatch):
     from idlc.editor.publish import diagnostics
 
