@@ -340,7 +340,7 @@ def test_ctrl_c_ends_with_the_status_that_shells_expect(monkeypatch, capsys):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("idlc.check.run.look", interrupt)
+    monkeypatch.setattr("idlc.check.run.list_files", interrupt)
     assert main(["check", "."]) == 130
     assert capsys.readouterr().err.strip() == "interrupted"
 
