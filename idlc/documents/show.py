@@ -20,13 +20,13 @@ from idlc.project import inputs
 from idlc.project.find import find, is_path
 from idlc.project.library import resolve
 from idlc.project.settings import Scope
-from idlc.recordings.definitions import Recorded
 from idlc.recordings.find import split_recordings
-from idlc.recordings.types import LocalTypes, read_topics, recorded_types, topics_of, versions
 
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
     from idlc.project.library import Library
+    from idlc.recordings.definitions import Recorded
+    from idlc.recordings.types import LocalTypes
 
 
 def hashes(targets: Sequence[str], scope: Scope, report: Report) -> list[tuple[str, str]]:
@@ -154,6 +154,8 @@ class TopicFacts(NamedTuple):
 
 def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
+    from idlc.recordings.types import LocalTypes, read_topics, recorded_types, versions
+
     recording = read_topics(path, report, check=True)
     report.notes += [topic.message for topic in recording.unread] if recording else []
     local = LocalTypes(scope, report)
@@ -187,6 +189,8 @@ def definitions(
     path: str, selected: Sequence[str], style: str, scope: Scope, report: Report
 ) -> Iterator[str]:
     """Yield the interfaces of topics, each once, as text in a format."""
+    from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
+
     recorded = topics_of([path], selected, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
