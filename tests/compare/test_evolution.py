@@ -16,7 +16,10 @@ PARTS = 8
 STEPS = 25
 
 
-@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize(
+    "part",
+    [part if part < 2 else pytest.param(part, marks=pytest.mark.long) for part in range(PARTS)],
+)
 def test_the_verdict_is_what_happens(part):
     disagreements = []
     seen = Counter()

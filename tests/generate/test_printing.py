@@ -59,6 +59,7 @@ def rendered(monkeypatch):
     return render
 
 
+@pytest.mark.long
 def test_statements_say_the_same_in_lines_of_every_width(rendered):
     files = {**PARTS, "msg/Defaults.msg": DEFAULTS, "srv/Ask.srv": "Number a\n---\nWords[] b\n"}
     for number, kind in enumerate(kind for kind in KINDS if "<=" not in kind):

@@ -83,7 +83,10 @@ def test_every_message_agrees_with_generated_code(look):
     look("official", names_in((*PACKAGES, "test_msgs"), interfaces()))
 
 
-@pytest.mark.parametrize("version", ["humble", "lyrical", "rolling"])
+@pytest.mark.parametrize(
+    "version",
+    ["humble", *(pytest.param(name, marks=pytest.mark.long) for name in ("lyrical", "rolling"))],
+)
 def test_every_message_in_the_structures_of_another_version(version, look, tmp_path):
     """Type support measures its tables, and walker.c walks over what it then makes."""
     words = [f"-D{one}" for one in VERSIONS[version]]
