@@ -1,4 +1,4 @@
-"""How large idlc is: modules and lines of code of each room.
+"""The size of idlc: modules and lines of code of each room.
 
 `python -m benchmarks.size` prints them. Blank lines, comments and docstrings are no code.
 """

@@ -139,7 +139,7 @@ def _no_such_part(text: str, interface: ir.TypeName, names: Sequence[str]) -> Di
 class TopicFacts(NamedTuple):
     """One line of the table.
 
-    `hash` is the recorded one, or that of the recorded definition. `here` compares it with the
+    `hash` is the recorded hash, or the hash of the recorded definition. `here` compares it with the
     local type of the same name: same, differs or unknown. `definition` is the encoding of the
     recorded one.
     """

@@ -284,7 +284,7 @@ class Scope(msgspec.Struct, frozen=True):
     exclude: Exclusions = Exclusions()
     paths: tuple[str, ...] = ()
     out: str | None = None
-    distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros_scope(()))
+    distros: tuple[Distro, ...] = msgspec.field(default_factory=lambda: _distros_named(()))
 
     @property
     def distro(self) -> Distro:
@@ -310,11 +310,11 @@ def scope(
         Exclusions(tuple(left_out)),
         settings.paths,
         settings.out,
-        _distros_scope(listed(distro) if distro else settings.distro),
+        _distros_named(listed(distro) if distro else settings.distro),
     )
 
 
-def _distros_scope(names: Sequence[str]) -> tuple[Distro, ...]:
+def _distros_named(names: Sequence[str]) -> tuple[Distro, ...]:
     """Return the distributions with these names, each once."""
     return tuple(dict.fromkeys(BY_NAME[name] for name in names))
 
