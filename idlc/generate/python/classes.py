@@ -77,13 +77,12 @@ def _operator(field: ir.Field, receiver: str, operator: str) -> str:
 def _compared(field: ir.Field, receiver: str, references: References) -> str | Group:
     """Return whether a field is equal.
 
-    It is a call for possible arrays, untyped values, and expressions too long for a line.
+    It is a call for possible arrays and expressions too long for a line.
     """
     plain = _operator(field, receiver, "==")
     element = ir.element_of(field.type)
     is_array = isinstance(field.type, (ir.Array, ir.Sequence)) and isinstance(element, ir.Primitive)
-    untyped = isinstance(element, ir.Ref) and element.target in references.implied
-    if is_array or untyped or len(plain) > WIDTH - 16:
+    if is_array or len(plain) > WIDTH - 16:
         slot = python_names.slot(field.name)
         return call("_idlc.same", f"{receiver}.{slot}", f"other.{slot}")
     return plain

@@ -62,8 +62,7 @@ def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file:
 
 
 def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
-    """Return what the messages of a service or action are for, and an action's services."""
-    name = interface.name.name
+    """Return what the messages of an interface are for."""
     match interface:
         case ir.Message():
             return {interface.name: f"{interface.name}."}
@@ -71,33 +70,13 @@ def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
             return {
                 interface.request.name: f"The request of the service {interface.name}.",
                 interface.response.name: f"The response of the service {interface.name}.",
-                **_event(interface, f"a call of {name}"),
             }
         case ir.Action():
-            send, get = derive.services(interface)
-            goal = f"a {name} goal"
-            words = {
-                send.name: f"Starts {goal}",
-                send.request.name: f"Sent by a client to start {goal}",
-                send.response.name: f"Tells a client whether {goal} was accepted, and when",
-                get.name: f"Waits for the result of {goal}",
-                get.request.name: f"Sent by a client to wait for the result of {goal}",
-                get.response.name: f"Tells a client how {goal} ended, and its result",
-                derive.feedback_message(interface).name: f"Published while {goal} is executed",
-            }
             return {
                 interface.goal.name: f"The goal of the action {interface.name}.",
                 interface.result.name: f"The result of the action {interface.name}.",
                 interface.feedback.name: f"The feedback of the action {interface.name}.",
-                **{type_name: f"{text}. Added by ROS 2." for type_name, text in words.items()},
-                **_event(send, f"a call that starts {goal}"),
-                **_event(get, "a call that waits for a result"),
             }
-
-
-def _event(service: ir.Service, call: str) -> dict[ir.TypeName, str]:
-    text = f"Published about {call}, where services are introspected. Added by ROS 2."
-    return {derive.event(service).name: text}
 
 
 def _hidden(structure: ir.Message) -> list[str]:
@@ -306,14 +285,14 @@ def _shape(field: ir.Field, references: References, naming: Naming, *, converts:
     if isinstance(field.type, ir.Ref):
         annotation = _element(field.type, references)
         fresh: Node = f"{annotation}()"
-        expected = "" if field.type.target in references.implied else annotation
+        expected = annotation
     else:
         element = _element(ir.element_of(field.type), references)
         inner = naming.builtins + element if element in BUILTINS else element
         expected = f"{naming.builtins}list"
         annotation = f"{expected}[{inner}]"
         fresh = _fresh_list(field, references)
-    doubt = (f"{name} is not None", *([f"{kind} is not {expected}"] if expected else []))
+    doubt = (f"{name} is not None", f"{kind} is not {expected}")
     if converts and not isinstance(field.type, ir.Ref):
         inside = getattr(ir.element_of(field.type), "name", "")
         read = [f"_idlc.read_{LIST_PRIMITIVES[inside]}"] if inside in LIST_PRIMITIVES else []
@@ -339,7 +318,7 @@ def _element(element: ir.Element, references: References) -> str:
         case ir.String():
             return "str"
         case ir.Ref(target):
-            return references.annotation(target)
+            return references.name(target)
         case ir.Unknown():
             raise ValueError("an unknown type cannot be emitted")
 

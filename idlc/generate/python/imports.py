@@ -45,23 +45,18 @@ class Homes:
         self.modules = modules
         self.parent = f"{parent}." if parent else ""
         self.classes = modules[interface.name]
-        self.protocol = python_names.protocol_module(self.classes)
-        self.sections = {message.name for message in derive.sections(interface)}
-        self.derived = {message.name for message in derive.messages(interface)} - self.sections
+        self.structures = {message.name for message in derive.messages(interface)}
 
     def of(self, structure: ir.TypeName) -> python_names.ModuleName:
         """Return the module that defines a structure's class."""
-        if structure in self.sections:
-            return self.classes
-        return self.protocol if structure in self.derived else self.modules[structure]
+        return self.classes if structure in self.structures else self.modules[structure]
 
 
 class References:
     """The names of all classes that a module mentions.
 
-    `own` are the structures that it defines, `others` are in fields and of other packages.
-    `direct` are imported with the module; `implied` are others in fields that ROS 2 adds, imported
-    when they are used, so that each part of a protocol needs only its own types.
+    `own` are the structures that it defines or writes, `direct` those that their fields name,
+    of which `others` are of other packages.
     """
 
     def __init__(
@@ -75,10 +70,9 @@ class References:
         self.package = interface.name.package
         self.kind = interface.name.kind
         self.own = {message.name for message in structures}
-        named = {name for message in structures for name in message.references} - self.own
-        self.others = {name for name in named if name.package != self.package}
-        self.implied = self.others if self.own & homes.derived else set()
-        self.direct = named - self.implied
+        named = {name for message in structures for name in message.references}
+        self.direct = named - self.own
+        self.others = {name for name in self.direct if name.package != self.package}
         groups = {interface.name, *(service.name for service in derive.services(interface))}
         self._names = self._named(self.own | groups, _closure(self.own, messages))
 
@@ -103,16 +97,6 @@ class References:
     def name(self, type_: ir.TypeName) -> python_names.ClassName:
         """Return the class's name in this module."""
         return self._names[type_]
-
-    def annotation(self, type_: ir.TypeName) -> str:
-        """Return the class as annotations and constructors name it."""
-        if type_ in self.implied:
-            return f"{_module(type_)}.{python_names.class_(type_)}"
-        return self.name(type_)
-
-    def modules(self) -> list[tuple[str, str]]:
-        """Return the modules of implied types, with their names in this module."""
-        return sorted({(self._outside(type_), _module(type_)) for type_ in self.implied})
 
     def _outside(self, type_: ir.TypeName) -> str:
         return f"{self._homes.parent}{type_.package}.{type_.kind}"
@@ -146,10 +130,6 @@ class References:
                 for line in statements(module, names, indent + 4)
             ],
         )
-
-
-def _module(type_: ir.TypeName) -> str:
-    return f"_{type_.package}_{type_.kind}"
 
 
 def _closure(own: set[ir.TypeName], messages: plan.Messages) -> set[ir.TypeName]:
@@ -190,7 +170,7 @@ def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str
         for message in derive.messages(interface)
     }
     for service in derive.services(interface):
-        names[python_names.class_(service.name)] = homes.protocol
+        names[python_names.class_(service.name)] = homes.classes
     names[python_names.class_(interface.name)] = homes.classes
     return names
 
