@@ -50,7 +50,9 @@ if TYPE_CHECKING:
 else:
     from .sequences import Generic
 
-    Added = object
+    class Added:
+        """The base of what holds the parts of messages, which itself is none."""
+
     Goal = Result = Feedback = Request = Response = None
 
 
@@ -407,6 +409,7 @@ class _Composition:
         defaults = [None if self.converts else value for value in function.__defaults__]
         bound = FunctionType(function.__code__, self.scope, "__init__", tuple(defaults))
         bound.__qualname__ = f"{public_name(name)}.__init__"
+        bound.__module__ = __name__  # where its source is
         bound.__annotations__ = {
             field: hint.replace("ListOf", "Iterable") + " | None" * (value is None)
             for (field, hint), value in zip(hints.items(), defaults, strict=True)

@@ -41,7 +41,7 @@ def equality(structure: ir.Message, receiver: str, references: References) -> Eq
     others = [field for field in structure.fields if field not in scalars]
     if not others:
         return Equality((), Code(_all_equal(scalars, receiver)))
-    parts = [_compared(field, receiver, references) for field in others]
+    parts = [_compared(field, receiver) for field in others]
     calls: list[Node] = [part for part in parts if isinstance(part, Group)]
     plain = [part for part in parts if isinstance(part, str)]
     if plain and all(_is_foreign(field, references) for field in others):
@@ -75,7 +75,7 @@ def _operator(field: ir.Field, receiver: str, operator: str) -> str:
     return f"{receiver}.{slot} {operator} other.{slot}"
 
 
-def _compared(field: ir.Field, receiver: str, references: References) -> str | Group:
+def _compared(field: ir.Field, receiver: str) -> str | Group:
     """Return whether a field is equal.
 
     It is a call for possible arrays and expressions too long for a line.

@@ -20,7 +20,7 @@ from idlc.generate.python.lines import (
     tuple_of,
     wrapped,
 )
-from idlc.model import derive, ir, python_names
+from idlc.model import ir, python_names
 from idlc.model.ir import spell
 from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES

@@ -231,7 +231,7 @@ def _classes(
     interface: ir.Interface,
     structures: tuple[ir.Message, ...],
     references: References,
-    converts: bool,  # noqa: FBT001
+    converts: bool,
 ) -> ModuleView:
     name = interface.name
     purposes = fields.purposes(interface)
