@@ -39,8 +39,8 @@ from typing import Any, NamedTuple
 
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
-from . import c, callbacks, introspection
-from .callbacks import RefusedError
+from . import c, introspection
+from .c import RefusedError
 from .introspection import about
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
@@ -280,7 +280,7 @@ def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
     ]
     answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
     words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
-    return callbacks.machine_code(
+    return c.machine_code(
         "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
     )
 
@@ -303,7 +303,7 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
                 pass
         return decode_any(data)
 
-    return callbacks.taking(name, taken)
+    return c.taking(name, taken)
 
 
 def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
@@ -348,7 +348,7 @@ def _serializer() -> int:
             pass
         return False
 
-    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
 
 
 @cache
@@ -366,7 +366,7 @@ def _deserializer() -> int:
         except BaseException:
             return False
 
-    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
+    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
 
 
 @cache
@@ -377,7 +377,7 @@ def _size() -> int:
         except BaseException:
             return 0
 
-    return callbacks.callback(PYFUNCTYPE(c_size_t, py_object), size)
+    return c.callback(PYFUNCTYPE(c_size_t, py_object), size)
 
 
 @cache
@@ -389,7 +389,7 @@ def _unbounded() -> int:
             pass
         return 0
 
-    return callbacks.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
+    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
 
 
 class _Callbacks(ctypes.Structure):

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..on_demand import typeinfo
-from . import c, callbacks
+from . import c
 from .abi import abi
 
 NESTED = 1
@@ -372,7 +372,7 @@ def elements(size: int, content: int) -> MemoryFunctions:
 def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
     """Return new functions; they live as long as the process."""
     allocate, deallocate = allocator()
-    addresses = callbacks.machine_code(
+    addresses = c.machine_code(
         "structs",
         {
             "allocate": allocate,

@@ -20,7 +20,7 @@ from ctypes import (
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from . import c, callbacks, introspection
+from . import c, introspection
 from .introspection import about
 
 
@@ -90,9 +90,9 @@ def event(cls: Any, handle: int) -> Event:
         try:
             if memory:
                 events.destroy(memory)
-            if callbacks.interrupted(failure):
+            if c.interrupted(failure):
                 return create(info, _, request, response)
-            callbacks.report("a service event was not sent", failure)
+            c.report("a service event was not sent", failure)
         except BaseException:  # noqa: S110
             pass
         return 0
@@ -105,7 +105,7 @@ def event(cls: Any, handle: int) -> Event:
         else:
             return True
         try:  # noqa: SIM105 (a context manager would be called outside of it)
-            callbacks.interrupted(failure)
+            c.interrupted(failure)
         except BaseException:  # noqa: S110
             pass
         return True
@@ -113,10 +113,8 @@ def event(cls: Any, handle: int) -> Event:
     info = ctypes.POINTER(_EventInfo)
     return Event(
         handle,
-        callbacks.callback(
-            PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create
-        ),
-        callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, c_void_p), destroy),
+        c.callback(PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create),
+        c.callback(PYFUNCTYPE(c_bool, c_void_p, c_void_p), destroy),
     )
 
 

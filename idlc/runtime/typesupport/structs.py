@@ -22,8 +22,8 @@ from typing import Any, NamedTuple, Protocol
 
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
-from . import c, callbacks, introspection
-from .callbacks import RefusedError
+from . import c, introspection
+from .c import RefusedError
 from .introspection import (
     ARRAY,
     NESTED,
@@ -296,7 +296,7 @@ def _converter(cls: Any, name: str) -> object:
 
     methods = {
         "__setitem__": staticmethod(store),
-        "__getitem__": staticmethod(callbacks.taking(name, fetch)),
+        "__getitem__": staticmethod(c.taking(name, fetch)),
     }
     return type("Converter", (), methods)()
 

@@ -178,8 +178,8 @@ def garbage_is_dropped():
 
 def without_machine_code(name):
     """Do something where there is no machine code, which Fast DDS can do without."""
-    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
-    callbacks.CODE, callbacks._executable = {}, None  # to call this would be an error
+    c = importlib.import_module("std_msgs._idlc.typesupport.c")
+    c.CODE, c._executable = {}, None  # to call this would be an error
     globals()[name]()
 
 
@@ -456,13 +456,13 @@ def says_what_to_do(case):
     utilities = importlib.import_module("rclpy.utilities")
     fastrtps = importlib.import_module("std_msgs._idlc.typesupport.fastrtps")
     introspection = importlib.import_module("std_msgs._idlc.typesupport.introspection")
-    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
+    c = importlib.import_module("std_msgs._idlc.typesupport.c")
     if case in {"machine", "memory"}:
         utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
     if case == "machine":
-        callbacks.CODE = {}
+        c.CODE = {}
     elif case == "memory":
-        callbacks._MAP_PRIVATE = 0  # the system refuses this, too
+        c._MAP_PRIVATE = 0  # the system refuses this, too
     elif case == "middleware":
         utilities.get_rmw_implementation_identifier = lambda: "rmw_connextdds"
     elif case == "layout":
