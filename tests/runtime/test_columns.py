@@ -191,7 +191,7 @@ def test_many_messages_of_a_few_layouts(folder, error, name):
     for wrong in (0, 150):
         broken = [*raws[:wrong], raws[wrong][:9], *raws[wrong + 1 :]]
         with pytest.raises(error, match=rf"^\[{wrong}\]"):
-            cls.to_columns(batch_of(cls, broken, rng))
+            cls.to_columns(batch_of(broken, rng))
 
 
 def test_one_long_sequence_among_short_ones(msg):
@@ -314,7 +314,7 @@ def test_a_file_in_memory_is_read_in_place(msg, tmp_path):
 def test_columns_share_nothing_with_the_buffers(msg, count):
     for cls in (msg.Point, msg.Image, msg.Deep):
         raws = cls.serialize_many(messages_of(cls, random.Random(1), count, 9)) * 2
-        batch = batch_of(cls, raws, random.Random(1))
+        batch = batch_of(raws, random.Random(1))
         memory = batch.buffer
         for ragged in (True, None):
             columns = cls.to_columns(batch, ragged=ragged)
@@ -380,7 +380,7 @@ def test_the_verdict_is_that_of_deserialize(folder, error, name):
             wanted = (where, caught.problem, caught.offset)
             for read in (cls.to_columns, cls.to_arrow):
                 with pytest.raises(error) as found:
-                    read(batch_of(cls, raws, rng))
+                    read(batch_of(raws, rng))
                 assert (found.value.path, found.value.problem, found.value.offset) == wanted
         else:
             check(cls, raws, rng)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..typeinfo import FieldInfo, fields_of, type_name, types
-from . import table_of
-from .plan import Instant, Lists, Node, Numbers, Strings, Struct
-from .table import columns_of
+from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct
+from idlc.recordings.columns.read import table_of
+from idlc.recordings.columns.table import columns_of
+from idlc.runtime.on_demand.typeinfo import FieldInfo, fields_of, type_name, types
 
 #: Between a definition and those that it refers to.
 SEPARATOR = "=" * 80
@@ -31,8 +31,7 @@ def to_arrow(
         import pyarrow  # type: ignore[import-untyped,unused-ignore]
     except ImportError as error:
         raise ImportError(
-            f"to_arrow needs pyarrow, which cannot be imported ({error}): "
-            f"pip install pyarrow",
+            f"to_arrow needs pyarrow, which cannot be imported ({error}): pip install pyarrow",
             name="pyarrow",
         ) from error
     table, top = table_of(kind, messages, fields, datetimes)
@@ -68,9 +67,7 @@ def _flattened(pa: Any, struct: Any) -> Any:
 
 
 def _struct(pa: Any, names: list[str], arrays: list[Any], count: int) -> Any:
-    fields = [
-        pa.field(name, array.type) for name, array in zip(names, arrays, strict=True)
-    ]
+    fields = [pa.field(name, array.type) for name, array in zip(names, arrays, strict=True)]
     return pa.Array.from_buffers(pa.struct(fields), count, [None], children=arrays)
 
 
@@ -119,9 +116,7 @@ class _Arrays:
     def struct(self, node: Node, column: Any) -> Any:
         """Return the array of Columns."""
         assert isinstance(node, Struct)
-        arrays = [
-            self.array(inner, column[name]) for name, inner in node.fields.items()
-        ]
+        arrays = [self.array(inner, column[name]) for name, inner in node.fields.items()]
         return _struct(self.pa, list(node.fields), arrays, len(column))
 
     def lists(self, node: Lists, column: Any) -> Any:
@@ -152,8 +147,7 @@ def definition_of(name: str) -> str:
         needed += [other for other in dict.fromkeys(nested) if other not in needed]
     parts = [_message_text(name)]
     parts += [
-        f"{SEPARATOR}\nMSG: {_short_name(other)}\n{_message_text(other)}"
-        for other in needed[1:]
+        f"{SEPARATOR}\nMSG: {_short_name(other)}\n{_message_text(other)}" for other in needed[1:]
     ]
     return "".join(parts)
 
@@ -162,9 +156,7 @@ def _message_text(name: str) -> str:
     """Return a message file, or what its fields would be in one."""
     source = types()["sources"].get(name)
     if source is None or "/msg/" not in name:
-        source = "".join(
-            f"{_field_type(field)} {field.name}\n" for field in fields_of(name)
-        )
+        source = "".join(f"{_field_type(field)} {field.name}\n" for field in fields_of(name))
     return source if source.endswith("\n") else f"{source}\n"
 
 

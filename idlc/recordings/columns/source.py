@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .values import Texts
+from idlc.recordings.columns.values import Texts
 
 #: From this mean size on, ranges are copied one by one.
 LONG = 256
@@ -159,9 +159,7 @@ class Pieces:
             return self.heads.ranges(self.head_starts[rows] + inside, sizes, item)
         result = fresh(int(sizes.sum()))
         target, raws, at = memoryview(result), self.raws, 0
-        for row, start, size in zip(
-            rows.tolist(), inside.tolist(), sizes.tolist(), strict=True
-        ):
+        for row, start, size in zip(rows.tolist(), inside.tolist(), sizes.tolist(), strict=True):
             end = at + size
             target[at:end] = raws[row][start : start + size]
             at = end

@@ -6,9 +6,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .plan import Instant, Level, List, Lists, Node, Numbers, Segment, Strings, Struct
-from .scan import ScanResult, joined
-from .source import (
+from idlc.recordings.columns.plan import (
+    Instant,
+    Level,
+    List,
+    Lists,
+    Node,
+    Numbers,
+    Segment,
+    Strings,
+    Struct,
+)
+from idlc.recordings.columns.scan import ScanResult, joined
+from idlc.recordings.columns.source import (
     Place,
     Source,
     narrow_texts,
@@ -17,7 +27,7 @@ from .source import (
     wide_texts,
     without_zeros,
 )
-from .values import Columns, Ragged, Texts
+from idlc.recordings.columns.values import Columns, Ragged, Texts
 
 #: Texts take as much room as the longest of their column. So many bytes are always taken, and
 #: more only up to so many for each byte of the messages.
@@ -44,9 +54,7 @@ class Table:
     `order` is that of all messages; "<" if only some are big-endian.
     """
 
-    def __init__(
-        self, source: Source, size: int, order: str, scanned: ScanResult
-    ) -> None:
+    def __init__(self, source: Source, size: int, order: str, scanned: ScanResult) -> None:
         self.source = source
         self.size = size
         self.order = order
@@ -172,9 +180,7 @@ def columns_of(table: Table, top: Elements) -> Columns:
 class Reading:
     """Reads columns of the elements of one level, whose numbers are found already."""
 
-    def __init__(
-        self, table: Table, elements: Elements, numbers: dict[int, Any]
-    ) -> None:
+    def __init__(self, table: Table, elements: Elements, numbers: dict[int, Any]) -> None:
         self.table = table
         self.elements = elements
         self.numbers = numbers
@@ -192,9 +198,7 @@ class _Making(Reading):
     def column(self, node: Node, count: int, depth: int = 0) -> Any:
         """Return a column of `count` values, which are in arrays of so many dimensions."""
         if isinstance(node, Numbers):
-            numbers = self.table.native(
-                self.numbers[node.key], node.code, self.elements.big
-            )
+            numbers = self.table.native(self.numbers[node.key], node.code, self.elements.big)
             return numbers.reshape(count, *numbers.shape[1 + depth :])
         if isinstance(node, Strings):
             return self.table.texts(self.elements, node)
@@ -203,10 +207,7 @@ class _Making(Reading):
             return instants(node, *(self.column(part, count, depth) for part in parts))
         if isinstance(node, Lists):
             return self.lists(node, count, depth)
-        columns = {
-            name: self.column(inner, count, depth)
-            for name, inner in node.fields.items()
-        }
+        columns = {name: self.column(inner, count, depth) for name, inner in node.fields.items()}
         return Columns(columns, count)
 
     def lists(self, node: Lists, count: int, depth: int) -> Ragged:
@@ -273,9 +274,7 @@ class _Types:
             element = self.dtype(node.element, inside, path)
             return np.dtype((element, (count,)))
         if node.text.wide:
-            raise UnevenError(
-                f"{path} is a wstring, which no structured array can hold"
-            )
+            raise UnevenError(f"{path} is a wstring, which no structured array can hold")
         _, sizes = self.table.strings(elements, node)
         return np.dtype(f"S{max(1, int(sizes.max(initial=0)))}")
 
@@ -322,9 +321,7 @@ class _Filling(Reading):
     def value(self, node: Numbers | Instant) -> Any:
         """Return numbers or times, which may be in the buffer."""
         if isinstance(node, Instant):
-            return instants(
-                node, self.value(node.seconds), self.value(node.nanoseconds)
-            )
+            return instants(node, self.value(node.seconds), self.value(node.nanoseconds))
         numbers, big = self.numbers[node.key], self.elements.big
         if node.code == "?" or big is not None:
             return self.table.native(numbers, node.code, big)

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from ..typeinfo import FieldInfo, fields_of, least_element, spelling_hint
+from idlc.runtime.on_demand.typeinfo import FieldInfo, fields_of, least_element, spelling_hint
 
 
 class Leaf(NamedTuple):
@@ -178,9 +178,7 @@ def _selection(name: str, fields: tuple[str, ...]) -> dict[str, Any]:
         type_ = name
         *outer, last = field.split(".")
         for step in (*outer, last):
-            nested = (
-                {info.name: info.nested for info in fields_of(type_)} if type_ else {}
-            )
+            nested = {info.name: info.nested for info in fields_of(type_)} if type_ else {}
             if step not in nested:
                 hint = spelling_hint(step, list(nested))
                 raise ValueError(f"{name} has no field {field!r}{hint}")
@@ -261,9 +259,7 @@ class _Builder:
         self.add(text, 4 if field.wide else 1)
         return Strings(text)
 
-    def numbers(
-        self, field: FieldInfo, wanted: Wanted, size: int | None = None
-    ) -> Node:
+    def numbers(self, field: FieldInfo, wanted: Wanted, size: int | None = None) -> Node:
         """Plan a number, or an array of them."""
         assert field.primitive is not None
         width = field.primitive.size
@@ -283,9 +279,7 @@ class _Builder:
         segment, offset = self.place(element.align, size * element.size)
         for leaf in element.leaves:
             repeats = ((size, element.size), *leaf.repeats)
-            segment.leaves.append(
-                leaf._replace(offset=offset + leaf.offset, repeats=repeats)
-            )
+            segment.leaves.append(leaf._replace(offset=offset + leaf.offset, repeats=repeats))
 
     def place(self, align: int, size: int) -> tuple[Segment, int]:
         """Plan bytes of fixed size; return where they are."""

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from .plan import Level, List, Segment, Text
-from .source import Source, utf16_units
+from idlc.recordings.columns.plan import Level, List, Segment, Text
+from idlc.recordings.columns.source import Source, utf16_units
 
 
 class UnreadableError(Exception):
@@ -135,9 +135,7 @@ def joined(parts: list[Any]) -> Any:
     """Return parts as one array."""
     if len(parts) == 1:
         return np.asarray(parts[0], np.int64)
-    return np.concatenate(
-        [np.empty(0, np.int64), *(np.asarray(p, np.int64) for p in parts)]
-    )
+    return np.concatenate([np.empty(0, np.int64), *(np.asarray(p, np.int64) for p in parts)])
 
 
 class SequentialScan:
@@ -231,9 +229,7 @@ class SequentialScan:
         for index, step in enumerate(level.steps):
             if isinstance(step, Text) and step.key is not None:
                 tail(self.result.at[step.key]).extend(starts[index :: len(level.steps)])
-                tail(self.result.size[step.key]).extend(
-                    sizes[index :: len(level.steps)]
-                )
+                tail(self.result.size[step.key]).extend(sizes[index :: len(level.steps)])
         return self.advance(at, 0)
 
     def list(self, step: List, at: int, number: int) -> int:
@@ -302,10 +298,7 @@ class VectorScan:
         """Scan a string at each cursor."""
         size = self.number(cursors)
         start = cursors.advance(size * 4 if step.wide else size)
-        if (
-            step.wide
-            and (utf16_units(self.source, start, size, self.order) >> 16).any()
-        ):
+        if step.wide and (utf16_units(self.source, start, size, self.order) >> 16).any():
             raise UnreadableError
         if step.key is not None:
             self.result.at[step.key].append(start)
@@ -330,9 +323,7 @@ class VectorScan:
         else:
             self.varied(step.level, cursors, counts, first)
 
-    def packed(
-        self, step: List, packed: Segment, cursors: Cursors, counts: Any
-    ) -> None:
+    def packed(self, step: List, packed: Segment, cursors: Cursors, counts: Any) -> None:
         """Scan elements without gaps."""
         before = cursors.at
         cursors.align(packed.align)
@@ -361,9 +352,7 @@ class VectorScan:
             self.sequential.enter(self.source, rest, row)
             elements = range(index, -int(descending[row]))
             at = int(rest.at[row])
-            rest.at[row] = self.sequential.repeat(
-                level, at, first + int(order[row]), elements
-            )
+            rest.at[row] = self.sequential.repeat(level, at, first + int(order[row]), elements)
         cursors.at = cursors.at.copy()
         cursors.at[order] = rest.at
 
@@ -423,9 +412,7 @@ def _replicate(plan: Level, first: ScanResult, starts: Any, result: ScanResult) 
         result.size[key].append(np.tile(joined(parts), repeats))
     for level, around in _levels(plan):
         if level.key in first.parent:
-            number = (
-                result.count[around.key] + np.arange(repeats) * first.count[around.key]
-            )
+            number = result.count[around.key] + np.arange(repeats) * first.count[around.key]
             parents = number[:, None] + joined(first.parent[level.key])
             result.parent[level.key].append(parents.ravel())
             index = joined(first.index[level.key])

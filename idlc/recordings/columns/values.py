@@ -1,4 +1,4 @@
-"""Columns of serialized messages, and batches of the messages they are made from."""
+"""Columns of serialized messages."""
 
 from __future__ import annotations
 
@@ -7,27 +7,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-
-
-class Batch:
-    """Serialized messages in one buffer, from `starts` to `stops`.
-
-    The buffer is anything that has bytes: a memory-mapped file, for example, which is then
-    read in place. A batch is also an iterable of views of the messages.
-    """
-
-    def __init__(self, buffer: Any, starts: Any, stops: Any) -> None:
-        self.buffer = buffer
-        self.starts = starts
-        self.stops = stops
-
-    def __len__(self) -> int:
-        return len(self.starts)
-
-    def __iter__(self) -> Iterator[memoryview]:
-        view = memoryview(self.buffer).cast("B")
-        for start, stop in zip(self.starts, self.stops, strict=True):
-            yield view[int(start) : int(stop)]
 
 
 class Column:
@@ -138,9 +117,7 @@ class Ragged(_Sliced):
             raise TypeError("only numbers can be stacked")
         other = np.flatnonzero(sizes != sizes[:1])
         if len(other):
-            raise ValueError(
-                f"[{other[0]}] has {sizes[other[0]]} elements and [0] has {sizes[0]}"
-            )
+            raise ValueError(f"[{other[0]}] has {sizes[other[0]]} elements and [0] has {sizes[0]}")
         size = int(sizes[0]) if len(sizes) else 0
         return values.reshape(len(self), size, *values.shape[1:])
 

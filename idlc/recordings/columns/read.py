@@ -1,27 +1,26 @@
-"""Many serialized messages of one type as columns, without making messages.
-
-`to_columns` and `table_of` read them; `values.py` has the types that are passed in and returned.
-In between, `plan.py` makes the plan of a type, `scan.py` locates every field by it, and
-`table.py` makes columns and structured arrays. `arrow.py` makes tables of Arrow.
-"""
+"""Reading the columns of many messages, and saying which message cannot be read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib import import_module
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from ...errors import DecodeError
-from ..batches import failed
-from ..typeinfo import check_buffer, type_name
-from .plan import Level, plan_of
-from .scan import Cursors, ScanResult, UnreadableError, VectorScan, scan_uniform
-from .source import Flat, Pieces, Source
-from .table import Elements, Table, UnevenError, columns_of, structured
-from .values import Batch, Columns, Ragged, Texts
-
-__all__ = ["Batch", "Columns", "Ragged", "Texts", "table_of", "to_columns"]
+from idlc.recordings.columns.plan import Level, plan_of
+from idlc.recordings.columns.scan import (
+    Cursors,
+    ScanResult,
+    UnreadableError,
+    VectorScan,
+    scan_uniform,
+)
+from idlc.recordings.columns.source import Flat, Pieces, Source
+from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
+from idlc.runtime.errors import DecodeError
+from idlc.runtime.objects import owner_of
+from idlc.runtime.on_demand.typeinfo import check_buffer, type_name
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -36,15 +35,11 @@ class Messages(NamedTuple):
 
     def part(self, first: int, last: int) -> Messages:
         """Return some of the messages."""
-        return self._replace(
-            starts=self.starts[first:last], stops=self.stops[first:last]
-        )
+        return self._replace(starts=self.starts[first:last], stops=self.stops[first:last])
 
     def raw(self, index: int) -> bytes:
         """Return one message."""
-        start, stop = (
-            np.array([int(positions[index])]) for positions in (self.starts, self.stops)
-        )
+        start, stop = (np.array([int(positions[index])]) for positions in (self.starts, self.stops))
         return bytes(self.source.ranges(start, stop - start))
 
 
@@ -52,9 +47,7 @@ def messages_of(messages: Any) -> Messages:
     """Return the messages of a batch, or of an iterable; small ones of that are copied."""
     if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
         return _of_batch(messages)
-    raws = [
-        raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages
-    ]
+    raws = [raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages]
     sizes = np.fromiter(map(len, raws), np.int64, len(raws))
     stops = np.cumsum(sizes)
     starts = stops - sizes
@@ -106,7 +99,7 @@ def table_of(
     try:
         return _read(plan, all_of_them)
     except UnreadableError:
-        explain(name, plan, all_of_them)
+        explain(kind, plan, all_of_them)
 
 
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
@@ -144,8 +137,8 @@ def big_endian(messages: Messages) -> Any:
     return second == 0
 
 
-def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
-    """Raise DecodeError for the first message that is not of a type."""
+def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
+    """Raise the DecodeError of a class's package for the first message that is not one of it."""
     first, last = 0, len(messages.starts)
     while last - first > 1:  # the first one that cannot be read is in between
         middle = (first + last) // 2
@@ -155,7 +148,14 @@ def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check_buffer(name, messages.raw(first))
+        check_buffer(type_name(kind), messages.raw(first))
     except DecodeError as error:
-        failed(error, first)
+        path = f"[{first}].{error.path}" if error.path else f"[{first}]"
+        raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error
     raise AssertionError(f"[{first}] can be read by itself")
+
+
+def _runtime_of(kind: Any) -> Any:
+    """Return the runtime package that a message class comes from: carried, or installed."""
+    base = owner_of(kind).__base__
+    return import_module(base.__module__.rpartition(".")[0])
