@@ -20,7 +20,7 @@ from idlc.recordings.columns.source import Flat, Pieces, Source
 from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
 from idlc.runtime.errors import DecodeError
 from idlc.runtime.objects import owner_of
-from idlc.runtime.on_demand.typeinfo import check_buffer, type_name
+from idlc.runtime.on_demand.typeinfo import check_buffer, structure_of
 
 #: From this mean size on, messages are not copied into one array.
 LARGE = 1 << 15
@@ -92,9 +92,9 @@ def table_of(
     kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> tuple[Table, Elements]:
     """Return what is in messages, and the rows of the table; raise DecodeError."""
-    name = type_name(kind)
+    structure = structure_of(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(name, None if wanted is None else tuple(wanted), datetimes)
+    plan = plan_of(structure, None if wanted is None else tuple(wanted), datetimes)
     all_of_them = messages_of(messages)
     try:
         return _read(plan, all_of_them)
@@ -148,7 +148,7 @@ def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check_buffer(type_name(kind), messages.raw(first))
+        check_buffer(structure_of(kind), messages.raw(first))
     except DecodeError as error:
         path = f"[{first}].{error.path}" if error.path else f"[{first}]"
         raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error
