@@ -200,7 +200,7 @@ def recover(kind: type, buffer: Any, failure: Exception) -> Any:
     """Return the message after all, if a middleware would; raise DecodeError otherwise."""
     if isinstance(failure, DecodeError):
         raise failure
-    from .on_demand.typeinfo import read_carefully
+    from .typeinfo import read_carefully
 
     data = bytes(buffer)
     return read_carefully(kind, data, maker)
@@ -210,7 +210,7 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .on_demand.typeinfo import validate
+    from .typeinfo import validate
 
     try:
         validate(message, wire_only=True)

@@ -63,21 +63,21 @@ class OnDemand:
 
 def slot_types(kind: type) -> tuple[Any, ...]:
     """Return SLOT_TYPES of a message class."""
-    from .on_demand import typeinfo
+    from . import typeinfo
 
     return typeinfo.slot_types(kind)
 
 
 def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
     """Return `__dataclass_fields__` of a message class."""
-    from .on_demand import conversions
+    from . import conversions
 
     return conversions.dataclass_fields(kind)
 
 
 def dataclass_params(_kind: type) -> Any:
     """Return `__dataclass_params__` of a message class."""
-    from .on_demand import conversions
+    from . import conversions
 
     return conversions.dataclass_params()
 
@@ -281,7 +281,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .on_demand.typeinfo import validate
+        from .typeinfo import validate
 
         validate(self)
 
@@ -290,7 +290,7 @@ class Message(metaclass=MessageMeta):
 
         Nested messages become dictionaries, arrays lists, and bytes integers.
         """
-        from .on_demand.conversions import to_dict
+        from .conversions import to_dict
 
         return to_dict(self)
 
@@ -300,7 +300,7 @@ class Message(metaclass=MessageMeta):
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
         """
-        from .on_demand.conversions import from_dict
+        from .conversions import from_dict
 
         message: typing_extensions.Self = from_dict(cls, values)
         return message
@@ -330,7 +330,7 @@ class Message(metaclass=MessageMeta):
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a message."""
-        from .on_demand.conversions import message_schema
+        from .conversions import message_schema
 
         return message_schema(cls, handler(source), handler)
 

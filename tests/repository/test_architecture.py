@@ -56,7 +56,7 @@ PRINTS = {
 #: functions: none of it is needed until rclpy, or a tool of ROS 2, asks.
 RUNTIME_ON_DEMAND = {"numpy", "pyarrow", "rclpy", "rosidl_parser"}
 #: The runtime modules that import numpy at once, and that no other imports at once.
-NUMPY_AT_ONCE = ("idlc.runtime.arrays", "idlc.runtime.on_demand.columns")
+NUMPY_AT_ONCE = ("idlc.runtime.arrays",)
 
 
 def name_of(path: Path) -> str:

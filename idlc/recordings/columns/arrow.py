@@ -10,7 +10,7 @@ import numpy as np
 from idlc.recordings.columns.plan import Instant, Lists, Node, Numbers, Strings, Struct
 from idlc.recordings.columns.read import table_of
 from idlc.recordings.columns.table import columns_of
-from idlc.runtime.on_demand.typeinfo import FieldInfo, Structure, structure_of
+from idlc.runtime.typeinfo import FieldInfo, Structure, structure_of
 
 #: Between a definition and those that it refers to.
 SEPARATOR = "=" * 80

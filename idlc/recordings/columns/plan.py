@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from idlc.runtime.on_demand.typeinfo import FieldInfo, Structure, least_element, spelling_hint
+from idlc.runtime.typeinfo import FieldInfo, Structure, least_element, spelling_hint
 
 
 class Leaf(NamedTuple):

@@ -45,7 +45,7 @@ def rosidls(name):
 def support_of(name):
     cls = interface_of(name)
     package = cls.__module__.split(".")[0]
-    structs = importlib.import_module(f"{package}._idlc.typesupport.structs")
+    structs = importlib.import_module(f"{package}._idlc.structs")
     return structs.message(cls, name)
 
 

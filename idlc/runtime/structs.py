@@ -20,11 +20,10 @@ from functools import cache
 from struct import Struct
 from typing import Any, NamedTuple, Protocol
 
-from ..cdr import HEADERS, NATIVE
-from ..codec import encode_error, functions
-from ..on_demand.typeinfo import Structure
 from . import c, introspection
 from .c import RefusedError
+from .cdr import HEADERS, NATIVE
+from .codec import encode_error, functions
 from .introspection import (
     ARRAY,
     SCALAR,
@@ -34,6 +33,7 @@ from .introspection import (
     element_type,
     placed_fields,
 )
+from .typeinfo import Structure
 
 _HEADER = 4
 _COUNT = Struct("=I")

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from ..errors import ValidationError
-from ..names import slot_name
-from ..objects import owner_of
+from .errors import ValidationError
+from .names import slot_name
+from .objects import owner_of
 from .typeinfo import (
     FieldInfo,
     Structure,

@@ -17,15 +17,15 @@ from struct import Struct
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from ..cdr import NATIVE, order_of
-from ..errors import (
+from .cdr import NATIVE, order_of
+from .errors import (
     DecodeError,
     FieldRangeError,
     FieldTypeError,
     ValidationError,
     importing,
 )
-from ..names import public_name, slot_name, wire_name
+from .names import public_name, slot_name, wire_name
 
 
 class Primitive(NamedTuple):

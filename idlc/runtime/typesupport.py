@@ -15,6 +15,16 @@ from __future__ import annotations
 import ctypes
 import re
 import sys
+from ctypes import (
+    PYFUNCTYPE,
+    c_bool,
+    c_int32,
+    c_int64,
+    c_uint8,
+    c_uint32,
+    c_void_p,
+    py_object,
+)
 from functools import cache
 from importlib import import_module
 from importlib.machinery import PathFinder
@@ -22,9 +32,9 @@ from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from ..on_demand.typeinfo import Structure, structure_of
-from . import c, services
-from .abi import has_hashes
+from . import c, introspection
+from .introspection import has_hashes
+from .typeinfo import Structure, structure_of
 
 #: Middlewares that take encoded messages through Fast DDS's type support.
 _OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
@@ -217,11 +227,20 @@ def import_service(cls: Any) -> None:
     if built:
         _set_capsules(cls, {_SUPPORT: built.service()})
         return
-    event = services.event(cls, happened) if happened else services.Event()
-    support = services.service(
-        structure_of(cls), request, response, event, _implementation()
+    structure = structure_of(cls)
+    identifier, data = _implementation().service(
+        structure.name, request, response, happened
     )
-    _set_capsules(cls, {_SUPPORT: c.capsule(support)})
+    support = c.ServiceTypeSupport(
+        identifier,
+        data,
+        introspection.library().same_service,
+        request,
+        response,
+        *(_event(cls, happened) if happened else _Event()),
+        introspection.about(structure),
+    )
+    _set_capsules(cls, {_SUPPORT: c.capsule(c.pointer(support))})
 
 
 def import_action(cls: Any) -> None:
@@ -231,15 +250,117 @@ def import_action(cls: Any) -> None:
     """
     parts = cls.Impl
     _handle(import_module("action_msgs.msg").GoalInfo)
-    its_services = (
-        _handle(parts.SendGoalService),
-        _handle(parts.GetResultService),
-        _handle(parts.CancelGoalService),
-    )
-    messages = (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage))
+    handles = [
+        _handle(part)
+        for part in (
+            parts.SendGoalService,
+            parts.GetResultService,
+            parts.CancelGoalService,
+            parts.FeedbackMessage,
+            parts.GoalStatusMessage,
+        )
+    ]
     built = _extension(cls, structure_of(cls))
     if built:
         _set_capsules(cls, {_SUPPORT: built.action()})
         return
-    support = services.action(structure_of(cls), its_services, messages)
-    _set_capsules(cls, {_SUPPORT: c.capsule(support)})
+    about = introspection.about(structure_of(cls))
+    support = c.ActionTypeSupport(*handles, about)
+    _set_capsules(cls, {_SUPPORT: c.capsule(c.pointer(support))})
+
+
+# events of service introspection
+
+
+class _EventInfo(ctypes.Structure):
+    """`rosidl_service_introspection_info_t`."""
+
+    _fields_ = (
+        ("event_type", c_uint8),
+        ("sec", c_int32),
+        ("nanosec", c_uint32),
+        ("client_gid", c_uint8 * 16),
+        ("sequence_number", c_int64),
+    )
+
+
+class _Event(NamedTuple):
+    """The event part of a service's type support: all NULL where event messages cannot be had."""
+
+    handle: int = 0
+    create: int = 0
+    destroy: int = 0
+
+
+class _Memory:
+    """The functions of message memory that a class's metaclass has for rclpy."""
+
+    def __init__(self, cls: type) -> None:
+        def function(name: str, *prototype: Any) -> Any:
+            capsule = getattr(type(cls), name)
+            return PYFUNCTYPE(*prototype)(c.capsule_pointer(capsule))
+
+        self.create = function("_CREATE_ROS_MESSAGE", c_void_p)
+        self.destroy = function("_DESTROY_ROS_MESSAGE", None, c_void_p)
+        self.store = function("_CONVERT_FROM_PY", c_bool, py_object, c_void_p)
+        self.fetch = function("_CONVERT_TO_PY", py_object, c_void_p)
+
+    def messages(self, memory: int | None) -> list[object]:
+        """Return the message in some memory, as events hold it; NULL is no message."""
+        return [] if memory is None else [self.fetch(memory)]
+
+
+def _event(cls: Any, handle: int) -> _Event:
+    """Return how rcl makes and frees messages of a service's Event class.
+
+    Both functions are needed as soon as there is a handle: rcl does not check for NULL.
+    """
+    requests, responses, events = map(_Memory, (cls.Request, cls.Response, cls.Event))
+
+    def create(info: Any, _: int, request: int | None, response: int | None) -> int:
+        memory = 0
+        try:
+            event_info = info.contents
+            message = cls.Event(
+                request=requests.messages(request),
+                response=responses.messages(response),
+            )
+            message.info.event_type = event_info.event_type
+            message.info.stamp.sec = event_info.sec
+            message.info.stamp.nanosec = event_info.nanosec
+            message.info.client_gid = list(event_info.client_gid)
+            message.info.sequence_number = event_info.sequence_number
+            memory = int(events.create())
+            events.store(message, memory)
+            return memory
+        except BaseException as error:
+            failure = error
+        try:
+            if memory:
+                events.destroy(memory)
+            if c.interrupted(failure):
+                return create(info, _, request, response)
+            c.report("a service event was not sent", failure)
+        except BaseException:  # noqa: S110
+            pass
+        return 0
+
+    def destroy(memory: int, _: int) -> bool:
+        try:
+            events.destroy(memory)
+        except BaseException as error:
+            failure = error
+        else:
+            return True
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            c.interrupted(failure)
+        except BaseException:  # noqa: S110
+            pass
+        return True
+
+    info = ctypes.POINTER(_EventInfo)
+    return _Event(
+        handle,
+        c.callback(PYFUNCTYPE(c_void_p, info, c_void_p, c_void_p, c_void_p), create),
+        c.callback(PYFUNCTYPE(c_bool, c_void_p, c_void_p), destroy),
+    )

@@ -37,12 +37,12 @@ from functools import cache
 from struct import pack
 from typing import Any, NamedTuple
 
-from ..cdr import HEADERS, NATIVE
-from ..codec import encode_error, functions
-from ..on_demand.typeinfo import Structure
-from . import c, callbacks, introspection
-from .callbacks import RefusedError
+from . import c, introspection
+from .c import RefusedError
+from .cdr import HEADERS, NATIVE
+from .codec import encode_error, functions
 from .introspection import about
+from .typeinfo import Structure
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
@@ -281,7 +281,7 @@ def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
     ]
     answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
     words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
-    return callbacks.machine_code(
+    return c.machine_code(
         "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
     )
 
@@ -304,7 +304,7 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
                 pass
         return decode_any(data)
 
-    return callbacks.taking(name, taken)
+    return c.taking(name, taken)
 
 
 def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
@@ -349,7 +349,7 @@ def _serializer() -> int:
             pass
         return False
 
-    return callbacks.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
 
 
 @cache
@@ -367,7 +367,7 @@ def _deserializer() -> int:
         except BaseException:
             return False
 
-    return callbacks.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
+    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
 
 
 @cache
@@ -378,7 +378,7 @@ def _size() -> int:
         except BaseException:
             return 0
 
-    return callbacks.callback(PYFUNCTYPE(c_size_t, py_object), size)
+    return c.callback(PYFUNCTYPE(c_size_t, py_object), size)
 
 
 @cache
@@ -390,7 +390,7 @@ def _unbounded() -> int:
             pass
         return 0
 
-    return callbacks.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
+    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
 
 
 class _Callbacks(ctypes.Structure):

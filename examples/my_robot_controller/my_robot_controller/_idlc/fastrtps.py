@@ -37,12 +37,12 @@ from functools import cache
 from struct import pack
 from typing import Any, NamedTuple
 
-from ..cdr import HEADERS, NATIVE
-from ..codec import encode_error, functions
-from ..on_demand.typeinfo import Structure
 from . import c, introspection
 from .c import RefusedError
+from .cdr import HEADERS, NATIVE
+from .codec import encode_error, functions
 from .introspection import about
+from .typeinfo import Structure
 
 IDENTIFIER = "rosidl_typesupport_fastrtps_c"
 
