@@ -6,7 +6,7 @@ Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made h
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypedDict
@@ -25,20 +25,21 @@ from idlc.generate.python.positions import Tables
 from idlc.model import derive, ir, link, python_names
 from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
-from idlc.project.templates import RenderedFile, environment
+from idlc.project.templates import Code, RenderedFile, Text
+from idlc.project.templates import code as code_environment
 from idlc.wire import plan
 
 
 class CodecView(msgspec.Struct, frozen=True):
     """The codec of a message class: all but the names are finished lines, indented."""
 
-    name: str
-    function: str
-    imports: tuple[str, ...]
-    outside: tuple[str, ...]
-    constants: tuple[str, ...]
-    encode: tuple[str, ...]
-    decode: tuple[str, ...]
+    name: Code
+    function: Code
+    imports: tuple[Code, ...]
+    outside: tuple[Code, ...]
+    constants: tuple[Code, ...]
+    encode: tuple[Code, ...]
+    decode: tuple[Code, ...]
     is_bulk: bool
 
 
@@ -61,15 +62,19 @@ def codec(structure: ir.Message, references: References, messages: plan.Messages
     if any("_arrays." in line for line in constants):
         inside.insert(0, "    from .._idlc import arrays as _arrays")
     return CodecView(
-        name=references.name(structure.name),
-        function=f"{snake_case(structure.name.name).replace('__', '_')}_codec",
-        imports=tuple(inside),
-        outside=tuple(outside),
-        constants=constants,
-        encode=tuple(writing),
-        decode=tuple(reading),
+        name=Code(references.name(structure.name)),
+        function=Code(f"{snake_case(structure.name.name).replace('__', '_')}_codec"),
+        imports=_code(inside),
+        outside=_code(outside),
+        constants=_code(constants),
+        encode=_code(writing),
+        decode=_code(reading),
         is_bulk=bulk,
     )
+
+
+def _code(lines: Iterable[str]) -> tuple[Code, ...]:
+    return tuple(map(Code, lines))
 
 
 def _makers(
@@ -168,24 +173,30 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     `protocol` is the module of what ROS 2 adds to the service or action.
     """
 
-    template: str
-    path: str
-    origin: str
-    pragmas: tuple[str, ...]
-    title: str
-    imports: tuple[str, ...] = ()
+    origin: Text
+    pragmas: tuple[Code, ...]
+    title: Text
+    imports: tuple[Code, ...] = ()
     messages: tuple[MessageView, ...] = ()
     codecs: tuple[CodecView, ...] = ()
     services: tuple[GroupView, ...] = ()
     action: GroupView | None = None
-    protocol: str = ""
+    protocol: Code = Code("")
+
+
+class Module(NamedTuple):
+    """A module to write: the name of its template, its path, and what it shows."""
+
+    template: str
+    path: str
+    view: ModuleView
 
 
 PRAGMAS = (
-    '# mypy: disable-error-code="import-not-found,import-untyped"',
-    "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
+    Code('# mypy: disable-error-code="import-not-found,import-untyped"'),
+    Code("# pyright: reportMissingImports=false, reportMissingTypeStubs=false"),
 )
-HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
+HIDING_PRAGMAS = (Code("# pyright: reportIncompatibleMethodOverride=false"),)
 
 
 class _ModulePart(NamedTuple):
@@ -206,7 +217,7 @@ def module_views(
     parent: str = "",
     *,
     converts: bool = False,
-) -> Iterator[ModuleView]:
+) -> Iterator[Module]:
     """Yield the views of an interface's modules; `names` has the modules of all its package.
 
     With `converts`, classes convert values as Lyrical's do.
@@ -223,22 +234,20 @@ def module_views(
             yield _codecs(part, messages)
 
 
-def _classes(part: _ModulePart, homes: Homes) -> ModuleView:
+def _classes(part: _ModulePart, homes: Homes) -> Module:
     interface, references = part.interface, part.references
     name = interface.name
     purposes = fields.purposes(interface)
     is_action = isinstance(interface, ir.Action)
     file = f"{name.kind}/{name.name}.{name.kind}"
-    return ModuleView(
-        template="protocol" if part.is_added else name.kind,
-        path=f"{name.kind}/{part.module}.py",
-        origin=f"{name}.{name.kind}",
+    view = ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
         pragmas=(
             *(PRAGMAS if references.others else ()),
             *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
         ),
-        title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
-        imports=tuple(_imports(references, part.structures)),
+        title=Text(f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}."),
+        imports=_code(_imports(references, part.structures)),
         messages=tuple(
             classes.message(structure, references, purposes, file, converts=part.converts)
             for structure in part.structures
@@ -246,21 +255,21 @@ def _classes(part: _ModulePart, homes: Homes) -> ModuleView:
         # a service's own class is its author's; those of an action's services are not
         services=classes.services(interface, purposes) if part.is_added == is_action else (),
         action=classes.action(interface) if isinstance(interface, ir.Action) else None,
-        protocol=homes.protocol,
+        protocol=Code(homes.protocol),
     )
+    return Module("protocol" if part.is_added else name.kind, f"{name.kind}/{part.module}.py", view)
 
 
-def _codecs(part: _ModulePart, messages: plan.Messages) -> ModuleView:
+def _codecs(part: _ModulePart, messages: plan.Messages) -> Module:
     name = part.interface.name
     codecs = tuple(codec(structure, part.references, messages) for structure in part.structures)
-    return ModuleView(
-        template="codec",
-        path=f"{name.kind}/{python_names.codec_module(part.module)}.py",
-        origin=f"{name}.{name.kind}",
-        pragmas=PRAGMAS if any(view.outside for view in codecs) else (),
-        title=f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}.",
+    view = ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
+        pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
+        title=Text(f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}."),
         codecs=codecs,
     )
+    return Module("codec", f"{name.kind}/{python_names.codec_module(part.module)}.py", view)
 
 
 def _hides_methods(structure: ir.Message) -> bool:
@@ -293,7 +302,7 @@ PACKAGE = Path(__file__).parents[2]
 
 @cache
 def _template(name: str) -> jinja2.Template:
-    return environment().get_template(name)
+    return code_environment().get_template(name)
 
 
 @cache
@@ -320,7 +329,7 @@ def module_files(
     converts = model.distro.converts_values
     for module in module_views(interface, model.messages, modules, parent, converts=converts):
         template = _template(f"message/{module.template}.py.jinja")
-        yield RenderedFile(module.path, template.render(module=module))
+        yield RenderedFile(module.path, template.render(module=module.view))
 
 
 def render_package(model: link.Model, parent: str = "") -> tuple[RenderedFile, ...]:
@@ -334,7 +343,7 @@ def render_package(model: link.Model, parent: str = "") -> tuple[RenderedFile, .
     for kind in sorted({interface.name.kind for interface in model.own}):
         page = imports.package(model, kind, modules)
         text = _template("message/package_init.py.jinja").render(package=page)
-        files.append(RenderedFile(page.path, text))
+        files.append(RenderedFile(f"{kind}/__init__.py", text))
     files.append(RenderedFile("_type_data.py", type_data_source(model, parent)))
     # a package without it would lose to any other of its name, wherever that stands on the path
     files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))

@@ -89,7 +89,9 @@ def nothing_is_loaded_before_rclpy_asks():
     """The classes alone load neither ctypes nor the data of types."""
     assert "ctypes" not in sys.modules or "std_msgs._idlc.typesupport" not in sys.modules
     String("text").serialize()
-    waiting = {f"std_msgs._idlc.{name}" for name in ("c", "introspection", "typeinfo", "typesupport")}
+    waiting = {
+        f"std_msgs._idlc.{name}" for name in ("c", "introspection", "typeinfo", "typesupport")
+    }
     assert not waiting & set(sys.modules)
     assert type(String)._TYPE_SUPPORT is None
     serialize_message(String("text"))
