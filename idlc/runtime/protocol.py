@@ -17,7 +17,7 @@ from types import FunctionType
 
 from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
-from .errors import MissingPackageError, importing
+from .errors import importing
 from .message import InterfaceMeta, Message, OnDemand, dataclass, metaclass_of
 from .names import public_name, wire_name
 from .objects import owner_of, same
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from unique_identifier_msgs.msg import UUID
 
     from .hints import Options, Unpack
-    from .on_demand.typeinfo import FieldInfo, Structure, Types
+    from .typeinfo import FieldInfo, Structure, Types
 
     Goal = TypeVar("Goal")
     Result = TypeVar("Result")
@@ -42,10 +42,9 @@ if TYPE_CHECKING:
     Response = TypeVar("Response")
 
     class Added(Message):
-        """A message that ROS 2 adds; `_new` makes the defaults of fields."""
+        """A message that ROS 2 adds."""
 
-        _construct: ClassVar[Any]
-        _new: ClassVar[dict[str, Callable[[], Any]]]
+        def _fill(self, options: Options, *values: object) -> None: ...
 
 else:
     from .sequences import Generic
@@ -131,28 +130,18 @@ class Action(metaclass=ActionMeta):
         Impl = OnDemand(lambda action: compose(action) and action.Impl)
 
 
-class Imported:
-    """A class attribute: a class of another package, imported on first access."""
-
-    def __init__(self, module: str, name: str) -> None:
-        self._module = module
-        self._name = name
-
-    def __get__(self, instance: object, owner: type | None = None) -> Any:
-        """Return the class; without the package, the attribute is missing."""
-        try:
-            with importing():
-                module = __import__(self._module, fromlist=[self._name])
-        except MissingPackageError as error:
-            raise AttributeError(str(error)) from error
-        return getattr(module, self._name)
+def _import(module: str, name: str) -> Any:
+    with importing():
+        return getattr(__import__(module, fromlist=[name]), name)
 
 
 class ActionImpl:
     """What rclpy needs of an action: its attribute `Impl`."""
 
-    CancelGoalService = Imported("action_msgs.srv", "CancelGoal")
-    GoalStatusMessage = Imported("action_msgs.msg", "GoalStatusArray")
+    CancelGoalService = OnDemand(lambda _: _import("action_msgs.srv", "CancelGoal"))
+    GoalStatusMessage = OnDemand(
+        lambda _: _import("action_msgs.msg", "GoalStatusArray")
+    )
 
 
 # What the composed messages are made of: their fields as type checkers see them, constructors
@@ -174,13 +163,7 @@ class ServiceEvent(Added, Generic[Request, Response]):
         response: list[Response] | None = None,
         **options: Unpack[Options],
     ) -> None:
-        if options or info is not None:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._info = self._new["info"]() if info is None else info
-        self.request = [] if request is None else request
-        self.response = [] if response is None else response
+        self._fill(options, info, request, response)
 
 
 @dataclass(init=False, kw_only=True)
@@ -196,12 +179,7 @@ class SendGoalRequest(Added, Generic[Goal]):
         goal: Goal | None = None,
         **options: Unpack[Options],
     ) -> None:
-        if options or goal_id is not None:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._goal_id = self._new["goal_id"]() if goal_id is None else goal_id
-        self._goal = self._new["goal"]() if goal is None else goal
+        self._fill(options, goal_id, goal)
 
 
 @dataclass(init=False, kw_only=True)
@@ -217,12 +195,7 @@ class SendGoalResponse(Added):
         stamp: Time | None = None,
         **options: Unpack[Options],
     ) -> None:
-        if options or accepted.__class__ is not bool:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._accepted = self._new["accepted"]() if accepted is None else accepted
-        self._stamp = self._new["stamp"]() if stamp is None else stamp
+        self._fill(options, accepted, stamp)
 
 
 @dataclass(init=False, kw_only=True)
@@ -232,11 +205,7 @@ class GetResultRequest(Added):
     goal_id: UUID
 
     def __init__(self, goal_id: UUID | None = None, **options: Unpack[Options]) -> None:
-        if options or goal_id is not None:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._goal_id = self._new["goal_id"]() if goal_id is None else goal_id
+        self._fill(options, goal_id)
 
 
 @dataclass(init=False, kw_only=True)
@@ -252,12 +221,7 @@ class GetResultResponse(Added, Generic[Result]):
         result: Result | None = None,
         **options: Unpack[Options],
     ) -> None:
-        if options or status.__class__ is not int:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._status = self._new["status"]() if status is None else status
-        self._result = self._new["result"]() if result is None else result
+        self._fill(options, status, result)
 
 
 @dataclass(init=False, kw_only=True)
@@ -273,12 +237,7 @@ class FeedbackMessage(Added, Generic[Feedback]):
         feedback: Feedback | None = None,
         **options: Unpack[Options],
     ) -> None:
-        if options or goal_id is not None:
-            arguments = locals()
-            if self._construct(options, arguments):
-                return
-        self._goal_id = self._new["goal_id"]() if goal_id is None else goal_id
-        self._feedback = self._new["feedback"]() if feedback is None else feedback
+        self._fill(options, goal_id, feedback)
 
 
 # composing
@@ -303,12 +262,12 @@ def compose(group: Any) -> dict[str, Any]:
 
     Pickles look for classes there, and evaluated annotations for the names in them.
     """
-    from .on_demand.typeinfo import structure_of
+    from .typeinfo import structure_of
 
     metaclass: Any = type(group)
     with _lock:
         if metaclass._composed is None:
-            is_service = issubclass(group, Service)
+            is_service = metaclass._added == "Event"
             own = structure_of(group.Request if is_service else group.Goal)
             composition = _Composition(group, own)
             if is_service:
@@ -352,7 +311,7 @@ class _Composition:
             ),
         }
         name = f"{self.name}_Impl"
-        return self.add(type, name, ActionImpl, ActionImpl.__doc__, parts)
+        return self.add(type, name, ActionImpl, ActionImpl.__doc__ or "", parts)
 
     def add_service(self, name: str, purpose: str) -> Any:
         """Add a service of an action; its messages are there already."""
@@ -369,7 +328,7 @@ class _Composition:
         return self.add_message(f"{service}_Event", ServiceEvent, call)
 
     def add(
-        self, make: Any, name: str, base: type, doc: str | None, parts: dict[str, Any]
+        self, make: Any, name: str, base: type, doc: str, parts: dict[str, Any]
     ) -> Any:
         """Add a class."""
         name = public_name(name)
@@ -380,15 +339,18 @@ class _Composition:
     def add_message(self, name: str, shape: Any, subject: str) -> Any:
         """Add a message, of the fields that the type data has; `shape` is its class here."""
         fields = self.types[f"{self.kind}/{name}"].fields
+        defaults = shape.__init__.__defaults__
         hints = {field.name: self.hint(field) for field in fields}
         parts: dict[str, Any] = {
             "__match_args__": tuple(hints),
             "__annotations__": hints,
             "__init__": self.constructor(shape.__init__, name, hints),
             "__eq__": _equal,
-            "_construct": codec.construct,
-            "_new": {
-                field.name: self.default(field) for field in fields if not field.is_list
+            "_fill": _fill,
+            "_usual": type(defaults[0]),
+            "_makers": {
+                field.name if field.is_list else field.slot: self.maker(field)
+                for field in fields
             },
             "_fields_and_field_types": {
                 field.name: _spell(field, "boolean", "sequence<{}, {}>")
@@ -399,7 +361,9 @@ class _Composition:
             parts |= {field.name: ListOf() for field in fields if field.is_list}
         if shape in (ServiceEvent, SendGoalResponse, GetResultRequest):
             parts["_codec_"] = OnDemand(_codecs)
-        purpose = shape.__doc__.replace("a call", subject).replace("a goal", subject)
+        purpose: str = shape.__doc__.replace("a call", subject).replace(
+            "a goal", subject
+        )
         entries = [f"        {field.name}: {_spell(field)}\n" for field in fields]
         doc = f"{purpose}\n\n    Attributes:\n{''.join(entries)}    "
         return self.add(type(Message), name, Message, doc, parts)
@@ -413,9 +377,7 @@ class _Composition:
         bound.__annotations__ = {
             field: hint.replace("ListOf", "Iterable") + " | None" * (value is None)
             for (field, hint), value in zip(hints.items(), defaults, strict=True)
-        }
-        bound.__annotations__["options"] = "_idlc.Unpack[_idlc.Options]"
-        bound.__annotations__["return"] = "None"
+        } | {"options": "_idlc.Unpack[_idlc.Options]", "return": "None"}
         return bound
 
     def hint(self, field: FieldInfo) -> str:
@@ -432,15 +394,16 @@ class _Composition:
             return f"_idlc.ListOf[{hint}]" if self.converts else f"list[{hint}]"
         return hint
 
-    def default(self, field: FieldInfo) -> Any:
-        """Return what makes the value of a field that is None in a call."""
+    def maker(self, field: FieldInfo) -> Callable[[], Any]:
+        """Return a function that makes the default of a field."""
+        if field.is_list:
+            return list
         if field.nested is None:
-            # before Lyrical, None is a value like others, and none that a number can be
-            return _plain(field) if self.converts else type(None)
-        kind, _, short = field.nested.name.rpartition("/")
-        if kind == self.kind:
-            return self.scope[public_name(short)]
-        return _maker(field.nested)
+            return _plain(field)
+        from functools import cache
+
+        kind = cache(field.nested.find_class)
+        return lambda: kind()()
 
 
 class _Package:
@@ -457,17 +420,23 @@ class _Package:
         return self._types[f"{self._kind}/{wire_name(name)}"].find_class()
 
 
-def _maker(structure: Structure) -> Callable[[], Any]:
-    """Return a function that makes messages of another package, imported by then."""
-    kind: Any = None
+def _fill(self: Any, options: Any, *values: Any) -> None:
+    """Set the fields of a new message."""
+    if options or values[0].__class__ is not self._usual:
+        arguments = dict(zip(self.__match_args__, values, strict=True))
+        if codec.construct(self, options, arguments):
+            return
+    for (name, make), value in zip(self._makers.items(), values, strict=True):
+        setattr(self, name, make() if value is None else value)
 
-    def make() -> Any:
-        nonlocal kind
-        if kind is None:
-            kind = structure.find_class()
-        return kind()
 
-    return make
+def _equal(self: Any, other: Any) -> Any:
+    owner = owner_of(type(self))
+    if not isinstance(other, owner):
+        return NotImplemented
+    return all(
+        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
+    )
 
 
 def _plain(field: FieldInfo) -> type:
@@ -485,21 +454,12 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
     return listed.format(name, field.bound) if field.is_list else name
 
 
-def _equal(self: Any, other: Any) -> Any:
-    owner = owner_of(type(self))
-    if not isinstance(other, owner):
-        return NotImplemented
-    return all(
-        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
-    )
-
-
 # codecs of what is rarely sent
 
 
 def _codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
-    from .on_demand.typeinfo import read_carefully, structure_of
+    from .typeinfo import read_carefully, structure_of
 
     owner = owner_of(kind)
     structure = structure_of(owner)

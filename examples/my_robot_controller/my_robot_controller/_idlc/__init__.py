@@ -39,16 +39,7 @@ from .cdr import (
 )
 from .codec import Codec, Reading, construct, maker
 from .errors import DecodeError, ValidationError, importing
-from .message import (
-    Action,
-    Imported,
-    Message,
-    Package,
-    Service,
-    complete,
-    dataclass,
-    table,
-)
+from .message import Message, dataclass, table
 from .names import lazily
 from .objects import same
 from .sequences import (
@@ -87,9 +78,20 @@ if TYPE_CHECKING:
     from .hints import Options as Options
     from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
+    from .protocol import Action as Action
+    from .protocol import ActionImpl as ActionImpl
+    from .protocol import FeedbackMessage as FeedbackMessage
+    from .protocol import GetResultRequest as GetResultRequest
+    from .protocol import GetResultResponse as GetResultResponse
+    from .protocol import SendGoalRequest as SendGoalRequest
+    from .protocol import SendGoalResponse as SendGoalResponse
+    from .protocol import Service as Service
+    from .protocol import ServiceEvent as ServiceEvent
 else:
     _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
-    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
+    _LAZY = dict.fromkeys(_HINTS.split(), "hints")
+    _LAZY |= {"Action": "protocol", "Service": "protocol"}
+    __getattr__, __dir__ = lazily(__name__, _LAZY)
 
 __all__ = [
     "ENDS",
@@ -100,23 +102,19 @@ __all__ = [
     "PAD8",
     "PROTOCOL",
     "TRUTHS",
-    "Action",
     "Codec",
     "DecodeError",
     "Float32Sequence",
     "Float64Sequence",
     "Fresh",
     "FreshList",
-    "Imported",
     "Int8Sequence",
     "Int16Sequence",
     "Int32Sequence",
     "Int64Sequence",
     "ListOf",
     "Message",
-    "Package",
     "Reading",
-    "Service",
     "Texts",
     "UInt8Sequence",
     "UInt16Sequence",
@@ -125,7 +123,6 @@ __all__ = [
     "ValidationError",
     "array",
     "array_of",
-    "complete",
     "construct",
     "dataclass",
     "flags",
