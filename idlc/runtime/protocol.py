@@ -479,6 +479,8 @@ def _codecs(kind: type) -> codec.Codecs:
             return join(writer.parts)
 
         def decode(data: Any) -> Any:
+            if not reading.copy:
+                data = memoryview(data)
             return read_carefully(owner, data, codec.maker, numbers)
 
         return codec.Codec(encode, decode, bulk=True)
