@@ -52,7 +52,7 @@ def _compiled(package: str) -> type:
     if not inputs:
         return distribution_class(package, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
-    gen(GenOptions((".",), where, home, vendor_deps=settings.vendor_deps), report)
+    gen(GenOptions((".",), where, home, vendoring=settings.vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)

@@ -20,6 +20,7 @@ from idlc.project.library import Library
 from idlc.project.lock import Tree
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.root import Root
+from idlc.project.settings import Vendoring
 from idlc.project.write import Change, Plan
 
 if TYPE_CHECKING:
@@ -188,13 +189,13 @@ class Overlay(Target):
         )
 
     def unchanged(
-        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return `False`: interfaces alone do not show whether a run would change nothing.
 
         Libraries depend on the installed distribution, too.
         """
-        del inputs, library, vendor_deps
+        del inputs, library, vendoring
         return False
 
     def cause(self, change: Change) -> str:

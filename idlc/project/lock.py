@@ -11,7 +11,7 @@ import re
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import msgspec
 
@@ -21,6 +21,9 @@ from idlc.diagnostics.text import one_line
 from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
 from idlc.project.files import content, is_file, kind_of, read_bytes, reason
+
+if TYPE_CHECKING:
+    from idlc.project.settings import Vendoring
 
 #: A path of a file that idlc may have written below a folder: a few plain names.
 _OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
@@ -137,6 +140,19 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     dependencies: dict[str, str]
     types: dict[str, str]
     outputs: dict[str, str]
+
+    @property
+    def vendoring(self) -> Vendoring:
+        """The place of other packages' types."""
+        if not self.vendor_deps:
+            return ""
+        return "beside" if self.vendored else "private"
+
+    def vendors_as(self, vendoring: Vendoring) -> bool:
+        """Return whether a run that vendors in this way would write the same files."""
+        if self.vendor_deps and not self.dependencies:  # the places differ for nothing
+            return bool(vendoring)
+        return self.vendoring == vendoring
 
 
 def digest(data: bytes) -> str:

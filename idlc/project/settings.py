@@ -10,7 +10,16 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeAlias,
+    TypeVar,
+    get_args,
+)
 
 import msgspec
 from msgspec import Meta
@@ -33,8 +42,13 @@ Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
 Switch = Annotated[bool, Meta(title="true or false")]
+SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
+
+#: The place of the types that are used of other packages: in the generated package, as whole
+#: packages beside it, or where they are installed.
+Vendoring: TypeAlias = Literal["private", "beside", ""]
 
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
@@ -133,7 +147,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     exclude: Texts = ()
     out: Text = ""
     package: Text = ""
-    vendor_deps: Switch = False
+    vendor_deps: SwitchOrBeside = False
     distro: TextOrTexts = ()
     templates: Text = ""
     breaking: Table = {}
@@ -153,7 +167,7 @@ class Config(msgspec.Struct, frozen=True):
     package: str | None = None
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
-    vendor_deps: bool = False
+    vendoring: Vendoring = ""
     distro: tuple[str, ...] = ()
     templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
@@ -230,7 +244,7 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
         package=settings.package or None,
         include=tuple(_typed(folder, path, root) for path in settings.include),
         exclude=settings.exclude,
-        vendor_deps=settings.vendor_deps,
+        vendoring={True: "private", False: "", "beside": "beside"}[settings.vendor_deps],
         distro=_distros(settings.distro, place, report),
         templates=_typed(folder, settings.templates, root) if settings.templates else None,
         tables={"breaking": settings.breaking, "check": settings.check},

@@ -336,11 +336,12 @@ def _stored(models: Mapping[str, Model], key: str = "") -> str:
 
 def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.generate.python.imports import Surroundings
     from idlc.generate.python.render import render_package
 
     for package, model in models.items():
         yield RenderedFile(f"{package}/_idlc.py", SUPPORT)
-        for file in render_package(model, parent):
+        for file in render_package(model, Surroundings(others=f"{parent}.")):
             if not file.path.startswith("_idlc/"):
                 yield RenderedFile(f"{package}/{file.path}", file.text)
 
