@@ -59,7 +59,9 @@ def package_of(
     `copies` are models of other packages' types that are written into it, `beside` the packages
     that are written beside it.
     """
+    from idlc.generate.python.imports import ALONE, VENDORING
     from idlc.generate.python.render import render_package
+    from idlc.generate.python.vendored import vendored_files
     from idlc.project import templates
     from idlc.wire.layout import oversized
 
@@ -69,7 +71,11 @@ def package_of(
         return None
     templates.keep_compiled()
     with stage("render", model.package):
-        modules = {file.path: file.text for file in render_package(model, vendored=copies)}
+        rendered = (
+            *render_package(model, VENDORING if copies else ALONE),
+            *vendored_files(model.package, copies),
+        )
+        modules = {file.path: file.text for file in rendered}
         files = _with_surroundings(model, modules, target)
     plan = target.plan(files, check=check)
     if plan is None:

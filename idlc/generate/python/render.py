@@ -6,7 +6,7 @@ Pure but for reading idlc's own templates and runtime. `idlc.lock` is not made h
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypedDict
@@ -19,26 +19,27 @@ from idlc.generate.python import classes, fields, imports, positions
 from idlc.generate.python.classes import GroupView, MessageView
 from idlc.generate.python.decode import decode, is_bulk
 from idlc.generate.python.encode import encode
-from idlc.generate.python.imports import ALONE, VENDORED, VENDORING, Homes, References, Surroundings
+from idlc.generate.python.imports import ALONE, Homes, References, Surroundings
 from idlc.generate.python.lines import assign, call, string_literal
 from idlc.generate.python.positions import Tables
 from idlc.model import derive, ir, link, python_names
 from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
-from idlc.project.templates import RenderedFile, environment
+from idlc.project.templates import Code, RenderedFile, Text
+from idlc.project.templates import code as code_environment
 from idlc.wire import plan
 
 
 class CodecView(msgspec.Struct, frozen=True):
     """The codec of a message class: all but the names are finished lines, indented."""
 
-    name: str
-    function: str
-    imports: tuple[str, ...]
-    outside: tuple[str, ...]
-    constants: tuple[str, ...]
-    encode: tuple[str, ...]
-    decode: tuple[str, ...]
+    name: Code
+    function: Code
+    imports: tuple[Code, ...]
+    outside: tuple[Code, ...]
+    constants: tuple[Code, ...]
+    encode: tuple[Code, ...]
+    decode: tuple[Code, ...]
     is_bulk: bool
 
 
@@ -62,15 +63,19 @@ def codec(structure: ir.Message, references: References, messages: plan.Messages
         runtime = references.surroundings.runtime
         inside.insert(0, f"    from {runtime}_idlc import arrays as _arrays")
     return CodecView(
-        name=references.name(structure.name),
-        function=f"{snake_case(structure.name.name).replace('__', '_')}_codec",
-        imports=tuple(inside),
-        outside=tuple(outside),
-        constants=constants,
-        encode=tuple(writing),
-        decode=tuple(reading),
+        name=Code(references.name(structure.name)),
+        function=Code(f"{snake_case(structure.name.name).replace('__', '_')}_codec"),
+        imports=_code(inside),
+        outside=_code(outside),
+        constants=_code(constants),
+        encode=_code(writing),
+        decode=_code(reading),
         is_bulk=bulk,
     )
+
+
+def _code(lines: Iterable[str]) -> tuple[Code, ...]:
+    return tuple(map(Code, lines))
 
 
 def _makers(
@@ -169,25 +174,31 @@ class ModuleView(msgspec.Struct, frozen=True, kw_only=True):
     `protocol` is the module of what ROS 2 adds to the service or action.
     """
 
-    template: str
-    path: str
-    origin: str
-    pragmas: tuple[str, ...]
-    title: str
-    runtime: str
-    imports: tuple[str, ...] = ()
+    origin: Text
+    pragmas: tuple[Code, ...]
+    title: Text
+    runtime: Code
+    imports: tuple[Code, ...] = ()
     messages: tuple[MessageView, ...] = ()
     codecs: tuple[CodecView, ...] = ()
     services: tuple[GroupView, ...] = ()
     action: GroupView | None = None
-    protocol: str = ""
+    protocol: Code = Code("")
+
+
+class Module(NamedTuple):
+    """A module to write: the name of its template, its path, and what it shows."""
+
+    template: str
+    path: str
+    view: ModuleView
 
 
 PRAGMAS = (
-    '# mypy: disable-error-code="import-not-found,import-untyped"',
-    "# pyright: reportMissingImports=false, reportMissingTypeStubs=false",
+    Code('# mypy: disable-error-code="import-not-found,import-untyped"'),
+    Code("# pyright: reportMissingImports=false, reportMissingTypeStubs=false"),
 )
-HIDING_PRAGMAS = ("# pyright: reportIncompatibleMethodOverride=false",)
+HIDING_PRAGMAS = (Code("# pyright: reportIncompatibleMethodOverride=false"),)
 
 
 class _ModulePart(NamedTuple):
@@ -208,7 +219,7 @@ def module_views(
     surroundings: Surroundings = ALONE,
     *,
     converts: bool = False,
-) -> Iterator[ModuleView]:
+) -> Iterator[Module]:
     """Yield the views of an interface's modules; `names` has the modules of all its package.
 
     With `converts`, classes convert values as Lyrical's do.
@@ -225,23 +236,21 @@ def module_views(
             yield _codecs(part, messages)
 
 
-def _classes(part: _ModulePart, homes: Homes) -> ModuleView:
+def _classes(part: _ModulePart, homes: Homes) -> Module:
     interface, references = part.interface, part.references
     name = interface.name
     purposes = fields.purposes(interface)
     is_action = isinstance(interface, ir.Action)
     file = f"{name.kind}/{name.name}.{name.kind}"
-    return ModuleView(
-        template="protocol" if part.is_added else name.kind,
-        path=f"{name.kind}/{part.module}.py",
-        origin=f"{name}.{name.kind}",
+    view = ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
         pragmas=(
             *(PRAGMAS if references.others and not homes.surroundings.vendors else ()),
             *(HIDING_PRAGMAS if any(map(_hides_methods, part.structures)) else ()),
         ),
-        title=f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}.",
-        runtime=homes.surroundings.runtime,
-        imports=tuple(_imports(references, part.structures)),
+        title=Text(f"What ROS 2 adds to {name}." if part.is_added else f"The classes of {name}."),
+        runtime=Code(homes.surroundings.runtime),
+        imports=_code(_imports(references, part.structures)),
         messages=tuple(
             classes.message(structure, references, purposes, file, converts=part.converts)
             for structure in part.structures
@@ -249,22 +258,22 @@ def _classes(part: _ModulePart, homes: Homes) -> ModuleView:
         # a service's own class is its author's; those of an action's services are not
         services=classes.services(interface, purposes) if part.is_added == is_action else (),
         action=classes.action(interface) if isinstance(interface, ir.Action) else None,
-        protocol=homes.protocol,
+        protocol=Code(homes.protocol),
     )
+    return Module("protocol" if part.is_added else name.kind, f"{name.kind}/{part.module}.py", view)
 
 
-def _codecs(part: _ModulePart, messages: plan.Messages) -> ModuleView:
+def _codecs(part: _ModulePart, messages: plan.Messages) -> Module:
     name = part.interface.name
     codecs = tuple(codec(structure, part.references, messages) for structure in part.structures)
-    return ModuleView(
-        template="codec",
-        path=f"{name.kind}/{python_names.codec_module(part.module)}.py",
-        origin=f"{name}.{name.kind}",
-        pragmas=PRAGMAS if any(view.outside for view in codecs) else (),
-        runtime=part.references.surroundings.runtime,
-        title=f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}.",
+    view = ModuleView(
+        origin=Text(f"{name}.{name.kind}"),
+        pragmas=PRAGMAS if any(codec.outside for codec in codecs) else (),
+        title=Text(f"The codecs of {f'what ROS 2 adds to {name}' if part.is_added else name}."),
+        runtime=Code(part.references.surroundings.runtime),
         codecs=codecs,
     )
+    return Module("codec", f"{name.kind}/{python_names.codec_module(part.module)}.py", view)
 
 
 def _hides_methods(structure: ir.Message) -> bool:
@@ -297,8 +306,8 @@ PACKAGE = Path(__file__).parents[2]
 
 
 @cache
-def _template(name: str) -> jinja2.Template:
-    return environment().get_template(name)
+def template(name: str) -> jinja2.Template:
+    return code_environment().get_template(name)
 
 
 @cache
@@ -328,74 +337,34 @@ def module_files(
     converts = model.distro.converts_values
     views = module_views(interface, model.messages, modules, surroundings, converts=converts)
     for module in views:
-        template = _template(f"message/{module.template}.py.jinja")
-        yield RenderedFile(module.path, template.render(module=module))
+        text = template(f"message/{module.template}.py.jinja").render(module=module.view)
+        yield RenderedFile(module.path, text)
 
 
 def render_package(
-    model: link.Model, surroundings: Surroundings = ALONE, vendored: Sequence[link.Model] = ()
+    model: link.Model, surroundings: Surroundings = ALONE
 ) -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
-    `vendored` are models of other packages, with the types that the package comes with. Models
-    must be without errors: no `Unknown` type, no missing one.
+    The model must be without errors: no `Unknown` type, no missing one.
     """
     files = [
-        *_interface_files(model, VENDORING if vendored else surroundings),
+        *interface_files(model, surroundings),
         # a package without it would lose to any other of its name, wherever that stands on the path
         RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'),
         RenderedFile("py.typed", ""),
-        *(_vendored_files(model.package, vendored) if vendored else ()),
         *runtime_files(),
     ]
     return tuple(sorted(files, key=lambda file: file.path))
 
 
-def _interface_files(model: link.Model, surroundings: Surroundings) -> Iterator[RenderedFile]:
+def interface_files(model: link.Model, surroundings: Surroundings) -> Iterator[RenderedFile]:
     """Yield the modules of a package's interfaces and the description of their types."""
     modules = python_names.modules(interface.name for interface in model.own)
     for own in model.own:
         yield from module_files(own, model, modules, surroundings)
     for kind in model.kinds:
         page = imports.package(model, kind, modules, surroundings)
-        text = _template("message/package_init.py.jinja").render(package=page)
-        yield RenderedFile(page.path, text)
+        text = template("message/package_init.py.jinja").render(package=page)
+        yield RenderedFile(f"{kind}/__init__.py", text)
     yield RenderedFile("_type_data.py", type_data_source(model, surroundings))
-
-
-class VendoredView(msgspec.Struct, frozen=True):
-    """The types of another package that a package comes with.
-
-    `structures` are their names, such as `msg/Header`, and hashes.
-    """
-
-    name: str
-    kinds: tuple[ir.Kind, ...]
-    structures: tuple[tuple[str, str], ...]
-
-
-def _vendored_files(package: str, vendored: Sequence[link.Model]) -> Iterator[RenderedFile]:
-    """Yield the types that a package comes with, and what chooses between them and others."""
-    views = tuple(map(_vendored_view, vendored))
-    text = _template("message/vendor.py.jinja").render(package=package, vendored=views)
-    yield RenderedFile("vendor/__init__.py", text)
-    yield RenderedFile("_vendor/__init__.py", '"""The copies that `vendor` imports."""\n')
-    for model, view in zip(vendored, views, strict=True):
-        for file in _interface_files(model, VENDORED):
-            yield RenderedFile(f"_vendor/{view.name}/{file.path}", file.text)
-        text = _template("message/vendored_package.py.jinja").render(package=view)
-        yield RenderedFile(f"_vendor/{view.name}/__init__.py", text)
-        text = _template("message/vendor_package.py.jinja").render(package=view)
-        yield RenderedFile(f"vendor/{view.name}/__init__.py", text)
-        for kind in view.kinds:
-            text = _template("message/vendor_types.py.jinja").render(package=view, kind=kind)
-            yield RenderedFile(f"vendor/{view.name}/{kind}.py", text)
-
-
-def _vendored_view(model: link.Model) -> VendoredView:
-    names = [section.name for own in model.own for section in derive.sections(own)]
-    return VendoredView(
-        model.package,
-        tuple(model.kinds),
-        tuple((f"{name.kind}/{name.name}", model.describer.hash(str(name))) for name in names),
-    )
