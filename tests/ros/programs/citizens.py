@@ -48,7 +48,7 @@ def check_serialization():
 
 def check_structs():
     """As Cyclone DDS would: through C structures."""
-    from hiding_msgs._idlc.typesupport import structs
+    from hiding_msgs._idlc import structs
 
     for message in (HIDING, TRUE):
         memory = Memory(structs.message(type(message), wire_name(type(message))))
