@@ -194,7 +194,6 @@ class _Command(click.Command):
     type=click.Choice(("private", "beside")),
     is_flag=False,
     flag_value="private",
-    default="",
     metavar="[=beside]",
     help="Write the types that are used of other packages into OUT, or these packages beside it.",
 )
@@ -226,6 +225,7 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     package = arguments["package"]
     words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
     again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
+    arguments["vendoring"] = arguments["vendoring"] or ""
     typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
     request = in_package(with_settings(typed, settings))
     if not request.paths or not (request.out or request.ament):

@@ -27,10 +27,10 @@ from idlc.project import inputs, lock, settings
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
-from idlc.project.lock import load_lock
+from idlc.project.lock import Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
-from idlc.project.settings import Config, Scope, Vendoring, load_settings, scope
+from idlc.project.settings import Config, Scope, load_settings, scope
 from idlc.recordings.find import is_recording, split_recordings
 from idlc.version import __version__
 

@@ -17,7 +17,6 @@ from idlc.model.distros import Distro
 from idlc.project import inputs, lock
 from idlc.project.inputs import accept_name
 from idlc.project.library import Library
-from idlc.project.settings import Vendoring
 from idlc.project.write import Plan
 from idlc.version import __version__
 
@@ -50,7 +49,7 @@ def package_of(
     library: Library,
     *,
     check: bool,
-    vendoring: Vendoring = "",
+    vendoring: lock.Vendoring = "",
     copies: Sequence[Model] = (),
     beside: Sequence[str] = (),
 ) -> Package | None:
@@ -84,9 +83,7 @@ def package_of(
     own = {
         ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if _key(n) in digests
     }
-    others = {
-        name for each in (model, *copies) for name in each.interfaces if name not in own
-    }
+    others = {name for each in (model, *copies) for name in each.interfaces if name not in own}
     return Package(
         target,
         plan,
@@ -142,7 +139,7 @@ def planned(
     compiler: Compiler,
     *,
     check: bool,
-    vendoring: Vendoring,
+    vendoring: lock.Vendoring,
 ) -> list[Package]:
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     vendor = _Vendor({model.package for model in models}, compiler, check=check)
@@ -247,7 +244,7 @@ def generated(package: Package) -> Generated:
 
 
 def up_to_date(
-    target: Target, digests: dict[str, str], library: Library, vendoring: Vendoring
+    target: Target, digests: dict[str, str], library: Library, vendoring: lock.Vendoring
 ) -> tuple[Generated, ...]:
     """Return the packages if a run would change nothing; empty otherwise."""
     if not target.unchanged(digests, library, vendoring) or target.lock is None:

@@ -17,10 +17,9 @@ from idlc.generate.target import Target
 from idlc.project import prefixes, write
 from idlc.project.atomic import exclusive
 from idlc.project.library import Library
-from idlc.project.lock import Tree
+from idlc.project.lock import Tree, Vendoring
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.root import Root
-from idlc.project.settings import Vendoring
 from idlc.project.write import Change, Plan
 
 if TYPE_CHECKING:

@@ -21,10 +21,20 @@ from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
 from idlc.project.library import Library
-from idlc.project.lock import FILE, Lock, Obstacle, Tree, digest, encode, load_lock, meaning
+from idlc.project.lock import (
+    FILE,
+    Lock,
+    Obstacle,
+    Tree,
+    Vendoring,
+    digest,
+    encode,
+    load_lock,
+    meaning,
+)
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
-from idlc.project.settings import Scope, Vendoring
+from idlc.project.settings import Scope
 from idlc.project.write import Change, Plan, plan
 from idlc.version import __version__
 
@@ -339,9 +349,7 @@ class Target:
         self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return whether compiling the inputs would change nothing."""
-        is_unchanged = unchanged(
-            self._path, self.lock, self.package, inputs, library, vendoring
-        )
+        is_unchanged = unchanged(self._path, self.lock, self.package, inputs, library, vendoring)
         if is_unchanged:
             write.sweep(self._path)
         return is_unchanged

@@ -11,7 +11,7 @@ import re
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
@@ -21,9 +21,6 @@ from idlc.diagnostics.text import one_line
 from idlc.model.ir import TypeName
 from idlc.model.names import is_package_name
 from idlc.project.files import content, is_file, kind_of, read_bytes, reason
-
-if TYPE_CHECKING:
-    from idlc.project.settings import Vendoring
 
 #: A path of a file that idlc may have written below a folder: a few plain names.
 _OWN = re.compile(r"(?:[\w-][\w.-]*/){0,7}[\w-][\w.-]*", re.ASCII)
@@ -117,6 +114,11 @@ FORMAT = 1
 class _Header(msgspec.Struct):
     format: int
     idlc: str
+
+
+#: The place of the types of other packages that are used: in the generated package, as whole
+#: packages beside it, or where they are installed.
+Vendoring: TypeAlias = Literal["private", "beside", ""]
 
 
 class Lock(msgspec.Struct, frozen=True, kw_only=True):

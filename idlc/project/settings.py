@@ -16,7 +16,6 @@ from typing import (
     Any,
     Literal,
     NamedTuple,
-    TypeAlias,
     TypeVar,
     get_args,
 )
@@ -32,6 +31,7 @@ from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, listed, unknown_distro
 from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
+from idlc.project.lock import Vendoring
 from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
@@ -41,14 +41,9 @@ if TYPE_CHECKING:
 Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
-Switch = Annotated[bool, Meta(title="true or false")]
 SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
-
-#: The place of the types that are used of other packages: in the generated package, as whole
-#: packages beside it, or where they are installed.
-Vendoring: TypeAlias = Literal["private", "beside", ""]
 
 _Shape = TypeVar("_Shape", bound=msgspec.Struct)
 
@@ -244,13 +239,19 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
         package=settings.package or None,
         include=tuple(_typed(folder, path, root) for path in settings.include),
         exclude=settings.exclude,
-        vendoring={True: "private", False: "", "beside": "beside"}[settings.vendor_deps],
+        vendoring=_vendoring(settings.vendor_deps),
         distro=_distros(settings.distro, place, report),
         templates=_typed(folder, settings.templates, root) if settings.templates else None,
         tables={"breaking": settings.breaking, "check": settings.check},
         source=source,
         folder=folder,
     )
+
+
+def _vendoring(value: bool | Literal["beside"]) -> Vendoring:
+    if value == "beside":
+        return "beside"
+    return "private" if value else ""
 
 
 def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:

@@ -307,6 +307,7 @@ PACKAGE = Path(__file__).parents[2]
 
 @cache
 def template(name: str) -> jinja2.Template:
+    """Return a template of generated code."""
     return code_environment().get_template(name)
 
 
@@ -320,11 +321,6 @@ def runtime_files() -> tuple[RenderedFile, ...]:
         )
         for path in sorted(runtime.rglob("*.py"))
     )
-
-
-def support_packages() -> list[str]:
-    """Return the Python packages that the support package consists of, itself first."""
-    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
 
 
 def module_files(
