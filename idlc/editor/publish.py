@@ -11,6 +11,7 @@ from idlc.diagnostics import codes, explain
 from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.editor.documents import Document
 from idlc.editor.protocol import uris
+from idlc.editor.protocol.capabilities import requests_problems
 from idlc.editor.protocol.parts import Location, Part, Position, Range
 from idlc.editor.state import RELATIVE, ServerState
 from idlc.editor.workspace import Snapshot, Workspace
@@ -127,9 +128,9 @@ def publish(state: ServerState) -> None:
     gone = state.published.keys() - new.keys()
     changed = {uri for uri, some in new.items() if state.published.get(uri) != some} | gone
     state.published = new
-    # a client that pulls problems would show pushed ones again
-    if state.supports("textDocument", "diagnostic"):
-        if changed and state.supports("workspace", "diagnostics", "refreshSupport"):
+    # a client that requests problems would show pushed ones again
+    if requests_problems(state.client):
+        if changed:
             state.ask("workspace/diagnostic/refresh", None)
         return
     for uri in sorted(changed):

@@ -133,13 +133,7 @@ class ServerState:
 
     def supports(self, *path: str) -> bool:
         """Return whether the client has a capability, or names it in a list."""
-        value: Any = self.client
-        for name in path:
-            if isinstance(value, list):
-                value = name in value
-            else:
-                value = value.get(name) if isinstance(value, dict) else None
-        return value not in (None, False)
+        return capabilities.supports(self.client, *path)
 
     def refresh(self, what: str) -> None:
         """Have the client request a feature again, such as `codeLens`, if it can."""
