@@ -6,10 +6,11 @@ from array import array
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
 
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC
@@ -45,8 +46,7 @@ MSG = "ros2msg"
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
 
-@dataclass(frozen=True)
-class Schema:
+class Schema(msgspec.Struct, frozen=True):
     """A definition as it was recorded; `encoding` is ros2msg or ros2idl for those of ROS 2."""
 
     name: str
@@ -59,8 +59,7 @@ class Schema:
         return not self.text.strip()
 
 
-@dataclass(frozen=True)
-class Topic:
+class Topic(msgspec.Struct, frozen=True):
     """The messages recorded under one name, of one type.
 
     `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
@@ -394,4 +393,4 @@ def _joined(same: list[Topic]) -> list[Topic]:
     """Return at most one topic for channels: their total, their first definition and hash."""
     digest = next((topic.hash for topic in same if topic.hash), None)
     total = sum(topic.count for topic in same)
-    return [replace(topic, count=total, hash=digest) for topic in same[:1]]
+    return [msgspec.structs.replace(topic, count=total, hash=digest) for topic in same[:1]]
