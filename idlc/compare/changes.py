@@ -170,7 +170,7 @@ def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> It
     yield gap
 
 
-def described(field: ir.Field) -> object:
+def describe_type(field: ir.Field) -> object:
     """Return a field's type as it enters the type hash."""
     message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
     return individual(message)["fields"][0]["type"]

@@ -27,12 +27,12 @@ from idlc.recordings.containers.mcap import MAGIC as MCAP_MAGIC
 from idlc.recordings.containers.source import (
     CDR,
     RecordingError,
-    Unread,
+    UnreadTopic,
     first_bytes,
     is_local,
     of_file,
     source_of,
-    unread,
+    unread_reason,
 )
 
 if TYPE_CHECKING:
@@ -260,14 +260,14 @@ class Container(File):
                 with of_file(file.name):
                     check_count(topic.name, counted, total)
 
-    def unread(self) -> list[Unread]:
+    def unread(self) -> list[UnreadTopic]:
         """Return the topics that cannot be read, judging by the first message of each."""
-        reasons: dict[Unread, None] = {}
+        reasons: dict[UnreadTopic, None] = {}
         for file in self.files:
             names = {number: topic.name for topic, number in file.topics if topic.encoding == CDR}
             with suppress(RecordingError):  # reading the messages says what is wrong
                 for number, start in file.first_messages():
-                    why = unread(names[number], start) if number in names else None
+                    why = unread_reason(names[number], start) if number in names else None
                     if why:
                         reasons[why] = None
         return list(reasons)

@@ -127,7 +127,7 @@ def times_of(values: Any, what: str) -> Any:
     return values.astype(np.int64)
 
 
-def joined(parts: Sequence[Messages]) -> Messages:
+def join_messages(parts: Sequence[Messages]) -> Messages:
     """Return the messages of all parts, in memory once more only if they are small."""
     if len(parts) == 1:
         return parts[0]
@@ -194,7 +194,7 @@ def mcap_messages(
                     return
                 ranges = _read(source, group, channels, room, check).within(window)
             if len(ranges):
-                yield unpacked(ranges, room)
+                yield decompress_each(ranges, room)
 
 
 def _read(
@@ -386,7 +386,7 @@ def _messages(
     return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)
 
 
-def unpacked(ranges: Ranges, room: Room) -> Messages:
+def decompress_each(ranges: Ranges, room: Room) -> Messages:
     """Return messages without the compression that each may have by itself.
 
     No other message begins like a zstd frame.
