@@ -29,7 +29,7 @@ from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
 from idlc.runtime.objects import owner_of
-from idlc.runtime.on_demand.typeinfo import structure_of
+from idlc.runtime.typeinfo import structure_of
 from idlc.version import __version__
 
 if TYPE_CHECKING:
