@@ -195,7 +195,7 @@ class _Command(click.Command):
     is_flag=False,
     flag_value="private",
     metavar="[=beside]",
-    help="Write the types that are used of other packages into OUT, or these packages beside it.",
+    help="Write the types that OUT uses of other packages into it, or these packages beside it.",
 )
 @click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
 @options.report_style

@@ -283,7 +283,7 @@ def with_needs(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
                 hint=f"{distro.installing(missing)}, or run `{again} --vendor-deps`, "
-                "which writes it next to this one",
+                "which writes the types that are used into this one",
             )
         )
     return tuple(package._replace(needs=quiet.get(package.out, ())) for package in done)

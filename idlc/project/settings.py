@@ -162,12 +162,19 @@ class Config(msgspec.Struct, frozen=True):
     package: str | None = None
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
-    vendoring: Vendoring = ""
+    vendor_deps: bool | Literal["beside"] = False
     distro: tuple[str, ...] = ()
     templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
+
+    @property
+    def vendoring(self) -> Vendoring:
+        """The place of other packages' types that `vendor_deps` asks for."""
+        if self.vendor_deps == "beside":
+            return "beside"
+        return "private" if self.vendor_deps else ""
 
 
 def load_settings(root: Root, report: Report) -> Config:
@@ -239,19 +246,13 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
         package=settings.package or None,
         include=tuple(_typed(folder, path, root) for path in settings.include),
         exclude=settings.exclude,
-        vendoring=_vendoring(settings.vendor_deps),
+        vendor_deps=settings.vendor_deps,
         distro=_distros(settings.distro, place, report),
         templates=_typed(folder, settings.templates, root) if settings.templates else None,
         tables={"breaking": settings.breaking, "check": settings.check},
         source=source,
         folder=folder,
     )
-
-
-def _vendoring(value: bool | Literal["beside"]) -> Vendoring:
-    if value == "beside":
-        return "beside"
-    return "private" if value else ""
 
 
 def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
