@@ -38,10 +38,10 @@ from .cdr import (
     wide_texts_reader,
 )
 from .codec import Codec, Reading, construct, maker
-from .errors import DecodeError, ValidationError, importing
+from .errors import DecodeError, MissingPackageError, ValidationError, importing
 from .message import Message, dataclass, table
 from .names import lazily
-from .objects import same
+from .objects import equal, same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -114,6 +114,7 @@ __all__ = [
     "Int64Sequence",
     "ListOf",
     "Message",
+    "MissingPackageError",
     "Reading",
     "Texts",
     "UInt8Sequence",
@@ -125,6 +126,7 @@ __all__ = [
     "array_of",
     "construct",
     "dataclass",
+    "equal",
     "flags",
     "flags_writer",
     "importing",

@@ -20,7 +20,7 @@ from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
 from .errors import importing
 from .message import InterfaceMeta, Message, OnDemand, dataclass, metaclass_of
 from .names import public_name, wire_name
-from .objects import owner_of, same
+from .objects import equal, owner_of, same
 from .sequences import ListOf, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
@@ -433,7 +433,7 @@ def _fill(self: Any, options: Any, *values: Any) -> None:
 def _equal(self: Any, other: Any) -> Any:
     owner = owner_of(type(self))
     if not isinstance(other, owner):
-        return NotImplemented
+        return equal(self, other)
     return all(
         same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
     )

@@ -20,7 +20,7 @@ from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
 from .errors import importing
 from .message import InterfaceMeta, Message, OnDemand, dataclass, metaclass_of
 from .names import public_name, wire_name
-from .objects import owner_of, same
+from .objects import equal, owner_of, same
 from .sequences import ListOf, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
@@ -267,7 +267,7 @@ def compose(group: Any) -> dict[str, Any]:
     metaclass: Any = type(group)
     with _lock:
         if metaclass._composed is None:
-            is_service = issubclass(group, Service)
+            is_service = metaclass._added == "Event"
             own = structure_of(group.Request if is_service else group.Goal)
             composition = _Composition(group, own)
             if is_service:
@@ -311,7 +311,7 @@ class _Composition:
             ),
         }
         name = f"{self.name}_Impl"
-        return self.add(type, name, ActionImpl, ActionImpl.__doc__, parts)
+        return self.add(type, name, ActionImpl, ActionImpl.__doc__ or "", parts)
 
     def add_service(self, name: str, purpose: str) -> Any:
         """Add a service of an action; its messages are there already."""
@@ -328,7 +328,7 @@ class _Composition:
         return self.add_message(f"{service}_Event", ServiceEvent, call)
 
     def add(
-        self, make: Any, name: str, base: type, doc: str | None, parts: dict[str, Any]
+        self, make: Any, name: str, base: type, doc: str, parts: dict[str, Any]
     ) -> Any:
         """Add a class."""
         name = public_name(name)
@@ -361,7 +361,9 @@ class _Composition:
             parts |= {field.name: ListOf() for field in fields if field.is_list}
         if shape in (ServiceEvent, SendGoalResponse, GetResultRequest):
             parts["_codec_"] = OnDemand(_codecs)
-        purpose = shape.__doc__.replace("a call", subject).replace("a goal", subject)
+        purpose: str = shape.__doc__.replace("a call", subject).replace(
+            "a goal", subject
+        )
         entries = [f"        {field.name}: {_spell(field)}\n" for field in fields]
         doc = f"{purpose}\n\n    Attributes:\n{''.join(entries)}    "
         return self.add(type(Message), name, Message, doc, parts)
@@ -431,7 +433,7 @@ def _fill(self: Any, options: Any, *values: Any) -> None:
 def _equal(self: Any, other: Any) -> Any:
     owner = owner_of(type(self))
     if not isinstance(other, owner):
-        return NotImplemented
+        return equal(self, other)
     return all(
         same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
     )
@@ -477,6 +479,8 @@ def _codecs(kind: type) -> codec.Codecs:
             return join(writer.parts)
 
         def decode(data: Any) -> Any:
+            if not reading.copy:
+                data = memoryview(data)
             return read_carefully(owner, data, codec.maker, numbers)
 
         return codec.Codec(encode, decode, bulk=True)

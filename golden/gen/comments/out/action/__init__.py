@@ -8,13 +8,16 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._fill import Fill, Fill_Feedback, Fill_Goal, Fill_Result
-    from ._fill__protocol import (
+    from ._fill import (
+        Fill,
+        Fill_Feedback,
         Fill_FeedbackMessage,
         Fill_GetResult,
         Fill_GetResult_Event,
         Fill_GetResult_Request,
         Fill_GetResult_Response,
+        Fill_Goal,
+        Fill_Result,
         Fill_SendGoal,
         Fill_SendGoal_Event,
         Fill_SendGoal_Request,
@@ -40,17 +43,17 @@ __all__ = [
 _MODULES = {
     "Fill": "_fill",
     "Fill_Feedback": "_fill",
-    "Fill_FeedbackMessage": "_fill__protocol",
-    "Fill_GetResult": "_fill__protocol",
-    "Fill_GetResult_Event": "_fill__protocol",
-    "Fill_GetResult_Request": "_fill__protocol",
-    "Fill_GetResult_Response": "_fill__protocol",
+    "Fill_FeedbackMessage": "_fill",
+    "Fill_GetResult": "_fill",
+    "Fill_GetResult_Event": "_fill",
+    "Fill_GetResult_Request": "_fill",
+    "Fill_GetResult_Response": "_fill",
     "Fill_Goal": "_fill",
     "Fill_Result": "_fill",
-    "Fill_SendGoal": "_fill__protocol",
-    "Fill_SendGoal_Event": "_fill__protocol",
-    "Fill_SendGoal_Request": "_fill__protocol",
-    "Fill_SendGoal_Response": "_fill__protocol",
+    "Fill_SendGoal": "_fill",
+    "Fill_SendGoal_Event": "_fill",
+    "Fill_SendGoal_Request": "_fill",
+    "Fill_SendGoal_Response": "_fill",
 }
 
 __getattr__, __dir__ = _idlc.lazily(__name__, _MODULES)

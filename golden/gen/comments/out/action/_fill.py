@@ -44,7 +44,7 @@ class Fill_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._level == other._level)
 
 
@@ -81,7 +81,7 @@ class Fill_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._reached == other._reached)
 
 
@@ -118,7 +118,7 @@ class Fill_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._level == other._level)
 
 
@@ -128,5 +128,34 @@ class Fill(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = Fill_Goal
     Result: _idlc.TypeAlias = Fill_Result
     Feedback: _idlc.TypeAlias = Fill_Feedback
+
     if TYPE_CHECKING:
-        from ._fill__protocol import Fill_Impl as Impl
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.Service):
+                class Request(_idlc.SendGoalRequest[Fill_Goal]): ...
+
+                class Response(_idlc.SendGoalResponse): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class GetResultService(_idlc.Service):
+                class Request(_idlc.GetResultRequest): ...
+
+                class Response(_idlc.GetResultResponse[Fill_Result]): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[Fill_Feedback]): ...
+
+
+if TYPE_CHECKING:
+    Fill_SendGoal: _idlc.TypeAlias = Fill.Impl.SendGoalService
+    Fill_SendGoal_Request: _idlc.TypeAlias = Fill_SendGoal.Request
+    Fill_SendGoal_Response: _idlc.TypeAlias = Fill_SendGoal.Response
+    Fill_SendGoal_Event: _idlc.TypeAlias = Fill_SendGoal.Event
+    Fill_GetResult: _idlc.TypeAlias = Fill.Impl.GetResultService
+    Fill_GetResult_Request: _idlc.TypeAlias = Fill_GetResult.Request
+    Fill_GetResult_Response: _idlc.TypeAlias = Fill_GetResult.Response
+    Fill_GetResult_Event: _idlc.TypeAlias = Fill_GetResult.Event
+    Fill_FeedbackMessage: _idlc.TypeAlias = Fill.Impl.FeedbackMessage

@@ -8,8 +8,7 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._reset import Reset, Reset_Request, Reset_Response
-    from ._reset__protocol import Reset_Event
+    from ._reset import Reset, Reset_Event, Reset_Request, Reset_Response
 
 __all__ = [
     "Reset",
@@ -20,7 +19,7 @@ __all__ = [
 
 _MODULES = {
     "Reset": "_reset",
-    "Reset_Event": "_reset__protocol",
+    "Reset_Event": "_reset",
     "Reset_Request": "_reset",
     "Reset_Response": "_reset",
 }

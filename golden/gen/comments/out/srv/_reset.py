@@ -44,7 +44,7 @@ class Reset_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._reason == other._reason)
 
 
@@ -81,7 +81,7 @@ class Reset_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._ok == other._ok)
 
 
@@ -90,5 +90,11 @@ class Reset(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = Reset_Request
     Response: _idlc.TypeAlias = Reset_Response
+
     if TYPE_CHECKING:
-        from ._reset__protocol import Reset_Event as Event
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+
+if TYPE_CHECKING:
+    Reset_Event: _idlc.TypeAlias = Reset.Event

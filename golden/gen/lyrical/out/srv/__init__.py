@@ -8,8 +8,7 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._run import Run, Run_Request, Run_Response
-    from ._run__protocol import Run_Event
+    from ._run import Run, Run_Event, Run_Request, Run_Response
 
 __all__ = [
     "Run",
@@ -20,7 +19,7 @@ __all__ = [
 
 _MODULES = {
     "Run": "_run",
-    "Run_Event": "_run__protocol",
+    "Run_Event": "_run",
     "Run_Request": "_run",
     "Run_Response": "_run",
 }

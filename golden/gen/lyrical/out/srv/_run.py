@@ -55,7 +55,7 @@ class Run_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Run_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._wait != other._wait:
             return False
         return bool(self._args == other._args)
@@ -102,7 +102,7 @@ class Run_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Run_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._status != other._status:
             return False
         return bool(self._stamps == other._stamps)
@@ -113,5 +113,12 @@ class Run(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = Run_Request
     Response: _idlc.TypeAlias = Run_Response
+    _converts_ = True
+
     if TYPE_CHECKING:
-        from ._run__protocol import Run_Event as Event
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+
+if TYPE_CHECKING:
+    Run_Event: _idlc.TypeAlias = Run.Event

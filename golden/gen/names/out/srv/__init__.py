@@ -8,8 +8,7 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._none import None_, None_Request, None_Response
-    from ._none__protocol import None_Event
+    from ._none import None_, None_Event, None_Request, None_Response
 
 __all__ = [
     "None_",
@@ -20,7 +19,7 @@ __all__ = [
 
 _MODULES = {
     "None_": "_none",
-    "None_Event": "_none__protocol",
+    "None_Event": "_none",
     "None_Request": "_none",
     "None_Response": "_none",
 }

@@ -29,7 +29,7 @@ class None_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return True
 
 
@@ -51,7 +51,7 @@ class None_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return True
 
 
@@ -60,5 +60,11 @@ class None_(_idlc.Service):  # noqa
 
     Request: _idlc.TypeAlias = None_Request
     Response: _idlc.TypeAlias = None_Response
+
     if TYPE_CHECKING:
-        from ._none__protocol import None_Event as Event
+
+        class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+
+if TYPE_CHECKING:
+    None_Event: _idlc.TypeAlias = None_.Event

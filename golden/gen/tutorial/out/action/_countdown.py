@@ -44,7 +44,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._target_count == other._target_count)
 
 
@@ -89,7 +89,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (
             self._final_count != other._final_count or self._success != other._success
         )
@@ -128,7 +128,7 @@ class Countdown_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._current_count == other._current_count)
 
 
@@ -138,5 +138,34 @@ class Countdown(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = Countdown_Goal
     Result: _idlc.TypeAlias = Countdown_Result
     Feedback: _idlc.TypeAlias = Countdown_Feedback
+
     if TYPE_CHECKING:
-        from ._countdown__protocol import Countdown_Impl as Impl
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.Service):
+                class Request(_idlc.SendGoalRequest[Countdown_Goal]): ...
+
+                class Response(_idlc.SendGoalResponse): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class GetResultService(_idlc.Service):
+                class Request(_idlc.GetResultRequest): ...
+
+                class Response(_idlc.GetResultResponse[Countdown_Result]): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[Countdown_Feedback]): ...
+
+
+if TYPE_CHECKING:
+    Countdown_SendGoal: _idlc.TypeAlias = Countdown.Impl.SendGoalService
+    Countdown_SendGoal_Request: _idlc.TypeAlias = Countdown_SendGoal.Request
+    Countdown_SendGoal_Response: _idlc.TypeAlias = Countdown_SendGoal.Response
+    Countdown_SendGoal_Event: _idlc.TypeAlias = Countdown_SendGoal.Event
+    Countdown_GetResult: _idlc.TypeAlias = Countdown.Impl.GetResultService
+    Countdown_GetResult_Request: _idlc.TypeAlias = Countdown_GetResult.Request
+    Countdown_GetResult_Response: _idlc.TypeAlias = Countdown_GetResult.Response
+    Countdown_GetResult_Event: _idlc.TypeAlias = Countdown_GetResult.Event
+    Countdown_FeedbackMessage: _idlc.TypeAlias = Countdown.Impl.FeedbackMessage

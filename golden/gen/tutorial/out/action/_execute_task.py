@@ -44,7 +44,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._task_name == other._task_name)
 
 
@@ -81,7 +81,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._success == other._success)
 
 
@@ -120,7 +120,7 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._current_status == other._current_status)
 
 
@@ -130,5 +130,34 @@ class ExecuteTask(_idlc.Action):  # noqa
     Goal: _idlc.TypeAlias = ExecuteTask_Goal
     Result: _idlc.TypeAlias = ExecuteTask_Result
     Feedback: _idlc.TypeAlias = ExecuteTask_Feedback
+
     if TYPE_CHECKING:
-        from ._execute_task__protocol import ExecuteTask_Impl as Impl
+
+        class Impl(_idlc.ActionImpl):
+            class SendGoalService(_idlc.Service):
+                class Request(_idlc.SendGoalRequest[ExecuteTask_Goal]): ...
+
+                class Response(_idlc.SendGoalResponse): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class GetResultService(_idlc.Service):
+                class Request(_idlc.GetResultRequest): ...
+
+                class Response(_idlc.GetResultResponse[ExecuteTask_Result]): ...
+
+                class Event(_idlc.ServiceEvent[Request, Response]): ...
+
+            class FeedbackMessage(_idlc.FeedbackMessage[ExecuteTask_Feedback]): ...
+
+
+if TYPE_CHECKING:
+    ExecuteTask_SendGoal: _idlc.TypeAlias = ExecuteTask.Impl.SendGoalService
+    ExecuteTask_SendGoal_Request: _idlc.TypeAlias = ExecuteTask_SendGoal.Request
+    ExecuteTask_SendGoal_Response: _idlc.TypeAlias = ExecuteTask_SendGoal.Response
+    ExecuteTask_SendGoal_Event: _idlc.TypeAlias = ExecuteTask_SendGoal.Event
+    ExecuteTask_GetResult: _idlc.TypeAlias = ExecuteTask.Impl.GetResultService
+    ExecuteTask_GetResult_Request: _idlc.TypeAlias = ExecuteTask_GetResult.Request
+    ExecuteTask_GetResult_Response: _idlc.TypeAlias = ExecuteTask_GetResult.Response
+    ExecuteTask_GetResult_Event: _idlc.TypeAlias = ExecuteTask_GetResult.Event
+    ExecuteTask_FeedbackMessage: _idlc.TypeAlias = ExecuteTask.Impl.FeedbackMessage

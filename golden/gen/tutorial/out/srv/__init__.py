@@ -8,8 +8,12 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._add_two_ints import AddTwoInts, AddTwoInts_Request, AddTwoInts_Response
-    from ._add_two_ints__protocol import AddTwoInts_Event
+    from ._add_two_ints import (
+        AddTwoInts,
+        AddTwoInts_Event,
+        AddTwoInts_Request,
+        AddTwoInts_Response,
+    )
 
 __all__ = [
     "AddTwoInts",
@@ -20,7 +24,7 @@ __all__ = [
 
 _MODULES = {
     "AddTwoInts": "_add_two_ints",
-    "AddTwoInts_Event": "_add_two_ints__protocol",
+    "AddTwoInts_Event": "_add_two_ints",
     "AddTwoInts_Request": "_add_two_ints",
     "AddTwoInts_Response": "_add_two_ints",
 }
