@@ -361,7 +361,7 @@ class _Composition:
             parts |= {field.name: ListOf() for field in fields if field.is_list}
         if shape in (ServiceEvent, SendGoalResponse, GetResultRequest):
             parts["_codec_"] = OnDemand(_codecs)
-        purpose: str = shape.__doc__.replace("a call", subject).replace(
+        purpose = f"{shape.__doc__}".replace("a call", subject).replace(
             "a goal", subject
         )
         entries = [f"        {field.name}: {_spell(field)}\n" for field in fields]

@@ -197,17 +197,10 @@ class PackageView(msgspec.Struct, frozen=True):
     names: tuple[NameView, ...]
 
 
-def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str, str]:
-    """Return the names that an interface's modules offer, with their modules."""
-    homes = Homes(interface, modules)
-    names: dict[str, str] = {
-        python_names.class_(message.name): homes.of(message.name)
-        for message in derive.messages(interface)
-    }
-    for service in derive.services(interface):
-        names[python_names.class_(service.name)] = homes.classes
-    names[python_names.class_(interface.name)] = homes.classes
-    return names
+def exported(interface: ir.Interface) -> list[str]:
+    """Return the names that the module of an interface offers."""
+    parts = (*derive.messages(interface), *derive.services(interface), interface)
+    return [python_names.class_(part.name) for part in parts]
 
 
 def package(
@@ -220,7 +213,7 @@ def package(
     homes: dict[str, str] = {}
     for interface in model.own:
         if interface.name.kind == kind:
-            homes |= exported(interface, modules)
+            homes |= dict.fromkeys(exported(interface), modules[interface.name])
     by_module: dict[str, list[str]] = defaultdict(list)
     for name, module in homes.items():
         by_module[module].append(name)
