@@ -81,8 +81,10 @@ if TYPE_CHECKING:
     from .protocol import Action as Action
     from .protocol import ActionImpl as ActionImpl
     from .protocol import FeedbackMessage as FeedbackMessage
+    from .protocol import GetResult as GetResult
     from .protocol import GetResultRequest as GetResultRequest
     from .protocol import GetResultResponse as GetResultResponse
+    from .protocol import SendGoal as SendGoal
     from .protocol import SendGoalRequest as SendGoalRequest
     from .protocol import SendGoalResponse as SendGoalResponse
     from .protocol import Service as Service

@@ -26,7 +26,7 @@ from .sequences import ListOf, sequence_reader, sequence_writer
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, ClassVar, Generic, TypeVar
+    from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
@@ -238,6 +238,19 @@ class FeedbackMessage(Added, Generic[Feedback]):
         **options: Unpack[Options],
     ) -> None:
         self._fill(options, goal_id, feedback)
+
+
+if TYPE_CHECKING:
+
+    class SendGoal(Service):
+        """The service of an action that starts goals."""
+
+        Response: TypeAlias = SendGoalResponse
+
+    class GetResult(Service):
+        """The service of an action that waits for results."""
+
+        Request: TypeAlias = GetResultRequest
 
 
 # composing

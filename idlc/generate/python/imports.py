@@ -182,10 +182,11 @@ TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "A
 
 
 class NameView(msgspec.Struct, frozen=True):
-    """A class, and the module that it is in."""
+    """A class, and the module that it is in; `value` has it where no statement defines it."""
 
     name: Code
     module: Code
+    value: Code
 
 
 class PackageView(msgspec.Struct, frozen=True):
@@ -197,10 +198,30 @@ class PackageView(msgspec.Struct, frozen=True):
     names: tuple[NameView, ...]
 
 
-def exported(interface: ir.Interface) -> list[str]:
-    """Return the names that the module of an interface offers."""
-    parts = (*derive.messages(interface), *derive.services(interface), interface)
-    return [python_names.class_(part.name) for part in parts]
+def exported(interface: ir.Interface) -> dict[str, str]:
+    """Return the names that the module of an interface offers.
+
+    Those that ROS 2 adds come with the attributes that have them, others with nothing.
+    """
+    group = python_names.class_(interface.name)
+    values: dict[ir.TypeName, str] = {}
+    if isinstance(interface, ir.Service):
+        values = _parts(interface, group)
+    elif isinstance(interface, ir.Action):
+        send, get = derive.services(interface)
+        values = {
+            **_parts(send, f"{group}.Impl.SendGoalService"),
+            **_parts(get, f"{group}.Impl.GetResultService"),
+            derive.feedback_message(interface).name: f"{group}.Impl.FeedbackMessage",
+        }
+    written = [interface.name, *(section.name for section in derive.sections(interface))]
+    values |= dict.fromkeys(written, "")
+    return {python_names.class_(name): value for name, value in values.items()}
+
+
+def _parts(service: ir.Service, value: str) -> dict[ir.TypeName, str]:
+    parts = zip(derive.messages(service), ("Request", "Response", "Event"), strict=True)
+    return {service.name: value} | {part.name: f"{value}.{name}" for part, name in parts}
 
 
 def package(
@@ -210,20 +231,19 @@ def package(
     surroundings: Surroundings = ALONE,
 ) -> PackageView:
     """Return the view of one kind's package."""
-    homes: dict[str, str] = {}
-    for interface in model.own:
-        if interface.name.kind == kind:
-            homes |= dict.fromkeys(exported(interface), modules[interface.name])
-    by_module: dict[str, list[str]] = defaultdict(list)
-    for name, module in homes.items():
-        by_module[module].append(name)
+    names: list[NameView] = []
+    imports: list[str] = []
+    for module, interface in sorted(
+        ((modules[own.name], own) for own in model.own if own.name.kind == kind),
+        key=lambda pair: natural(pair[0]),
+    ):
+        values = exported(interface)
+        own = [name for name, value in values.items() if not value]
+        imports += statements(f".{module}", own, 4)
+        names += [NameView(Code(name), Code(module), Code(value)) for name, value in values.items()]
     return PackageView(
         title=Text(f"{TITLES[kind]} of {model.package}, imported when they are asked for."),
         runtime=Code(surroundings.runtime),
-        imports=tuple(
-            Code(line)
-            for module in sorted(by_module, key=natural)
-            for line in statements(f".{module}", by_module[module], 4)
-        ),
-        names=tuple(NameView(Code(name), Code(homes[name])) for name in sorted(homes, key=natural)),
+        imports=tuple(map(Code, imports)),
+        names=tuple(sorted(names, key=lambda view: natural(view.name))),
     )

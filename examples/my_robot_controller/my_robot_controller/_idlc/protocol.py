@@ -26,7 +26,7 @@ from .sequences import ListOf, sequence_reader, sequence_writer
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, ClassVar, Generic, TypeVar
+    from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
@@ -240,6 +240,19 @@ class FeedbackMessage(Added, Generic[Feedback]):
         self._fill(options, goal_id, feedback)
 
 
+if TYPE_CHECKING:
+
+    class SendGoal(Service):
+        """The service of an action that starts goals."""
+
+        Response: TypeAlias = SendGoalResponse
+
+    class GetResult(Service):
+        """The service of an action that waits for results."""
+
+        Request: TypeAlias = GetResultRequest
+
+
 # composing
 
 _lock = allocate_lock()
@@ -361,7 +374,7 @@ class _Composition:
             parts |= {field.name: ListOf() for field in fields if field.is_list}
         if shape in (ServiceEvent, SendGoalResponse, GetResultRequest):
             parts["_codec_"] = OnDemand(_codecs)
-        purpose: str = shape.__doc__.replace("a call", subject).replace(
+        purpose = f"{shape.__doc__}".replace("a call", subject).replace(
             "a goal", subject
         )
         entries = [f"        {field.name}: {_spell(field)}\n" for field in fields]

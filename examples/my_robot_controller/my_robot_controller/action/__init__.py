@@ -11,33 +11,34 @@ if TYPE_CHECKING:
     from ._countdown import (
         Countdown,
         Countdown_Feedback,
-        Countdown_FeedbackMessage,
-        Countdown_GetResult,
-        Countdown_GetResult_Event,
-        Countdown_GetResult_Request,
-        Countdown_GetResult_Response,
         Countdown_Goal,
         Countdown_Result,
-        Countdown_SendGoal,
-        Countdown_SendGoal_Event,
-        Countdown_SendGoal_Request,
-        Countdown_SendGoal_Response,
     )
     from ._execute_task import (
         ExecuteTask,
         ExecuteTask_Feedback,
-        ExecuteTask_FeedbackMessage,
-        ExecuteTask_GetResult,
-        ExecuteTask_GetResult_Event,
-        ExecuteTask_GetResult_Request,
-        ExecuteTask_GetResult_Response,
         ExecuteTask_Goal,
         ExecuteTask_Result,
-        ExecuteTask_SendGoal,
-        ExecuteTask_SendGoal_Event,
-        ExecuteTask_SendGoal_Request,
-        ExecuteTask_SendGoal_Response,
     )
+
+    Countdown_FeedbackMessage = Countdown.Impl.FeedbackMessage
+    Countdown_GetResult = Countdown.Impl.GetResultService
+    Countdown_GetResult_Event = Countdown.Impl.GetResultService.Event
+    Countdown_GetResult_Request = Countdown.Impl.GetResultService.Request
+    Countdown_GetResult_Response = Countdown.Impl.GetResultService.Response
+    Countdown_SendGoal = Countdown.Impl.SendGoalService
+    Countdown_SendGoal_Event = Countdown.Impl.SendGoalService.Event
+    Countdown_SendGoal_Request = Countdown.Impl.SendGoalService.Request
+    Countdown_SendGoal_Response = Countdown.Impl.SendGoalService.Response
+    ExecuteTask_FeedbackMessage = ExecuteTask.Impl.FeedbackMessage
+    ExecuteTask_GetResult = ExecuteTask.Impl.GetResultService
+    ExecuteTask_GetResult_Event = ExecuteTask.Impl.GetResultService.Event
+    ExecuteTask_GetResult_Request = ExecuteTask.Impl.GetResultService.Request
+    ExecuteTask_GetResult_Response = ExecuteTask.Impl.GetResultService.Response
+    ExecuteTask_SendGoal = ExecuteTask.Impl.SendGoalService
+    ExecuteTask_SendGoal_Event = ExecuteTask.Impl.SendGoalService.Event
+    ExecuteTask_SendGoal_Request = ExecuteTask.Impl.SendGoalService.Request
+    ExecuteTask_SendGoal_Response = ExecuteTask.Impl.SendGoalService.Response
 
 __all__ = [
     "Countdown",

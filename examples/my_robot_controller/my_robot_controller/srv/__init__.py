@@ -8,12 +8,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._add_two_ints import (
-        AddTwoInts,
-        AddTwoInts_Event,
-        AddTwoInts_Request,
-        AddTwoInts_Response,
-    )
+    from ._add_two_ints import AddTwoInts, AddTwoInts_Request, AddTwoInts_Response
+
+    AddTwoInts_Event = AddTwoInts.Event
 
 __all__ = [
     "AddTwoInts",

@@ -8,21 +8,17 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._fill import (
-        Fill,
-        Fill_Feedback,
-        Fill_FeedbackMessage,
-        Fill_GetResult,
-        Fill_GetResult_Event,
-        Fill_GetResult_Request,
-        Fill_GetResult_Response,
-        Fill_Goal,
-        Fill_Result,
-        Fill_SendGoal,
-        Fill_SendGoal_Event,
-        Fill_SendGoal_Request,
-        Fill_SendGoal_Response,
-    )
+    from ._fill import Fill, Fill_Feedback, Fill_Goal, Fill_Result
+
+    Fill_FeedbackMessage = Fill.Impl.FeedbackMessage
+    Fill_GetResult = Fill.Impl.GetResultService
+    Fill_GetResult_Event = Fill.Impl.GetResultService.Event
+    Fill_GetResult_Request = Fill.Impl.GetResultService.Request
+    Fill_GetResult_Response = Fill.Impl.GetResultService.Response
+    Fill_SendGoal = Fill.Impl.SendGoalService
+    Fill_SendGoal_Event = Fill.Impl.SendGoalService.Event
+    Fill_SendGoal_Request = Fill.Impl.SendGoalService.Request
+    Fill_SendGoal_Response = Fill.Impl.SendGoalService.Response
 
 __all__ = [
     "Fill",

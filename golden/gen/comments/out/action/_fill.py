@@ -132,30 +132,14 @@ class Fill(_idlc.Action):  # noqa
     if TYPE_CHECKING:
 
         class Impl(_idlc.ActionImpl):
-            class SendGoalService(_idlc.Service):
+            class SendGoalService(_idlc.SendGoal):
                 class Request(_idlc.SendGoalRequest[Fill_Goal]): ...
 
-                class Response(_idlc.SendGoalResponse): ...
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-            class GetResultService(_idlc.Service):
-                class Request(_idlc.GetResultRequest): ...
-
+            class GetResultService(_idlc.GetResult):
                 class Response(_idlc.GetResultResponse[Fill_Result]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
 
             class FeedbackMessage(_idlc.FeedbackMessage[Fill_Feedback]): ...
-
-
-if TYPE_CHECKING:
-    Fill_SendGoal: _idlc.TypeAlias = Fill.Impl.SendGoalService
-    Fill_SendGoal_Request: _idlc.TypeAlias = Fill_SendGoal.Request
-    Fill_SendGoal_Response: _idlc.TypeAlias = Fill_SendGoal.Response
-    Fill_SendGoal_Event: _idlc.TypeAlias = Fill_SendGoal.Event
-    Fill_GetResult: _idlc.TypeAlias = Fill.Impl.GetResultService
-    Fill_GetResult_Request: _idlc.TypeAlias = Fill_GetResult.Request
-    Fill_GetResult_Response: _idlc.TypeAlias = Fill_GetResult.Response
-    Fill_GetResult_Event: _idlc.TypeAlias = Fill_GetResult.Event
-    Fill_FeedbackMessage: _idlc.TypeAlias = Fill.Impl.FeedbackMessage

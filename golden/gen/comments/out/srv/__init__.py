@@ -8,7 +8,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._reset import Reset, Reset_Event, Reset_Request, Reset_Response
+    from ._reset import Reset, Reset_Request, Reset_Response
+
+    Reset_Event = Reset.Event
 
 __all__ = [
     "Reset",

@@ -94,7 +94,3 @@ class Reset(_idlc.Service):  # noqa
     if TYPE_CHECKING:
 
         class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-
-if TYPE_CHECKING:
-    Reset_Event: _idlc.TypeAlias = Reset.Event

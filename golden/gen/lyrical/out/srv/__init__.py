@@ -8,7 +8,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._run import Run, Run_Event, Run_Request, Run_Response
+    from ._run import Run, Run_Request, Run_Response
+
+    Run_Event = Run.Event
 
 __all__ = [
     "Run",

@@ -118,7 +118,3 @@ class Run(_idlc.Service):  # noqa
     if TYPE_CHECKING:
 
         class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-
-if TYPE_CHECKING:
-    Run_Event: _idlc.TypeAlias = Run.Event

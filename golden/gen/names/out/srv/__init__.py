@@ -8,7 +8,9 @@ from .. import _idlc
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from ._none import None_, None_Event, None_Request, None_Response
+    from ._none import None_, None_Request, None_Response
+
+    None_Event = None_.Event
 
 __all__ = [
     "None_",

@@ -64,7 +64,3 @@ class None_(_idlc.Service):  # noqa
     if TYPE_CHECKING:
 
         class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-
-if TYPE_CHECKING:
-    None_Event: _idlc.TypeAlias = None_.Event

@@ -142,30 +142,14 @@ class Countdown(_idlc.Action):  # noqa
     if TYPE_CHECKING:
 
         class Impl(_idlc.ActionImpl):
-            class SendGoalService(_idlc.Service):
+            class SendGoalService(_idlc.SendGoal):
                 class Request(_idlc.SendGoalRequest[Countdown_Goal]): ...
 
-                class Response(_idlc.SendGoalResponse): ...
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-            class GetResultService(_idlc.Service):
-                class Request(_idlc.GetResultRequest): ...
-
+            class GetResultService(_idlc.GetResult):
                 class Response(_idlc.GetResultResponse[Countdown_Result]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
 
             class FeedbackMessage(_idlc.FeedbackMessage[Countdown_Feedback]): ...
-
-
-if TYPE_CHECKING:
-    Countdown_SendGoal: _idlc.TypeAlias = Countdown.Impl.SendGoalService
-    Countdown_SendGoal_Request: _idlc.TypeAlias = Countdown_SendGoal.Request
-    Countdown_SendGoal_Response: _idlc.TypeAlias = Countdown_SendGoal.Response
-    Countdown_SendGoal_Event: _idlc.TypeAlias = Countdown_SendGoal.Event
-    Countdown_GetResult: _idlc.TypeAlias = Countdown.Impl.GetResultService
-    Countdown_GetResult_Request: _idlc.TypeAlias = Countdown_GetResult.Request
-    Countdown_GetResult_Response: _idlc.TypeAlias = Countdown_GetResult.Response
-    Countdown_GetResult_Event: _idlc.TypeAlias = Countdown_GetResult.Event
-    Countdown_FeedbackMessage: _idlc.TypeAlias = Countdown.Impl.FeedbackMessage

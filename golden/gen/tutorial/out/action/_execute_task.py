@@ -134,30 +134,14 @@ class ExecuteTask(_idlc.Action):  # noqa
     if TYPE_CHECKING:
 
         class Impl(_idlc.ActionImpl):
-            class SendGoalService(_idlc.Service):
+            class SendGoalService(_idlc.SendGoal):
                 class Request(_idlc.SendGoalRequest[ExecuteTask_Goal]): ...
 
-                class Response(_idlc.SendGoalResponse): ...
+                class Event(_idlc.ServiceEvent[Request, _idlc.SendGoalResponse]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-            class GetResultService(_idlc.Service):
-                class Request(_idlc.GetResultRequest): ...
-
+            class GetResultService(_idlc.GetResult):
                 class Response(_idlc.GetResultResponse[ExecuteTask_Result]): ...
 
-                class Event(_idlc.ServiceEvent[Request, Response]): ...
+                class Event(_idlc.ServiceEvent[_idlc.GetResultRequest, Response]): ...
 
             class FeedbackMessage(_idlc.FeedbackMessage[ExecuteTask_Feedback]): ...
-
-
-if TYPE_CHECKING:
-    ExecuteTask_SendGoal: _idlc.TypeAlias = ExecuteTask.Impl.SendGoalService
-    ExecuteTask_SendGoal_Request: _idlc.TypeAlias = ExecuteTask_SendGoal.Request
-    ExecuteTask_SendGoal_Response: _idlc.TypeAlias = ExecuteTask_SendGoal.Response
-    ExecuteTask_SendGoal_Event: _idlc.TypeAlias = ExecuteTask_SendGoal.Event
-    ExecuteTask_GetResult: _idlc.TypeAlias = ExecuteTask.Impl.GetResultService
-    ExecuteTask_GetResult_Request: _idlc.TypeAlias = ExecuteTask_GetResult.Request
-    ExecuteTask_GetResult_Response: _idlc.TypeAlias = ExecuteTask_GetResult.Response
-    ExecuteTask_GetResult_Event: _idlc.TypeAlias = ExecuteTask_GetResult.Event
-    ExecuteTask_FeedbackMessage: _idlc.TypeAlias = ExecuteTask.Impl.FeedbackMessage

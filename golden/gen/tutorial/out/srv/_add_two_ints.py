@@ -100,7 +100,3 @@ class AddTwoInts(_idlc.Service):  # noqa
     if TYPE_CHECKING:
 
         class Event(_idlc.ServiceEvent[Request, Response]): ...
-
-
-if TYPE_CHECKING:
-    AddTwoInts_Event: _idlc.TypeAlias = AddTwoInts.Event
