@@ -33,6 +33,11 @@ def owner_of(kind: type) -> Any:
     return owner
 
 
+def equals_other(_message: Any, _other: Any) -> bool:
+    """Return how a message compares with what is not of its class."""
+    return NotImplemented  # type: ignore[no-any-return]
+
+
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     kind = type(mine)

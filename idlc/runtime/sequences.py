@@ -100,6 +100,11 @@ class NumberSequence(Generic[Number]):
         return property(slot.__get__, setter)
 
     @classmethod
+    def default(cls, *values: Number) -> Fresh[array[Number]]:
+        """Return the class attribute of a declared default."""
+        return Fresh(array, cls.code, values)
+
+    @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a sequence."""
         from .on_demand.conversions import numbers_schema

@@ -46,11 +46,10 @@ from .message import (
     Package,
     Service,
     complete,
-    dataclass,
-    table,
+    define,
 )
 from .names import lazily
-from .objects import same
+from .objects import equals_other, same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -70,8 +69,6 @@ from .sequences import (
     sequence_reader,
     sequence_writer,
     several,
-    to_array,
-    to_list,
 )
 
 #: What generated code expects of the runtime. Each runtime serves all code of its number.
@@ -79,16 +76,14 @@ PROTOCOL = 1
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from .hints import Any as Any
     from .hints import Floats as Floats
     from .hints import Integers as Integers
     from .hints import Iterable as Iterable
     from .hints import Join as Join
     from .hints import Options as Options
-    from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
 else:
-    _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
+    _HINTS = "Floats Integers Iterable Join Options Unpack"
     __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
 
 __all__ = [
@@ -127,7 +122,8 @@ __all__ = [
     "array_of",
     "complete",
     "construct",
-    "dataclass",
+    "define",
+    "equals_other",
     "flags",
     "flags_writer",
     "importing",
@@ -149,12 +145,9 @@ __all__ = [
     "several",
     "sizes",
     "strings_reader",
-    "table",
     "text_block",
     "text_phases",
     "texts_reader",
-    "to_array",
-    "to_list",
     "unsized",
     "wide_block",
     "wide_text",

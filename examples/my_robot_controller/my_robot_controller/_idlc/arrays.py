@@ -10,6 +10,7 @@ import numpy as np
 
 from .cdr import NATIVE
 from .names import name_of
+from .sequences import Fresh
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -71,7 +72,6 @@ FLOAT32 = np.dtype("float32")
 FLOAT64 = np.dtype("float64")
 
 zeros = np.zeros
-array = np.array
 
 
 class NumberArray(Generic[Element]):
@@ -95,6 +95,11 @@ class NumberArray(Generic[Element]):
             store(message, to_ndarray(dtype, size, values, name))
 
         return property(slot.__get__, setter)
+
+    @classmethod
+    def default(cls, *values: float) -> Fresh[NDArray[Element]]:
+        """Return the class attribute of a declared default."""
+        return Fresh(np.array, values, cls.dtype)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
@@ -247,11 +252,9 @@ __all__ = [
     "UInt16Array",
     "UInt32Array",
     "UInt64Array",
-    "array",
     "array_reader",
     "array_writer",
     "buffer_writer",
-    "to_ndarray",
     "view_reader",
     "zeros",
 ]

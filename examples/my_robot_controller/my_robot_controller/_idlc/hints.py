@@ -34,12 +34,10 @@ class Options(TypedDict, total=False):
 
 
 __all__ = [
-    "Any",
     "Floats",
     "Integers",
     "Iterable",
     "Join",
     "Options",
-    "TypeAlias",
     "Unpack",
 ]
