@@ -81,9 +81,10 @@ if TYPE_CHECKING:
     from .hints import Iterable as Iterable
     from .hints import Join as Join
     from .hints import Options as Options
+    from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
 else:
-    _HINTS = "Floats Integers Iterable Join Options Unpack"
+    _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
 
 __all__ = [

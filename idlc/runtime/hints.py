@@ -39,5 +39,6 @@ __all__ = [
     "Iterable",
     "Join",
     "Options",
+    "TypeAlias",
     "Unpack",
 ]

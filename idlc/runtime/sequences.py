@@ -46,24 +46,12 @@ MANY = 1 << 16
 _TAKEN = (list, tuple, array, bytes, bytearray)
 
 
-def to_array(code: str, values: Any, name: str) -> Any:
+def converted(code: str, values: Any) -> Any:
     """Return `values` as a new array of type `code`, as rosidl's classes do.
 
     Bytes are the memory of the elements. Buffers of the same type (of numpy, memoryview) are
-    copied whole. Raises FieldTypeError, FieldRangeError or ValidationError with the `name` of
-    the field.
+    copied whole. Errors are those of `array`.
     """
-    try:
-        return converted(code, values)
-    except (TypeError, ValueError, OverflowError) as error:
-        failure = error
-    from .on_demand.typeinfo import refused
-
-    raise refused(name, code, None, values, failure) from None
-
-
-def converted(code: str, values: Any) -> Any:
-    """Return the same; errors are those of `array`."""
     if isinstance(values, _TAKEN):
         return array(code, values)
     try:
@@ -95,7 +83,14 @@ class NumberSequence(Generic[Number]):
         store = slot.__set__
 
         def setter(message: object, values: Any) -> None:
-            store(message, to_array(code, values, name))
+            try:
+                store(message, converted(code, values))
+                return
+            except (TypeError, ValueError, OverflowError) as error:
+                failure = error
+            from .on_demand.typeinfo import refused
+
+            raise refused(name, code, None, values, failure) from None
 
         return property(slot.__get__, setter)
 

@@ -133,9 +133,9 @@ BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "locals", "object
 class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     """A field. `wire_name` and `idl` are its name and type in rosidl.
 
-    `fresh` is the default of a field whose parameter is None without an argument. Whoever assigns
-    to a field that `converts` calls a property. `is_array`: whatever holds them, the field is equal
-    to another if its elements are.
+    `fresh` is the default of a field whose parameter is None without an argument. Assigning to a
+    field of `numbers` takes longer than to its slot, because it converts them. `is_array`: the
+    field is equal to another with the same elements, whatever holds them.
     """
 
     name: Code
@@ -146,7 +146,7 @@ class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     parameter: Code
     fresh: Code
     docstring: Docstring
-    converts: bool
+    numbers: bool
     is_scalar: bool
     is_array: bool
 
@@ -232,10 +232,9 @@ def view(
         parameter=Code(shape.parameter),
         fresh=Code(shape.fresh),
         docstring=attribute(field, file),
-        converts=shape.converts,
+        numbers=shape.numbers,
         is_scalar=isinstance(field.type, (ir.Primitive, ir.String)),
-        is_array=shape.converts
-        or (is_list and isinstance(ir.element_of(field.type), ir.Primitive))
+        is_array=(is_list and isinstance(ir.element_of(field.type), ir.Primitive))
         or not references.knows(ir.element_of(field.type)),
     )
 
@@ -257,7 +256,7 @@ class _Shape(NamedTuple):
     annotation: str
     parameter: str
     fresh: str = ""
-    converts: bool = False
+    numbers: bool = False
 
 
 def _shape(field: ir.Field, references: References, naming: Naming, *, converts: bool) -> _Shape:
@@ -280,7 +279,7 @@ def _shape(field: ir.Field, references: References, naming: Naming, *, converts:
         inside = getattr(ir.element_of(field.type), "name", "")
         read = f"_idlc.read_{LIST_PRIMITIVES[inside]}" if inside in LIST_PRIMITIVES else ""
         annotation = f"_idlc.ListOf[{element}] = _idlc.ListOf({read})"
-        return _Shape(annotation, f"_idlc.Iterable[{element}] | None = None", fresh, True)
+        return _Shape(annotation, f"_idlc.Iterable[{element}] | None = None", fresh)
     annotation = f"{naming.builtins}list[{element}]"
     return _Shape(annotation, f"{annotation} | None = None", fresh)
 

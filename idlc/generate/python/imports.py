@@ -40,6 +40,10 @@ def _import_from(module: str, names: tuple[str, ...], margin: str) -> list[str]:
     return [f"{margin}from {module} import (", *items, f"{margin})"]
 
 
+#: Classes of Python that generated modules name.
+_TAKEN = {*dir(builtins), "Any"}
+
+
 class Homes:
     """The module of each structure of a package, without the package and the kind.
 
@@ -101,7 +105,7 @@ class References:
             by_class[python_names.class_(name)].append(name)
         return {
             name: python_names.class_(name)
-            if name in own or (len(same) == 1 and not hasattr(builtins, class_))
+            if name in own or (len(same) == 1 and class_ not in _TAKEN)
             else python_names.qualified_class(name)
             for class_, same in by_class.items()
             for name in same

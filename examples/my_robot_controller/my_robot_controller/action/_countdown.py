@@ -127,9 +127,9 @@ class Countdown_Feedback(_idlc.Message):  # noqa
 class Countdown(_idlc.Action):  # noqa
     """The action my_robot_controller/action/Countdown."""
 
-    Goal = Countdown_Goal
-    Result = Countdown_Result
-    Feedback = Countdown_Feedback
+    Goal: _idlc.TypeAlias = Countdown_Goal
+    Result: _idlc.TypeAlias = Countdown_Result
+    Feedback: _idlc.TypeAlias = Countdown_Feedback
     if TYPE_CHECKING:
         from ._countdown__protocol import (
             Countdown_Impl as Impl,

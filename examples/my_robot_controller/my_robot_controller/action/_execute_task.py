@@ -117,9 +117,9 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
 class ExecuteTask(_idlc.Action):  # noqa
     """The action my_robot_controller/action/ExecuteTask."""
 
-    Goal = ExecuteTask_Goal
-    Result = ExecuteTask_Result
-    Feedback = ExecuteTask_Feedback
+    Goal: _idlc.TypeAlias = ExecuteTask_Goal
+    Result: _idlc.TypeAlias = ExecuteTask_Result
+    Feedback: _idlc.TypeAlias = ExecuteTask_Feedback
     if TYPE_CHECKING:
         from ._execute_task__protocol import (
             ExecuteTask_Impl as Impl,

@@ -117,9 +117,9 @@ class Fill_Feedback(_idlc.Message):  # noqa
 class Fill(_idlc.Action):  # noqa
     """The action comments_msgs/action/Fill."""
 
-    Goal = Fill_Goal
-    Result = Fill_Result
-    Feedback = Fill_Feedback
+    Goal: _idlc.TypeAlias = Fill_Goal
+    Result: _idlc.TypeAlias = Fill_Result
+    Feedback: _idlc.TypeAlias = Fill_Feedback
     if TYPE_CHECKING:
         from ._fill__protocol import (
             Fill_Impl as Impl,

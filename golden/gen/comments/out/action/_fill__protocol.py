@@ -351,17 +351,17 @@ class Fill_FeedbackMessage(_idlc.Message):  # noqa
 class Fill_SendGoal(_idlc.Service):  # noqa
     """Starts a Fill goal. Added by ROS 2."""
 
-    Request = Fill_SendGoal_Request
-    Response = Fill_SendGoal_Response
-    Event = Fill_SendGoal_Event
+    Request: _idlc.TypeAlias = Fill_SendGoal_Request
+    Response: _idlc.TypeAlias = Fill_SendGoal_Response
+    Event: _idlc.TypeAlias = Fill_SendGoal_Event
 
 
 class Fill_GetResult(_idlc.Service):  # noqa
     """Waits for the result of a Fill goal. Added by ROS 2."""
 
-    Request = Fill_GetResult_Request
-    Response = Fill_GetResult_Response
-    Event = Fill_GetResult_Event
+    Request: _idlc.TypeAlias = Fill_GetResult_Request
+    Response: _idlc.TypeAlias = Fill_GetResult_Response
+    Event: _idlc.TypeAlias = Fill_GetResult_Event
 
 
 class Fill_Impl:

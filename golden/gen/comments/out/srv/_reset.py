@@ -82,8 +82,8 @@ class Reset_Response(_idlc.Message):  # noqa
 class Reset(_idlc.Service):  # noqa
     """The service comments_msgs/srv/Reset."""
 
-    Request = Reset_Request
-    Response = Reset_Response
+    Request: _idlc.TypeAlias = Reset_Request
+    Response: _idlc.TypeAlias = Reset_Response
     if TYPE_CHECKING:
         from ._reset__protocol import (
             Reset_Event as Event,

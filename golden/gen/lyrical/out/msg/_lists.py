@@ -29,7 +29,7 @@ class Lists(_idlc.Message):  # noqa
         "str",
         "position",
         "data",
-        "texts_in_a_field_with_a_long_name",
+        "texts_in_a_long_field_name",
     )
     _fields_and_field_types = {
         "names": "sequence<string>",
@@ -41,7 +41,7 @@ class Lists(_idlc.Message):  # noqa
         "str": "sequence<string, 2>",
         "position": "float[3]",
         "data": "sequence<uint8>",
-        "texts_in_a_field_with_a_long_name": "sequence<string>",
+        "texts_in_a_long_field_name": "sequence<string>",
     }
 
     NAMES__DEFAULT = _idlc.FreshList(
@@ -67,8 +67,8 @@ class Lists(_idlc.Message):  # noqa
     """float32[3] position (msg/Lists.msg)"""
     data: _idlc.UInt8Sequence = _idlc.UInt8Sequence()
     """uint8[] data (msg/Lists.msg)"""
-    texts_in_a_field_with_a_long_name: _idlc.ListOf[_builtins.str] = _idlc.ListOf()
-    """string[] texts_in_a_field_with_a_long_name (msg/Lists.msg)"""
+    texts_in_a_long_field_name: _idlc.ListOf[_builtins.str] = _idlc.ListOf()
+    """string[] texts_in_a_long_field_name (msg/Lists.msg)"""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class Lists(_idlc.Message):  # noqa
         str: _idlc.Iterable[_builtins.str] | None = None,
         position: _arrays.Values | None = None,
         data: _idlc.Integers | None = None,
-        texts_in_a_field_with_a_long_name: _idlc.Iterable[_builtins.str] | None = None,
+        texts_in_a_long_field_name: _idlc.Iterable[_builtins.str] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if names is None:
@@ -93,29 +93,23 @@ class Lists(_idlc.Message):  # noqa
                 return
         self.names = names
         if words is None:
-            self._words = []
-        else:
-            self.words = words
+            words = []
+        self.words = words
         if three is None:
-            self._three = _idlc.several(Words, 3)
-        else:
-            self.three = three
+            three = _idlc.several(Words, 3)
+        self.three = three
         if flags is None:
-            self._flags = []
-        else:
-            self.flags = flags
+            flags = []
+        self.flags = flags
         if raw is None:
-            self._raw = [b"\x00"] * 2
-        else:
-            self.raw = raw
+            raw = [b"\x00"] * 2
+        self.raw = raw
         if wide is None:
-            self._wide = [""] * 2
-        else:
-            self.wide = wide
+            wide = [""] * 2
+        self.wide = wide
         if str is None:
-            self._str = []
-        else:
-            self.str = str
+            str = []
+        self.str = str
         if position is None:
             self._position = _arrays.zeros(3, _arrays.FLOAT32)
         else:
@@ -124,48 +118,32 @@ class Lists(_idlc.Message):  # noqa
             self._data = _array("B")
         else:
             self.data = data
-        if texts_in_a_field_with_a_long_name is None:
-            self._texts_in_a_field_with_a_long_name = []
-        else:
-            self.texts_in_a_field_with_a_long_name = texts_in_a_field_with_a_long_name
+        if texts_in_a_long_field_name is None:
+            texts_in_a_long_field_name = []
+        self.texts_in_a_long_field_name = texts_in_a_long_field_name
 
     def __eq__(self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Lists):
             return _idlc.equals_other(self, other)
+        if not self.names == other.names:
+            return False
+        if not self.words == other.words:
+            return False
+        if not self.three == other.three:
+            return False
         if not _idlc.same(
-            self._names,
-            other._names,
+            self.flags,
+            other.flags,
         ):
             return False
         if not _idlc.same(
-            self._words,
-            other._words,
+            self.raw,
+            other.raw,
         ):
             return False
-        if not _idlc.same(
-            self._three,
-            other._three,
-        ):
+        if not self.wide == other.wide:
             return False
-        if not _idlc.same(
-            self._flags,
-            other._flags,
-        ):
-            return False
-        if not _idlc.same(
-            self._raw,
-            other._raw,
-        ):
-            return False
-        if not _idlc.same(
-            self._wide,
-            other._wide,
-        ):
-            return False
-        if not _idlc.same(
-            self._str,
-            other._str,
-        ):
+        if not self.str == other.str:
             return False
         if not _idlc.same(
             self._position,
@@ -177,9 +155,6 @@ class Lists(_idlc.Message):  # noqa
             other._data,
         ):
             return False
-        if not _idlc.same(
-            self._texts_in_a_field_with_a_long_name,
-            other._texts_in_a_field_with_a_long_name,
-        ):
+        if not self.texts_in_a_long_field_name == other.texts_in_a_long_field_name:
             return False
         return True

@@ -42,7 +42,7 @@ def lists_codec(
     array_of_uint8 = _idlc.sequence_writer(order, "B")
     array = _idlc.array_of(order)
     write_values_at = _idlc.phases(order, "3fI")
-    write_texts_in_a_field_with_a_long_name = _idlc.text_block(order)
+    write_texts_in_a_long_field_name = _idlc.text_block(order)
     new_lists = _idlc.maker(kind)
     new_words = _idlc.maker(Words)
     read_count = _idlc.layout(order, "I", start=4).unpack_from
@@ -58,7 +58,7 @@ def lists_codec(
     array_of_float32_3 = _arrays.array_reader(order, "float32", 3, reading)
     read_values_2 = _idlc.layout(order, "3fI").unpack_from
     read_uint8 = _idlc.sequence_reader(order, "B", reading)
-    read_texts_in_a_field_with_a_long_name = _idlc.texts_reader(order, text_2)
+    read_texts_in_a_long_field_name = _idlc.texts_reader(order, text_2)
     small = reading.small
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -130,11 +130,11 @@ def lists_codec(
         )
         put(data_2)
         low = data_2_count
-        texts_in_a_field_with_a_long_name = write_texts_in_a_field_with_a_long_name(
-            message._texts_in_a_field_with_a_long_name,
+        texts_in_a_long_field_name = write_texts_in_a_long_field_name(
+            message._texts_in_a_long_field_name,
         )
         put(pad4[low & 3])
-        put(texts_in_a_field_with_a_long_name)
+        put(texts_in_a_long_field_name)
         raw = join(parts)
         if len(data_2) != data_2_count:
             return encode(message, join)
@@ -206,9 +206,9 @@ def lists_codec(
         at = end + 3 & -4
         (count,) = read_count_2(data, at)
         (
-            message._texts_in_a_field_with_a_long_name,
+            message._texts_in_a_long_field_name,
             end,
-        ) = read_texts_in_a_field_with_a_long_name(data, at + 4, count)
+        ) = read_texts_in_a_long_field_name(data, at + 4, count)
         return message
 
     return _idlc.Codec(encode, decode, bulk=True)

@@ -58,10 +58,7 @@ class Run_Request(_idlc.Message):  # noqa
             return _idlc.equals_other(self, other)
         if self.wait != other.wait:
             return False
-        if not _idlc.same(
-            self._args,
-            other._args,
-        ):
+        if not self.args == other.args:
             return False
         return True
 
@@ -104,19 +101,15 @@ class Run_Response(_idlc.Message):  # noqa
                 return
         self.status = status
         if stamps is None:
-            self._stamps = []
-        else:
-            self.stamps = stamps
+            stamps = []
+        self.stamps = stamps
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Response):
             return _idlc.equals_other(self, other)
         if self.status != other.status:
             return False
-        if not _idlc.same(
-            self._stamps,
-            other._stamps,
-        ):
+        if not self.stamps == other.stamps:
             return False
         return True
 
@@ -124,8 +117,8 @@ class Run_Response(_idlc.Message):  # noqa
 class Run(_idlc.Service):  # noqa
     """The service lyrical_msgs/srv/Run."""
 
-    Request = Run_Request
-    Response = Run_Response
+    Request: _idlc.TypeAlias = Run_Request
+    Response: _idlc.TypeAlias = Run_Response
     if TYPE_CHECKING:
         from ._run__protocol import (
             Run_Event as Event,

@@ -53,13 +53,11 @@ class Run_Event(_idlc.Message):  # noqa
             info = _service_msgs_msg.ServiceEventInfo()
         self.info = info
         if request is None:
-            self._request = []
-        else:
-            self.request = request
+            request = []
+        self.request = request
         if response is None:
-            self._response = []
-        else:
-            self.response = response
+            response = []
+        self.response = response
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Event):
@@ -69,15 +67,9 @@ class Run_Event(_idlc.Message):  # noqa
             other.info,
         ):
             return False
-        if not _idlc.same(
-            self._request,
-            other._request,
-        ):
+        if not self.request == other.request:
             return False
-        if not _idlc.same(
-            self._response,
-            other._response,
-        ):
+        if not self.response == other.response:
             return False
         return True
 

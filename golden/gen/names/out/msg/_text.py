@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from .. import _idlc
-from ._any import Any
+from ._any import Any as names_msgs_Any
 from ._point import Point as names_msgs_Point
 
 with _idlc.importing():
@@ -36,14 +36,14 @@ class Text(_idlc.Message):  # noqa
     """geometry_msgs/Point other (msg/Text.msg)"""
     own: names_msgs_Point
     """names_msgs/Point own (msg/Text.msg)"""
-    any: list[Any]
+    any: list[names_msgs_Any]
     """names_msgs/Any[<=2] any (msg/Text.msg)"""
 
     def __init__(
         self,
         other: geometry_msgs_Point | None = None,
         own: names_msgs_Point | None = None,
-        any: list[Any] | None = None,
+        any: list[names_msgs_Any] | None = None,
         **options: _idlc.Unpack[_idlc.Options],
     ) -> None:
         if other is None:

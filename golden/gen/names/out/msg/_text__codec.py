@@ -23,7 +23,7 @@ def text_codec(
     reading: _idlc.Reading,
 ) -> _idlc.Codec:
     """Return what writes and reads Text in one byte order."""
-    from ._any import Any
+    from ._any import Any as names_msgs_Any
     from ._point import Point as names_msgs_Point
 
     with _idlc.importing():
@@ -41,7 +41,7 @@ def text_codec(
     new_text = _idlc.maker(kind)
     new_point = _idlc.maker(geometry_msgs_Point)
     new_point_2 = _idlc.maker(names_msgs_Point)
-    new_any = _idlc.maker(Any)
+    new_any = _idlc.maker(names_msgs_Any)
     new_pose = _idlc.maker(Pose)
     new_quaternion = _idlc.maker(Quaternion)
     read_values = _idlc.layout(order, "dddddI", start=4).unpack_from

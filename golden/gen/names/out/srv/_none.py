@@ -56,8 +56,8 @@ class None_Response(_idlc.Message):  # noqa
 class None_(_idlc.Service):  # noqa
     """The service names_msgs/srv/None."""
 
-    Request = None_Request
-    Response = None_Response
+    Request: _idlc.TypeAlias = None_Request
+    Response: _idlc.TypeAlias = None_Response
     if TYPE_CHECKING:
         from ._none__protocol import (
             None_Event as Event,

@@ -351,17 +351,17 @@ class Countdown_FeedbackMessage(_idlc.Message):  # noqa
 class Countdown_SendGoal(_idlc.Service):  # noqa
     """Starts a Countdown goal. Added by ROS 2."""
 
-    Request = Countdown_SendGoal_Request
-    Response = Countdown_SendGoal_Response
-    Event = Countdown_SendGoal_Event
+    Request: _idlc.TypeAlias = Countdown_SendGoal_Request
+    Response: _idlc.TypeAlias = Countdown_SendGoal_Response
+    Event: _idlc.TypeAlias = Countdown_SendGoal_Event
 
 
 class Countdown_GetResult(_idlc.Service):  # noqa
     """Waits for the result of a Countdown goal. Added by ROS 2."""
 
-    Request = Countdown_GetResult_Request
-    Response = Countdown_GetResult_Response
-    Event = Countdown_GetResult_Event
+    Request: _idlc.TypeAlias = Countdown_GetResult_Request
+    Response: _idlc.TypeAlias = Countdown_GetResult_Response
+    Event: _idlc.TypeAlias = Countdown_GetResult_Event
 
 
 class Countdown_Impl:

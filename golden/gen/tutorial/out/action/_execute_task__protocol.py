@@ -351,17 +351,17 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):  # noqa
 class ExecuteTask_SendGoal(_idlc.Service):  # noqa
     """Starts a ExecuteTask goal. Added by ROS 2."""
 
-    Request = ExecuteTask_SendGoal_Request
-    Response = ExecuteTask_SendGoal_Response
-    Event = ExecuteTask_SendGoal_Event
+    Request: _idlc.TypeAlias = ExecuteTask_SendGoal_Request
+    Response: _idlc.TypeAlias = ExecuteTask_SendGoal_Response
+    Event: _idlc.TypeAlias = ExecuteTask_SendGoal_Event
 
 
 class ExecuteTask_GetResult(_idlc.Service):  # noqa
     """Waits for the result of a ExecuteTask goal. Added by ROS 2."""
 
-    Request = ExecuteTask_GetResult_Request
-    Response = ExecuteTask_GetResult_Response
-    Event = ExecuteTask_GetResult_Event
+    Request: _idlc.TypeAlias = ExecuteTask_GetResult_Request
+    Response: _idlc.TypeAlias = ExecuteTask_GetResult_Response
+    Event: _idlc.TypeAlias = ExecuteTask_GetResult_Event
 
 
 class ExecuteTask_Impl:

@@ -92,8 +92,8 @@ class AddTwoInts_Response(_idlc.Message):  # noqa
 class AddTwoInts(_idlc.Service):  # noqa
     """The service tutorial_msgs/srv/AddTwoInts."""
 
-    Request = AddTwoInts_Request
-    Response = AddTwoInts_Response
+    Request: _idlc.TypeAlias = AddTwoInts_Request
+    Response: _idlc.TypeAlias = AddTwoInts_Response
     if TYPE_CHECKING:
         from ._add_two_ints__protocol import (
             AddTwoInts_Event as Event,
