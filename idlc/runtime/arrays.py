@@ -10,7 +10,6 @@ import numpy as np
 
 from .cdr import NATIVE
 from .names import name_of
-from .sequences import Fresh
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -93,9 +92,9 @@ class NumberArray(Generic[Element]):
         return property(slot.__get__, setter)
 
     @classmethod
-    def default(cls, *values: float) -> Fresh[NDArray[Element]]:
-        """Return the class attribute of a declared default."""
-        return Fresh(np.array, values, cls.dtype)
+    def of(cls, values: tuple[float, ...]) -> NDArray[Element]:
+        """Return what the field holds for some values."""
+        return np.array(values, cls.dtype)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:

@@ -367,9 +367,8 @@ def default(field: ir.Field) -> tuple[Code, tuple[Code, ...]]:
     """Return the value of a field's declared default: an expression, or a function's arguments."""
     if isinstance(field.type, (ir.Primitive, ir.String)):
         return Code(_scalar_default(field)), ()
-    function = "_idlc.FreshList"
+    values = _values(field)
     if support(field.type):
         assert isinstance(field.type, (ir.Sequence, ir.Array))
-        function = f"{numeric_class(field.type)}.default"
-    values = _values(field)
-    return Code(function if values else f"{function}()"), values
+        return Code("_idlc.Fresh"), (Code(f"{numeric_class(field.type)}.of"), *values)
+    return Code("_idlc.FreshList" if values else "_idlc.FreshList()"), values

@@ -14,8 +14,6 @@ import msgspec
 
 #: Columns in generated packages; other files get a width of their own.
 WIDTH = 88
-#: Columns of docstrings, whose text depends on where it is broken.
-PROSE_WIDTH = WIDTH
 
 
 class Group(msgspec.Struct, frozen=True):
@@ -111,15 +109,6 @@ def import_from(module: str, names: Sequence[str], indent: int = 0, width: int =
     return [f"{margin}from {module} import (", *items, f"{margin})"]
 
 
-def all_of(conditions: Sequence[str], indent: int) -> list[str]:
-    """Return lines that return whether all conditions are true."""
-    margin = " " * indent
-    line = f"{margin}return {' and '.join(conditions)}"
-    if len(line) <= WIDTH:
-        return [line]
-    return [f"{margin}return (", *_spread(conditions, "and", indent + 4), f"{margin})"]
-
-
 def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
@@ -127,17 +116,6 @@ def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     if len(line) <= WIDTH:
         return [line]
     return [f"{margin}{conditions[0]}", *(f"{margin}{word} {each}" for each in conditions[1:])]
-
-
-def if_one_or_all(first: str, rest: tuple[str, ...], indent: int) -> list[str]:
-    """Return the head of an `if` of one condition, or else all of the others."""
-    margin = " " * indent
-    if len(rest) < 2:
-        return any_of([first, *rest], indent, "if ", ":")
-    line = f"{margin}if {first} or ({' and '.join(rest)}):"
-    if len(line) <= WIDTH:
-        return [line]
-    return [f"{margin}if {first} or (", *_spread(rest, "and", indent + 4), f"{margin}):"]
 
 
 def any_of(conditions: list[str], indent: int, before: str, after: str) -> list[str]:
