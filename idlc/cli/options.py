@@ -30,8 +30,10 @@ def typed(*without: str) -> tuple[str, ...]:
         value = context.params[name]
         if isinstance(parameter, click.Argument):
             arguments += (f"./{word}" if word.startswith("-") else word for word in value)
-        elif value is True:
+        elif value is True or value == getattr(parameter, "flag_value", None):
             words.append(parameter.opts[0])
+        elif isinstance(getattr(parameter, "flag_value", None), str):
+            words.append(f"{parameter.opts[0]}={value}")
         else:
             for word in value if isinstance(value, tuple) else (value,):
                 words += (parameter.opts[0], word)
@@ -99,9 +101,9 @@ def _single(context: click.Context, option: click.Parameter, value: str | None) 
 
 
 def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | None:
-    from idlc.model.distros import BY_NAME, listed, unknown_distro
+    from idlc.model.distros import BY_NAME, split_names, unknown_distro
 
-    for name in listed(value) if value is not None else ():
+    for name in split_names(value) if value is not None else ():
         if name not in BY_NAME:
             raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
     return value

@@ -25,7 +25,7 @@ from idlc.recordings.find import split_recordings
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
     from idlc.project.library import Library
-    from idlc.recordings.definitions import Recorded
+    from idlc.recordings.definitions import RecordedDefinition
     from idlc.recordings.types import LocalTypes
 
 
@@ -156,7 +156,7 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
     from idlc.recordings.types import LocalTypes, read_topics, recorded_types, versions
 
-    recording = read_topics(path, report, check=True)
+    recording = read_topics(path, scope.root, report, check=True)
     report.notes += [topic.message for topic in recording.unread] if recording else []
     local = LocalTypes(scope, report)
     facts = []
@@ -169,7 +169,7 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     return sorted(facts, key=lambda row: (row.name, row.type_name))
 
 
-def _facts(recorded: Recorded, compiled: str | None, local: LocalTypes) -> TopicFacts:
+def _facts(recorded: RecordedDefinition, compiled: str | None, local: LocalTypes) -> TopicFacts:
     topic = recorded.topic
     hash_ = topic.hash or compiled
     local_hash = (
@@ -191,7 +191,7 @@ def definitions(
     """Yield the interfaces of topics, each once, as text in a format."""
     from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
 
-    recorded = topics_of([path], selected, report)
+    recorded = topics_of([path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
         types = recorded_types(version, local, scope, report)

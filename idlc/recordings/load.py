@@ -11,7 +11,7 @@ from importlib import import_module, invalidate_caches
 from pathlib import Path
 from shutil import rmtree
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from idlc.check.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report, Severity
@@ -25,11 +25,11 @@ from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.templates import RenderedFile
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definitions import recorded
+from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
 from idlc.runtime.objects import owner_of
-from idlc.runtime.on_demand.typeinfo import structure_of
+from idlc.runtime.typeinfo import structure_of
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def newest() -> int:
 Models = dict[str, "Model"]
 
 
-def asked_models(
+def requested_models(
     what: str, include: tuple[str, ...], distro: str | None, report: Report
 ) -> tuple[Models, list[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
@@ -126,7 +126,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
-    recording = read_topics(path, report)
+    recording = read_topics(path, where.root, report)
     groups = versions(recording.topics) if recording else []
     if len(groups) != 1:
         from idlc.recordings.packages import check_versions
@@ -159,7 +159,7 @@ def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
 
 def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
     where, report = Scope(Root.here(), include=include), Report()
-    (version,) = versions([recorded(topic, topic.name)])
+    (version,) = versions([read_definition(topic, topic.name)])
     types = recorded_types(version, LocalTypes(where, report), where, report)
     return types, report
 
@@ -186,7 +186,7 @@ class CompileError(ValueError):
     """Interfaces that cannot be loaded: they have errors, or do not exist."""
 
 
-class Loaded(ModuleType):
+class LoadedPackages(ModuleType):
     """Packages that were compiled together; requested interfaces also by their own names."""
 
     def __init__(
@@ -219,7 +219,7 @@ class Loaded(ModuleType):
         return f"<loaded: {', '.join(dir(self))}>"
 
 
-def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> Loaded:
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> LoadedPackages:
     """Compile interfaces, and return their classes.
 
     `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
@@ -228,10 +228,10 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     programs are better off with `idlc gen`.
     """
     report = Report()
-    models, asked = asked_models(str(what), tuple(include), distro, report)
+    models, asked = requested_models(str(what), tuple(include), distro, report)
     _raise_for(report)
     name = _stored(models)
-    return Loaded(f"{LOADED}.{name}", models, asked)
+    return LoadedPackages(f"{LOADED}.{name}", models, asked)
 
 
 def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
@@ -251,7 +251,7 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
         # local definitions that were used instead may change
         key = _stored(models, "" if list(report) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
-    if topic.hash not in (None, _type_of(kind).hash):
+    if topic.hash not in (None, structure_of(owner_of(kind)).hash):
         message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
         warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
     return kind
@@ -273,10 +273,10 @@ class MissingDefinitionWarning(UserWarning):
         return f"`{self.topic}`: {self.message}"
 
 
-def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
+def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return the class of a program; raise RecordingError if messages are of another type."""
     try:
-        class_type = _type_of(kind)
+        class_type = structure_of(owner_of(kind))
     except (AttributeError, ImportError, KeyError, TypeError):
         hint = "leave it out, or give one that `idlc gen` made"
         raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
@@ -292,23 +292,6 @@ def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
                 "leave the class out to read what was recorded",
             )
     return kind
-
-
-class _Type(NamedTuple):
-    name: str
-    hash: str
-
-
-def _type_of(kind: Any) -> _Type:
-    """Return the full name and the hash of a generated class."""
-    try:
-        structure = structure_of(owner_of(kind))
-    except ModuleNotFoundError:  # of idlc before 0.2
-        home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
-        info = import_module(f"{home}._idlc.on_demand.typeinfo")
-        name = info.type_name(kind)
-        return _Type(name, info.types()["hashes"][name])
-    return _Type(structure.name, structure.hash)
 
 
 def _class(home: str, name: str) -> Any:
@@ -336,11 +319,12 @@ def _stored(models: Mapping[str, Model], key: str = "") -> str:
 
 def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.generate.python.imports import Surroundings
     from idlc.generate.python.render import render_package
 
     for package, model in models.items():
         yield RenderedFile(f"{package}/_idlc.py", SUPPORT)
-        for file in render_package(model, parent):
+        for file in render_package(model, Surroundings(others=f"{parent}.")):
             if not file.path.startswith("_idlc/"):
                 yield RenderedFile(f"{package}/{file.path}", file.text)
 

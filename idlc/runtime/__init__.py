@@ -38,7 +38,7 @@ from .cdr import (
     wide_texts_reader,
 )
 from .codec import Codec, Reading, construct, maker
-from .errors import DecodeError, ValidationError, importing
+from .errors import DecodeError, MissingPackageError, ValidationError, importing
 from .message import (
     Action,
     Imported,
@@ -49,7 +49,7 @@ from .message import (
     define,
 )
 from .names import lazily
-from .objects import equals_other, same
+from .objects import equal, same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -110,6 +110,7 @@ __all__ = [
     "Int64Sequence",
     "ListOf",
     "Message",
+    "MissingPackageError",
     "Package",
     "Reading",
     "Service",
@@ -124,7 +125,7 @@ __all__ = [
     "complete",
     "construct",
     "define",
-    "equals_other",
+    "equal",
     "flags",
     "flags_writer",
     "importing",

@@ -10,7 +10,6 @@ import numpy as np
 
 from .cdr import NATIVE
 from .names import name_of
-from .sequences import Fresh
 
 if TYPE_CHECKING:
     from typing import TypeAlias
@@ -86,21 +85,21 @@ class NumberArray(Generic[Element]):
                 return
             except (TypeError, ValueError, OverflowError) as error:
                 failure = error
-            from .on_demand.typeinfo import refused
+            from .typeinfo import refused
 
             raise refused(name, dtype.name, size, values, failure) from None
 
         return property(slot.__get__, setter)
 
     @classmethod
-    def default(cls, *values: float) -> Fresh[NDArray[Element]]:
-        """Return the class attribute of a declared default."""
-        return Fresh(np.array, values, cls.dtype)
+    def of(cls, values: tuple[float, ...]) -> NDArray[Element]:
+        """Return what the field holds for some values."""
+        return np.array(values, cls.dtype)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes an array."""
-        from .on_demand.conversions import numbers_schema
+        from .conversions import numbers_schema
 
         kind = float if cls.dtype.kind == "f" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]

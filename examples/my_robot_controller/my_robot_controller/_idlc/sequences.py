@@ -88,21 +88,21 @@ class NumberSequence(Generic[Number]):
                 return
             except (TypeError, ValueError, OverflowError) as error:
                 failure = error
-            from .on_demand.typeinfo import refused
+            from .typeinfo import refused
 
             raise refused(name, code, None, values, failure) from None
 
         return property(slot.__get__, setter)
 
     @classmethod
-    def default(cls, *values: Number) -> Fresh[array[Number]]:
-        """Return the class attribute of a declared default."""
-        return Fresh(array, cls.code, values)
+    def of(cls, values: tuple[Number, ...]) -> array[Number]:
+        """Return what the field holds for some values."""
+        return array(cls.code, values)
 
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a sequence."""
-        from .on_demand.conversions import numbers_schema
+        from .conversions import numbers_schema
 
         kind = float if cls.code in "fd" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]
@@ -300,20 +300,20 @@ def sequence_reader(order: str, code: str, reading: Reading) -> Callable[[Any], 
 class Fresh(Generic[Value]):
     """A class attribute whose value is created at each access, for mutable defaults."""
 
-    def __init__(self, make: Callable[..., Value], *arguments: Any) -> None:
+    def __init__(self, make: Callable[[Any], Value], *values: Any) -> None:
         self._make = make
-        self._arguments = arguments
+        self._values = values
 
     def __get__(self, instance: object, owner: type | None = None) -> Value:
         """Return a new value."""
-        return self._make(*self._arguments)
+        return self._make(self._values)
 
 
 class FreshList(Fresh[list[Value]]):
     """A class attribute whose value is a new list of the same values at each access."""
 
     def __init__(self, *values: Value) -> None:
-        super().__init__(list, values)
+        super().__init__(list, *values)
 
 
 def several(kind: Any, count: int) -> list[Any]:

@@ -38,7 +38,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Goal):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.target_count != other.target_count:
             return False
         return True
@@ -81,7 +81,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Result):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.final_count != other.final_count:
             return False
         if self.success != other.success:
@@ -118,7 +118,7 @@ class Countdown_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Countdown_Feedback):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.current_count != other.current_count:
             return False
         return True

@@ -38,7 +38,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Goal):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.task_name != other.task_name:
             return False
         return True
@@ -73,7 +73,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Result):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.success != other.success:
             return False
         return True
@@ -108,7 +108,7 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_Feedback):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.current_status != other.current_status:
             return False
         return True

@@ -63,7 +63,7 @@ class RobotCommand(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotCommand):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.command_type != other.command_type:
             return False
         if self.linear_velocity_x != other.linear_velocity_x:

@@ -46,7 +46,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, AddTwoInts_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.a != other.a:
             return False
         if self.b != other.b:
@@ -83,7 +83,7 @@ class AddTwoInts_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, AddTwoInts_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.sum != other.sum:
             return False
         return True

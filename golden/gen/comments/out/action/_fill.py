@@ -38,7 +38,7 @@ class Fill_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Goal):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.level != other.level:
             return False
         return True
@@ -73,7 +73,7 @@ class Fill_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Result):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.reached != other.reached:
             return False
         return True
@@ -108,7 +108,7 @@ class Fill_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Fill_Feedback):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.level != other.level:
             return False
         return True

@@ -48,7 +48,8 @@ class Gauge(_idlc.Message):  # noqa
         "a",
         "it's",
     )
-    SAMPLES__DEFAULT = _idlc.Int16Sequence.default(
+    SAMPLES__DEFAULT = _idlc.Fresh(
+        _idlc.Int16Sequence.of,
         -1,
         0,
         1,
@@ -104,7 +105,7 @@ class Gauge(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Gauge):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.rate != other.rate:
             return False
         if self.level != other.level:

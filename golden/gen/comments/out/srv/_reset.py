@@ -38,7 +38,7 @@ class Reset_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Reset_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.reason != other.reason:
             return False
         return True
@@ -73,7 +73,7 @@ class Reset_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Reset_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.ok != other.ok:
             return False
         return True

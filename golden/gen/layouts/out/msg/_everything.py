@@ -170,7 +170,7 @@ class Everything(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Everything):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.flag != other.flag:
             return False
         if self.last != other.last:

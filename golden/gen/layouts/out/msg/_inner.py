@@ -56,7 +56,7 @@ class Inner(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Inner):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.a != other.a:
             return False
         if self.b != other.b:

@@ -25,5 +25,5 @@ class Nothing(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Nothing):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         return True

@@ -44,7 +44,7 @@ class Pair(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Pair):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.key != other.key:
             return False
         if self.value != other.value:

@@ -54,7 +54,7 @@ class Row(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Row):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.a != other.a:
             return False
         if self.b != other.b:

@@ -64,7 +64,7 @@ class Texts(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Texts):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.last != other.last:
             return False
         if not self.pairs == other.pairs:

@@ -59,7 +59,7 @@ class Titled(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Titled):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.level != other.level:
             return False
         if self.title != other.title:

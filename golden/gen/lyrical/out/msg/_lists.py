@@ -124,7 +124,7 @@ class Lists(_idlc.Message):  # noqa
 
     def __eq__(self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Lists):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not self.names == other.names:
             return False
         if not self.words == other.words:

@@ -78,7 +78,7 @@ class Words(_idlc.Message):  # noqa
 
     def __eq__(self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Words):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.text != other.text:
             return False
         if self.count != other.count:

@@ -55,7 +55,7 @@ class Run_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.wait != other.wait:
             return False
         if not self.args == other.args:
@@ -106,7 +106,7 @@ class Run_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.status != other.status:
             return False
         if not self.stamps == other.stamps:

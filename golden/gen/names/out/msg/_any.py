@@ -43,7 +43,7 @@ class Any(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Any):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not self.pose == other.pose:
             return False
         return True

@@ -39,7 +39,7 @@ class FOOBar(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FOOBar):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not self.inner == other.inner:
             return False
         return True

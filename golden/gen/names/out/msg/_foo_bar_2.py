@@ -36,7 +36,7 @@ class FooBar(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FooBar):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.a != other.a:
             return False
         return True

@@ -82,7 +82,7 @@ class Hiding(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Hiding):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.serialize != other.serialize:
             return False
         if not self.validate == other.validate:

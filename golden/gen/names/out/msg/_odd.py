@@ -65,7 +65,8 @@ class Odd(_idlc.Message):  # noqa
         "a",
         'b "c"',
     )
-    ORDER__DEFAULT = _arrays.Int32Array.default(
+    ORDER__DEFAULT = _idlc.Fresh(
+        _arrays.Int32Array.of,
         1,
         2,
         3,
@@ -157,7 +158,7 @@ class Odd(_idlc.Message):  # noqa
 
     def __eq__(_self, other: _builtins.object) -> _builtins.bool:
         if not isinstance(other, Odd):
-            return _idlc.equals_other(_self, other)
+            return _idlc.equal(_self, other)
         if _self.class_ != other.class_:
             return False
         if _self.serialize != other.serialize:

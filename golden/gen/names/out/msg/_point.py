@@ -44,7 +44,7 @@ class Point(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Point):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.x != other.x:
             return False
         if self.y != other.y:

@@ -63,7 +63,7 @@ class Text(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Text):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not self.other == other.other:
             return False
         if not self.own == other.own:

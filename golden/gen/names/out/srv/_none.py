@@ -27,7 +27,7 @@ class None_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, None_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         return True
 
 
@@ -49,7 +49,7 @@ class None_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, None_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         return True
 
 

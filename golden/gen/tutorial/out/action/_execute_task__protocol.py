@@ -59,7 +59,7 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.goal_id,
             other.goal_id,
@@ -104,7 +104,7 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.accepted != other.accepted:
             return False
         if not _idlc.same(
@@ -157,7 +157,7 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Event):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.info,
             other.info,
@@ -196,7 +196,7 @@ class ExecuteTask_GetResult_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Request):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.goal_id,
             other.goal_id,
@@ -239,7 +239,7 @@ class ExecuteTask_GetResult_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Response):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if self.status != other.status:
             return False
         if not self.result == other.result:
@@ -289,7 +289,7 @@ class ExecuteTask_GetResult_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Event):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.info,
             other.info,
@@ -337,7 +337,7 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ExecuteTask_FeedbackMessage):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.goal_id,
             other.goal_id,

@@ -61,7 +61,7 @@ class AddTwoInts_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, AddTwoInts_Event):
-            return _idlc.equals_other(self, other)
+            return _idlc.equal(self, other)
         if not _idlc.same(
             self.info,
             other.info,
