@@ -32,6 +32,8 @@ FILES = {
     "more/srv/Stop.srv": "bool now\n---\nbool stopped\n",
     "more/action/Turn.action": "float64 angle\n---\n---\nfloat64 left\n",
 }
+#: Lines of further outputs of one template that are shown.
+MOST_LINES = 120
 PERSON = ("--maintainer", "Ada", "--email", "ada@example.com")
 #: Commands and the folder that each runs in. A template shows what it wrote in the first of them.
 COMMANDS = [
@@ -92,17 +94,19 @@ def _names() -> list[str]:
 def _outputs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, dict[int, list[str]]]:
     """Return the texts that each template wrote, by the number of the command."""
     outputs: dict[str, dict[int, list[str]]] = {}
-    number = 0
+    started: list[tuple[str, ...]] = []
 
     def note(name: str, text: str) -> None:
-        texts = outputs.setdefault(name, {}).setdefault(number, [])
+        text = text.replace(str(folder), "/ws")
+        texts = outputs.setdefault(name, {}).setdefault(len(started) - 1, [])
         if text.strip() and text not in texts:
             texts.append(text)
 
     _record(note, monkeypatch)
     for path, text in FILES.items():
         write(folder / path, text)
-    for number, (place, words) in enumerate(COMMANDS):
+    for place, words in COMMANDS:
+        started.append(words)
         monkeypatch.chdir(folder / place)
         assert main(list(words)) == 0, words
     return outputs
@@ -153,8 +157,11 @@ def _section(name: str, outputs: dict[str, dict[int, list[str]]]) -> Iterator[st
     yield from _block("jinja", text)
     yield f"`idlc {' '.join(COMMANDS[number][1])}` writes:"
     yield ""
+    lines = 0
     for output in commands[number]:
-        yield from _block(_language(name.removesuffix(".jinja")), output)
+        lines += output.count("\n") + 1
+        if lines <= MOST_LINES or output is commands[number][0]:
+            yield from _block(_language(name.removesuffix(".jinja")), output)
 
 
 def _language(name: str) -> str:
