@@ -39,7 +39,7 @@ from .cdr import (
 )
 from .codec import Codec, Reading, construct, maker
 from .errors import DecodeError, MissingPackageError, ValidationError, importing
-from .message import Message, dataclass, table
+from .message import Message, define
 from .names import lazily
 from .objects import equal, same
 from .sequences import (
@@ -61,8 +61,6 @@ from .sequences import (
     sequence_reader,
     sequence_writer,
     several,
-    to_array,
-    to_list,
 )
 
 #: What generated code expects of the runtime. Each runtime serves all code of its number.
@@ -70,7 +68,6 @@ PROTOCOL = 1
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from .hints import Any as Any
     from .hints import Floats as Floats
     from .hints import Integers as Integers
     from .hints import Iterable as Iterable
@@ -90,7 +87,7 @@ if TYPE_CHECKING:
     from .protocol import Service as Service
     from .protocol import ServiceEvent as ServiceEvent
 else:
-    _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
+    _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     _LAZY = dict.fromkeys(_HINTS.split(), "hints")
     _LAZY |= {"Action": "protocol", "Service": "protocol"}
     __getattr__, __dir__ = lazily(__name__, _LAZY)
@@ -127,7 +124,7 @@ __all__ = [
     "array",
     "array_of",
     "construct",
-    "dataclass",
+    "define",
     "equal",
     "flags",
     "flags_writer",
@@ -150,12 +147,9 @@ __all__ = [
     "several",
     "sizes",
     "strings_reader",
-    "table",
     "text_block",
     "text_phases",
     "texts_reader",
-    "to_array",
-    "to_list",
     "unsized",
     "wide_block",
     "wide_text",

@@ -18,7 +18,7 @@ from types import FunctionType
 from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
 from .errors import importing
-from .message import InterfaceMeta, Message, OnDemand, dataclass, metaclass_of
+from .message import InterfaceMeta, Message, OnDemand, define, metaclass_of
 from .names import public_name, wire_name
 from .objects import equal, owner_of, same
 from .sequences import ListOf, sequence_reader, sequence_writer
@@ -148,7 +148,7 @@ class ActionImpl:
 # and docstrings
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class ServiceEvent(Added, Generic[Request, Response]):
     """Published about a call, where services are introspected. Added by ROS 2."""
 
@@ -166,7 +166,7 @@ class ServiceEvent(Added, Generic[Request, Response]):
         self._fill(options, info, request, response)
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class SendGoalRequest(Added, Generic[Goal]):
     """Sent by a client to start a goal. Added by ROS 2."""
 
@@ -182,7 +182,7 @@ class SendGoalRequest(Added, Generic[Goal]):
         self._fill(options, goal_id, goal)
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class SendGoalResponse(Added):
     """Tells a client whether a goal was accepted, and when. Added by ROS 2."""
 
@@ -198,7 +198,7 @@ class SendGoalResponse(Added):
         self._fill(options, accepted, stamp)
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class GetResultRequest(Added):
     """Sent by a client to wait for the result of a goal. Added by ROS 2."""
 
@@ -208,7 +208,7 @@ class GetResultRequest(Added):
         self._fill(options, goal_id)
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class GetResultResponse(Added, Generic[Result]):
     """Tells a client how a goal ended, and its result. Added by ROS 2."""
 
@@ -224,7 +224,7 @@ class GetResultResponse(Added, Generic[Result]):
         self._fill(options, status, result)
 
 
-@dataclass(init=False, kw_only=True)
+@define
 class FeedbackMessage(Added, Generic[Feedback]):
     """Published while a goal is executed. Added by ROS 2."""
 
