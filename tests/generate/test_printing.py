@@ -99,7 +99,7 @@ Mixed[] parts
 Number[3] numbers
 uint8[16] key
 byte[] octets
-float32 size
+string size
 """
 
 

@@ -39,9 +39,9 @@ def text_codec(
     write_any_item = _idlc.layout(order, "ddddddd", start=4).pack
     pad8 = _idlc.PAD8
     new_text = _idlc.maker(kind)
-    new_point = _idlc.maker(geometry_msgs_Point)
-    new_point_2 = _idlc.maker(names_msgs_Point)
-    new_any = _idlc.maker(names_msgs_Any)
+    new_geometry_msgs_point = _idlc.maker(geometry_msgs_Point)
+    new_names_msgs_point = _idlc.maker(names_msgs_Point)
+    new_names_msgs_any = _idlc.maker(names_msgs_Any)
     new_pose = _idlc.maker(Pose)
     new_quaternion = _idlc.maker(Quaternion)
     read_other_x = _idlc.layout(order, "dddddI", start=4).unpack_from
@@ -83,9 +83,9 @@ def text_codec(
     def decode(data: Any) -> Any:
         limit = len(data)
         message = new_text()
-        other = new_point()
+        other = new_geometry_msgs_point()
         message._other = other
-        own = new_point_2()
+        own = new_names_msgs_point()
         message._own = own
         (
             other._x,
@@ -104,11 +104,11 @@ def text_codec(
             at = (at + 3 & -8) + 4
         end = at + 56 * count
         for any_item_values in read_any_item(data[at:end]):
-            any_item = new_any()
+            any_item = new_names_msgs_any()
             any_.append(any_item)
             any_item_pose = new_pose()
             any_item._pose = any_item_pose
-            any_item_pose_position = new_point()
+            any_item_pose_position = new_geometry_msgs_point()
             any_item_pose._position = any_item_pose_position
             any_item_pose_orientation = new_quaternion()
             any_item_pose._orientation = any_item_pose_orientation
