@@ -25,8 +25,7 @@ from idlc.project.root import Root
 from idlc.project.settings import load_settings, scope
 from idlc.project.templates import keep_compiled
 from idlc.project.write import Change, Plan, apply_changes, difference
-from idlc.scaffold.roles import ROLES
-from idlc.scaffold.roles.role import Endpoint, Role
+from idlc.scaffold.roles import ROLES, Endpoint, Role
 from idlc.scaffold.templates import (
     ENDING,
     BrokenTemplateError,

@@ -157,7 +157,7 @@ def _entry(name: str, sources: Mapping[str, Source]) -> str:
 #: The version of the values for templates; it grows when an attribute changes or goes.
 VERSION = 1
 #: Folders of templates that a user can replace.
-FOLDERS = ("node", "node_test", "package")
+FOLDERS = ("node", "package")
 ENDING = ".jinja"
 #: The prefix by which a user's template includes one of idlc's, even the one that it replaces.
 OWN = "idlc/"
