@@ -46,8 +46,8 @@ def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str]
 
     pytest does so for dataclasses whose `__eq__` was made by `dataclass` alone.
     """
-    bases = [kind for kind in type(left).__mro__ if kind.__module__.endswith("._idlc.message")]
-    base: Any = next((kind for kind in bases if kind.__name__ == "Message"), None)
+    generated = [kind for kind in type(left).__mro__ if hasattr(type(kind), "_message")]
+    base: Any = generated[-1] if generated else None  # of all messages
     if op != "==" or base is None or type(left) is not type(right):
         return None
     try:  # a field may have the name of a method

@@ -1,8 +1,9 @@
-"""The environment of all templates, and rendered files."""
+"""The environments of templates, what these may place, and rendered files."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -23,6 +24,18 @@ class RenderedFile(msgspec.Struct, frozen=True):
     text: str
 
 
+class Code(str):
+    """Source that idlc wrote: a name, an expression, a statement."""
+
+    __slots__ = ()
+
+
+class Text(str):
+    """Words of others, escaped for the place where a template puts them."""
+
+    __slots__ = ()
+
+
 @cache
 def environment() -> jinja2.Environment:
     """Return the environment of all templates: strict, without filters of our own."""
@@ -36,6 +49,44 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         auto_reload=False,  # a look at the disk for each file that is written
     )
+
+
+@cache
+def code() -> jinja2.Environment:
+    """Return the environment of source files, which places nothing but Code and Text."""
+    return place_only_code(environment().overlay())
+
+
+def place_only_code(environment: jinja2.Environment) -> jinja2.Environment:
+    """Let an environment refuse each string that is neither Code nor Text; return it.
+
+    `join` and `indent`, macros and `set` blocks keep the type. Whatever else templates do with a
+    string gives an ordinary one, which cannot be placed.
+    """
+    environment.finalize = _placed
+    environment.concat = _concatenated  # type: ignore[method-assign]
+    environment.filters = {**environment.filters, "indent": _indented, "join": _joined}
+    return environment
+
+
+def _placed(value: object) -> object:
+    if isinstance(value, (Code, Text, int, jinja2.Undefined)):
+        return value
+    raise TypeError(f"a template may place Code and Text, not {type(value).__name__} {value!r:.80}")
+
+
+def _concatenated(parts: Iterable[str]) -> Code:
+    return Code("".join(parts))
+
+
+def _joined(values: Iterable[object], separator: str = "") -> Code:
+    return Code(separator.join([str(_placed(value)) for value in values]))
+
+
+def _indented(value: object, width: int) -> Code:
+    first, *rest = str(_placed(value)).split("\n")
+    margin = " " * width
+    return Code("\n".join([first, *(margin + line if line else line for line in rest)]))
 
 
 @cache
@@ -62,6 +113,7 @@ def keep_compiled() -> None:
     place = cache_folder()
     if place is not None:
         environment().bytecode_cache = _Compiled(place, "text")
+        code().bytecode_cache = _Compiled(place, "code")
         html().bytecode_cache = _Compiled(place, "html")
 
 

@@ -28,6 +28,8 @@ from idlc.recordings.containers.source import RecordingError
 from idlc.recordings.definitions import recorded
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
+from idlc.runtime.objects import owner_of
+from idlc.runtime.on_demand.typeinfo import structure_of
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -164,22 +166,19 @@ def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Repor
 
 #: The package that all loaded ones are in.
 LOADED = "idlc.loaded"
-#: The support package of each: idlc's own modules under another name, with data of its own.
+#: The `_idlc` of each. Messages show names as those of generated packages do.
 SUPPORT = '''\
-"""The support code of idlc, for this package."""
+"""The runtime of this package, which is that of idlc."""
 
-from importlib.machinery import PathFinder
+from idlc.runtime import *
+from idlc.runtime import objects
 
-import idlc
+_home = __name__.rpartition(".")[0]
+objects.SHOWN[_home] = _home.rpartition(".")[2]
 
-_spec = PathFinder.find_spec("idlc.runtime", idlc.__path__)
-__path__ += _spec.submodule_search_locations
-exec(_spec.loader.get_code(_spec.name))
 
-from . import objects
-
-# messages show names as those of generated packages do
-objects.HIDDEN = __name__.rsplit(".", 2)[0] + "."
+def __getattr__(name):
+    return getattr(__import__("idlc.runtime", fromlist=[name]), name)
 '''
 
 
@@ -302,10 +301,14 @@ class _Type(NamedTuple):
 
 def _type_of(kind: Any) -> _Type:
     """Return the full name and the hash of a generated class."""
-    home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
-    info = import_module(f"{home}._idlc.on_demand.typeinfo")
-    name = info.type_name(kind)
-    return _Type(name, info.types()["hashes"][name])
+    try:
+        structure = structure_of(owner_of(kind))
+    except ModuleNotFoundError:  # of idlc before 0.2
+        home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
+        info = import_module(f"{home}._idlc.on_demand.typeinfo")
+        name = info.type_name(kind)
+        return _Type(name, info.types()["hashes"][name])
+    return _Type(structure.name, structure.hash)
 
 
 def _class(home: str, name: str) -> Any:
@@ -336,9 +339,9 @@ def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     from idlc.generate.python.render import render_package
 
     for package, model in models.items():
-        yield RenderedFile(f"{package}/_idlc/__init__.py", SUPPORT)
+        yield RenderedFile(f"{package}/_idlc.py", SUPPORT)
         for file in render_package(model, parent):
-            if not file.path.startswith("_idlc/") or file.path == "_idlc/type_data.py":
+            if not file.path.startswith("_idlc/"):
                 yield RenderedFile(f"{package}/{file.path}", file.text)
 
 

@@ -74,6 +74,9 @@ from .sequences import (
     to_list,
 )
 
+#: What generated code expects of the runtime. Each runtime serves all code of its number.
+PROTOCOL = 1
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from .hints import Any as Any
@@ -95,6 +98,7 @@ __all__ = [
     "PAD2",
     "PAD4",
     "PAD8",
+    "PROTOCOL",
     "TRUTHS",
     "Action",
     "Codec",

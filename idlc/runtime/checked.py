@@ -20,10 +20,8 @@ from .objects import owner_of
 from .on_demand.typeinfo import (
     FieldInfo,
     Primitive,
-    class_of,
-    fields_of,
     spelling_hint,
-    type_name,
+    structure_of,
     validate_field,
 )
 
@@ -43,7 +41,7 @@ def construct(
     kind = type(message)
     unknown = [name for name in options if name != "check_fields"]
     check = bool(options.get("check_fields"))
-    fields = fields_of(type_name(kind))
+    fields = structure_of(kind).fields
     if unknown:
         names = [field.public for field in fields]
         hint = spelling_hint(unknown[0], names)
@@ -121,7 +119,7 @@ def checked_class(kind: Any) -> Any:
     namespace: dict[str, Any] = {
         name: getattr(kind, name) for name in ("__module__", "__qualname__", "__doc__")
     }
-    for field in fields_of(type_name(kind)):
+    for field in structure_of(kind).fields:
         name = field.public if _converts(owner, field) else field.slot
         namespace[field.public] = _property(owner.__dict__[name], field)
     namespace["__slots__"] = ()
@@ -194,8 +192,8 @@ def _refusal(value: Any, field: FieldInfo) -> str:
 
 def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
     if field.nested:
-        right = isinstance(value, class_of(field.nested))
-        return "" if right else f"a {field.nested}"
+        right = isinstance(value, field.nested.find_class())
+        return "" if right else f"a {field.nested.name}"
     if field.text:
         types: Any = str if listed else (str, UserString)
         if not isinstance(value, types):

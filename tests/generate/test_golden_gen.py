@@ -37,7 +37,7 @@ def outputs(case):
     """Return what is generated for a case, by path, but the support package's modules."""
     model = model_of(case)
     files = {file.path: file.text for file in render_package(model)}
-    support = {path for path in files if path.startswith("_idlc/")} - {"_idlc/type_data.py"}
+    support = {path for path in files if path.startswith("_idlc/")}
     for path in support:
         source = PACKAGE / "runtime" / path.removeprefix("_idlc/")
         assert files.pop(path) == source.read_text(encoding="utf-8")

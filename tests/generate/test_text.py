@@ -8,11 +8,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from jinja2 import UndefinedError
+from msgspec import Struct
+from msgspec.structs import asdict, replace
 
-from idlc.generate.python import lines, render
+from idlc.generate.python import imports, lines, render
 from idlc.generate.python import lines as literals
 from idlc.model import ir, link
-from idlc.project.templates import environment
+from idlc.model.python_names import modules
+from idlc.project.templates import Code, Text, code
+from tests.support import generated
 
 HOSTILE = [
     '"""',
@@ -142,4 +146,91 @@ def test_pages_of_hostile_text_are_formatted_and_clean(hostile_folder):
 
 def test_an_unknown_name_in_a_template_is_an_error():
     with pytest.raises(UndefinedError):
-        environment().from_string("{{ nothing }}").render()
+        code().from_string("{{ nothing }}").render()
+
+
+PLACED = [
+    "{{ text }}",
+    "{{ [text] | join(', ') }}",
+    "{{ text | indent(4) }}",
+    "{% macro show(words) %}{{ words }}{% endmacro %}{{ show(text) }}",
+    "{% set words %}{{ text }}{% endset %}{{ words }}",
+]
+MADE = [
+    "{{ text ~ text }}",
+    "{{ text.upper() }}",
+    "{{ text | replace('a', 'b') }}",
+    "{{ text[1:] }}",
+]
+
+
+@pytest.mark.parametrize("template", PLACED)
+def test_templates_place_code_and_text_and_no_other_string(template):
+    page = code().from_string(template)
+    for kind in (Code, Text):
+        assert page.render(text=kind("a + b")) == "a + b"
+    for other in ("a + b", None, ["a"], b"a"):
+        with pytest.raises(TypeError, match="a template may place Code and Text, not"):
+            page.render(text=other)
+
+
+@pytest.mark.parametrize("template", MADE)
+def test_what_templates_make_of_text_cannot_be_placed(template):
+    with pytest.raises(TypeError, match="Code and Text, not str"):
+        code().from_string(template).render(text=Text("a + b"))
+
+
+def test_indented_lines_get_a_margin_unless_they_are_empty():
+    text = Text("a\n\nb")
+    assert code().from_string("  {{ text | indent(2) }}").render(text=text) == "  a\n\n  b"
+
+
+def views():
+    """Yield each view of a package whose files are full of hostile text, and its template."""
+    comments = "".join(f"# {text}\n" for text in HOSTILE if text.isprintable() and "\\" not in text)
+    constant = 'string C = "{{ x }}"\n'
+    fields = f'{comments}{constant}string a "x" # [m/s]\nfloat64[2] b [1, 2]\nHeader[] c\n'
+    files = {
+        "msg/Header.msg": "int8 list\n",
+        "msg/Hostile.msg": f"{fields}std_msgs/Header d\n",
+        "srv/Ask.srv": f"{fields}---\n{comments}",
+        "action/Do.action": f"{fields}---\n---\n",
+    }
+    model = generated.model_of("hostile_msgs", files)
+    names = modules(interface.name for interface in model.own)
+    for interface in model.own:
+        for module in render.module_views(interface, model.messages, names):
+            yield module.template, {"module": module.view}
+    for kind in ("msg", "srv", "action"):
+        yield "package_init", {"package": imports.package(model, kind, names)}
+
+
+def with_an_ordinary_string(view):
+    """Yield a view once for each text in it, which is an ordinary string there."""
+    match view:
+        case str():
+            assert isinstance(view, (Code, Text)), view
+            if view:
+                yield f"{view} of others"
+        case tuple():
+            for place, part in enumerate(view):
+                for other in with_an_ordinary_string(part):
+                    yield (*view[:place], other, *view[place + 1 :])
+        case Struct() | dict():
+            parts = view if isinstance(view, dict) else asdict(view)
+            for name, part in parts.items():
+                for other in with_an_ordinary_string(part):
+                    yield {**view, name: other} if view is parts else replace(view, **{name: other})
+
+
+@pytest.mark.parametrize(("name", "view"), list(views()), ids=lambda value: str(value)[:12])
+def test_each_text_of_a_view_is_placed_as_what_it_is(name, view):
+    template = code().get_template(f"message/{name}.py.jinja")
+    page = template.render(view)
+    refused = 0
+    for other in with_an_ordinary_string(view):
+        try:
+            assert template.render(other) == page, "an ordinary string was placed"
+        except TypeError:
+            refused += 1
+    assert refused > 3

@@ -61,7 +61,7 @@ def both(tmp_path):
     return tmp_path
 
 
-@pytest.mark.parametrize("path", ["_idlc/message.py", "_idlc/type_data.py", "msg/_a.py"])
+@pytest.mark.parametrize("path", ["_idlc/message.py", "_type_data.py", "msg/_a.py"])
 def test_an_edit_of_the_same_size_and_time_is_seen(both, path):
     edited = both / "out" / "b_msgs" / path
     status, content = edited.stat(), edited.read_bytes()

@@ -386,6 +386,27 @@ def test_messages_show_the_names_of_generated_ones(tmp_path):
     assert pickle.loads(pickle.dumps(message)) == message
 
 
+def test_packages_that_share_a_runtime_may_describe_a_type_differently(tmp_path):
+    definitions = {"old": "float32 x\n", "new": "string<=2 name\nfloat32 x\n"}
+    points = {}
+    for age, definition in definitions.items():
+        (tmp_path / age / "demo_msgs/msg").mkdir(parents=True)
+        (tmp_path / age / "demo_msgs/msg/Point.msg").write_text(definition, encoding="utf-8")
+        points[age] = idlc.load(str(tmp_path / age / "demo_msgs")).Point
+    old, new = points["old"](1.5), points["new"]("ab", 1.5)
+    assert type(old).__mro__[1] is type(new).__mro__[1]
+    for message in (old, new, old):
+        message.validate()
+        assert type(message).from_dict(message.to_dict()) == message
+    with pytest.raises(ValueError, match="characters, at most 2"):
+        points["new"]("abc").validate()
+    with pytest.raises(ValueError, match="4 bytes"):
+        points["old"].deserialize(b"\0\1\0\0")
+    with pytest.raises(ValueError, match="name: the number of bytes of text"):
+        points["new"].deserialize(b"\0\1\0\0")
+    assert repr(old) == "demo_msgs.msg.Point(x=1.5)"
+
+
 def test_help_and_type_checkers_see_what_is_there(tmp_path):
     assert {"Recording", "load"} <= set(dir(idlc))
     assert "class Recording" in pydoc.plain(pydoc.render_doc(idlc))

@@ -158,7 +158,7 @@ def test_the_packages_own_extension_is_preferred(start, mixed):
 def test_an_outdated_extension_is_not_used(start, mixed):
     known = generated.type_data(mixed / "std_msgs")
     known["hashes"]["std_msgs/msg/String"] = "RIHS01_" + 64 * "0"
-    types = mixed / "std_msgs" / "_idlc" / "type_data.py"
+    types = mixed / "std_msgs" / "_type_data.py"
     types.write_text(f"JSON = {json.dumps(known)!r}\n", "utf-8")
     out, _ = finish(start("uses_the_extension", path=mixed))
     assert out == "string False\nheader True\n"

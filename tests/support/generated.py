@@ -91,7 +91,7 @@ def write_model(folder, model):
 
 def type_data(package):
     """Return what a generated package says of its types, read without importing it."""
-    text = (package / "_idlc" / "type_data.py").read_text(encoding="utf-8")
+    text = (package / "_type_data.py").read_text(encoding="utf-8")
     docstring, data = ast.parse(text).body  # there is nothing else
     assert isinstance(ast.literal_eval(docstring.value), str)
     return json.loads(ast.literal_eval(data.value))

@@ -4,6 +4,7 @@ import random
 import struct
 
 from idlc.runtime.names import public_name
+from idlc.runtime.on_demand.typeinfo import structure_of
 
 INTEGERS = {
     f"{sign}int{bits}": (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
@@ -15,20 +16,17 @@ ALPHABET = "aZ_0 9éß漢😀"
 
 def fields_of(message):
     """Return the fields of a message as the package's own type information has them."""
-    typeinfo = __import__(f"{type(message).__module__.partition('.')[0]}._idlc.on_demand.typeinfo")
-    typeinfo = typeinfo._idlc.on_demand.typeinfo
-    return typeinfo, typeinfo.fields_of(typeinfo.type_name(type(message)))
+    return structure_of(type(message)).fields
 
 
 def fill(message, values):
     """Set fields from recorded values; a byte is a number, a nested message a dictionary."""
-    typeinfo, fields = fields_of(message)
-    for field in fields:
+    for field in fields_of(message):
         value = values[field.name]
 
         def one(element, field=field):
             if field.nested:
-                return fill(typeinfo.class_of(field.nested)(), element)
+                return fill(field.nested.find_class()(), element)
             octet = field.primitive is not None and field.primitive.name == "byte"
             return bytes([element]) if octet else element
 
@@ -42,12 +40,11 @@ def fill(message, values):
 
 def randomized(message, rng, longest=4):
     """Set all fields to random values."""
-    typeinfo, fields = fields_of(message)
-    for field in fields:
+    for field in fields_of(message):
 
         def one(field=field):
             if field.nested:
-                return randomized(typeinfo.class_of(field.nested)(), rng, longest)
+                return randomized(field.nested.find_class()(), rng, longest)
             if field.text:
                 size = rng.randrange(min(field.text_bound or 12, 12) + 1)
                 return "".join(rng.choice(ALPHABET) for _ in range(size))

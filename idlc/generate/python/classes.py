@@ -22,6 +22,7 @@ from idlc.generate.python.lines import (
     tuple_of,
 )
 from idlc.model import derive, ir, python_names
+from idlc.project.templates import Code, Text
 
 
 class Equality(msgspec.Struct, frozen=True):
@@ -30,8 +31,8 @@ class Equality(msgspec.Struct, frozen=True):
     That is True or False, also where fields hold numpy's scalars.
     """
 
-    differences: tuple[str, ...]
-    rest: str
+    differences: tuple[Code, ...]
+    rest: Code
 
 
 def equality(structure: ir.Message, receiver: str, references: References) -> Equality:
@@ -39,7 +40,7 @@ def equality(structure: ir.Message, receiver: str, references: References) -> Eq
     scalars = [field for field in structure.fields if _is_scalar(field, receiver)]
     others = [field for field in structure.fields if field not in scalars]
     if not others:
-        return Equality((), _all_equal(scalars, receiver))
+        return Equality((), Code(_all_equal(scalars, receiver)))
     parts = [_compared(field, receiver, references) for field in others]
     calls: list[Node] = [part for part in parts if isinstance(part, Group)]
     plain = [part for part in parts if isinstance(part, str)]
@@ -51,7 +52,7 @@ def equality(structure: ir.Message, receiver: str, references: References) -> Eq
         last = all_of(plain, 8) if plain else layout_lines(calls.pop(), 8, "return ")
     differences = [_operator(field, receiver, "!=") for field in scalars]
     differences += [_between(layout_lines(part, 8, "if not ", ":"), "if ", ":") for part in calls]
-    return Equality(tuple(differences), _between(last, "return ", ""))
+    return Equality(tuple(map(Code, differences)), Code(_between(last, "return ", "")))
 
 
 def _between(statement: list[str], before: str, after: str) -> str:
@@ -107,8 +108,8 @@ def _all_equal(scalars: list[ir.Field], receiver: str) -> str:
 class ConstantView(msgspec.Struct, frozen=True):
     """A constant, or a default that has the place of one; the file says nothing about that."""
 
-    statement: str
-    docstring: str = ""
+    statement: Code
+    docstring: Text = Text("")
 
 
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
@@ -119,25 +120,25 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     the head of the `if` for a constructor that was given something unusual.
     """
 
-    name: str
+    name: Code
     docstring: fields.Docstring
-    match_args: str
+    match_args: Code
     constants: tuple[ConstantView, ...]
     fields: tuple[FieldView, ...]
     equality: Equality
-    receiver: str
-    options: str
-    guard: str
-    boolean: str
-    not_implemented: str
+    receiver: Code
+    options: Code
+    guard: Code
+    boolean: Code
+    not_implemented: Code
 
 
 class GroupView(msgspec.Struct, frozen=True):
     """A service or action, which only groups classes: its name and that in the file."""
 
-    name: str
-    purpose: str
-    stem: str
+    name: Code
+    purpose: Text
+    stem: Code
 
 
 Purposes = Mapping[ir.TypeName, str]
@@ -159,19 +160,19 @@ def message(
     )
     names = tuple_of(*(f'"{view.name}"' for view in views))
     entries = tuple(view.description for view in views)
-    doubt = views[0].doubt if views else ()
+    doubt = fields.doubt(structure, references, naming, converts=converts)
     return MessageView(
-        name=references.name(structure.name),
+        name=Code(references.name(structure.name)),
         docstring=fields.message(structure, purposes[structure.name], entries, file),
-        match_args="\n".join(layout_lines(names, 4, "__match_args__ = ")).partition(" = ")[2],
+        match_args=Code("\n".join(layout_lines(names, 4, "__match_args__ = ")).partition(" = ")[2]),
         constants=tuple(_constants(structure, file)),
         fields=views,
         equality=equality(structure, naming.receiver, references),
-        receiver=naming.receiver,
-        options=naming.options,
-        guard="\n".join(if_one_or_all(naming.options, doubt, 8)).lstrip(),
-        boolean=f"{naming.builtins}bool",
-        not_implemented=naming.not_implemented,
+        receiver=Code(naming.receiver),
+        options=Code(naming.options),
+        guard=_statement(if_one_or_all(naming.options, doubt, 8)),
+        boolean=Code(f"{naming.builtins}bool"),
+        not_implemented=Code(naming.not_implemented),
     )
 
 
@@ -185,17 +186,17 @@ def _constants(structure: ir.Message, file: str) -> Iterator[ConstantView]:
             yield ConstantView(_statement(fields.default_constant(field)))
 
 
-def _statement(on_lines: Iterable[str]) -> str:
-    return "\n".join(on_lines).lstrip()
+def _statement(on_lines: Iterable[str]) -> Code:
+    return Code("\n".join(on_lines).lstrip())
 
 
 def services(interface: ir.Interface, purposes: Purposes) -> tuple[GroupView, ...]:
     """Return the views of a service, or of the services that an action consists of."""
     return tuple(
         GroupView(
-            name=python_names.class_(service.name),
-            purpose=purposes.get(service.name, f"The service {service.name}."),
-            stem=service.name.name,
+            name=Code(python_names.class_(service.name)),
+            purpose=Text(purposes.get(service.name, f"The service {service.name}.")),
+            stem=Code(service.name.name),
         )
         for service in derive.services(interface)
     )
@@ -204,4 +205,4 @@ def services(interface: ir.Interface, purposes: Purposes) -> tuple[GroupView, ..
 def action(interface: ir.Action) -> GroupView:
     """Return the view of an action."""
     name = interface.name
-    return GroupView(python_names.class_(name), f"The action {name}.", name.name)
+    return GroupView(Code(python_names.class_(name)), Text(f"The action {name}."), Code(name.name))

@@ -22,20 +22,21 @@ from idlc.generate.python.lines import (
 )
 from idlc.model import derive, ir, python_names
 from idlc.model.ir import spell
+from idlc.project.templates import Code, Text
 from idlc.wire.plan import LIST_PRIMITIVES
 
 
 class DocstringSection(msgspec.Struct, frozen=True):
     """A list in a docstring, such as that of the attributes."""
 
-    title: str
-    entries: tuple[str, ...]
+    title: Text
+    entries: tuple[Text, ...]
 
 
 class Docstring(msgspec.Struct, frozen=True):
     """A class's docstring: `text` of one or more lines, and lists after it."""
 
-    text: str
+    text: Text
     sections: tuple[DocstringSection, ...] = ()
 
     @property
@@ -44,7 +45,7 @@ class Docstring(msgspec.Struct, frozen=True):
         return not self.sections and "\n" not in self.text
 
 
-def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file: str) -> Docstring:
+def message(structure: ir.Message, purpose: str, entries: tuple[Text, ...], file: str) -> Docstring:
     """Return a message's docstring: its comment, or else its `purpose`, and its fields' entries.
 
     `file` is the one that defines it, within its package.
@@ -56,9 +57,12 @@ def message(structure: ir.Message, purpose: str, entries: tuple[str, ...], file:
     place = _place(structure, file)
     lines += ["", f"Defined in {place}"] if place else []
     constants = tuple(_constant(c) for c in structure.constants if c.comment or c.unit)
-    sections = (DocstringSection("Attributes", entries), DocstringSection("Constants", constants))
+    sections = (
+        DocstringSection(Text("Attributes"), entries),
+        DocstringSection(Text("Constants"), constants),
+    )
     filled = tuple(section for section in sections if section.entries)
-    return Docstring(docstring(lines, one_line=not filled), filled)
+    return Docstring(Text(docstring(lines, one_line=not filled)), filled)
 
 
 def purposes(interface: ir.Interface) -> dict[ir.TypeName, str]:
@@ -129,7 +133,7 @@ def _place(structure: ir.Message, file: str) -> str:
     return f"{file}:{first.source.position(first.start)[0]}"
 
 
-def _constant(constant: ir.Constant) -> str:
+def _constant(constant: ir.Constant) -> Text:
     return entry(constant.name, constant, field_words(constant))
 
 
@@ -140,23 +144,23 @@ def field_words(described: ir.Field | ir.Constant) -> str:
     return unit + (f". {comment}" if comment else "")
 
 
-def entry(name: str, described: ir.Field | ir.Constant, suffix: str) -> str:
+def entry(name: str, described: ir.Field | ir.Constant, suffix: str) -> Text:
     """Return the entry of a field or constant in a list, on as many lines as it takes."""
     text = f"{name}: {spell(described.type)}{suffix}"
-    return "\n".join(lines.wrapped(text, 8, hanging=4))
+    return Text("\n".join(lines.wrapped(text, 8, hanging=4)))
 
 
-def attribute(described: ir.Field | ir.Constant, suffix: str, file: str) -> str:
+def attribute(described: ir.Field | ir.Constant, suffix: str, file: str) -> Text:
     """Return the statement that editors show of a field or constant: its definition and comment.
 
     The file is named without a line number, which other lines would change. The statement is empty
     for fields that ROS 2 adds: their annotation says it all.
     """
     if described.name_span is None:
-        return ""
+        return Text("")
     lines = wrapped(f"{spell(described.type)} {described.name}{suffix} ({file})", 6)
     text = docstring(lines, one_line=True)
-    return f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""'
+    return Text(f'"""{text}"""' if len(lines) == 1 else f'"""{text}\n"""')
 
 
 ANNOTATIONS = {"bool": "bool", "byte": "bytes", "float32": "float", "float64": "float"}
@@ -166,20 +170,17 @@ BUILTINS = frozenset({"bool", "bytes", "float", "int", "list", "str"})
 class FieldView(msgspec.Struct, frozen=True, kw_only=True):
     """A field, as text; `store` is a statement on as many lines as it takes.
 
-    `wire_name` and `idl` are its name and type in rosidl. All conditions of `doubt` are true, in
-    the constructor, for an argument that is perhaps not of the field's type; a field of numbers
-    has none, because it converts any argument.
+    `wire_name` and `idl` are its name and type in rosidl.
     """
 
-    name: str
-    wire_name: str
-    idl: str
-    description: str
-    docstring: str
-    annotation: str
-    parameter: str
-    store: str
-    doubt: tuple[str, ...]
+    name: Code
+    wire_name: Code
+    idl: Code
+    description: Text
+    docstring: Text
+    annotation: Code
+    parameter: Code
+    store: Code
 
 
 class Naming(msgspec.Struct, frozen=True):
@@ -265,16 +266,26 @@ def view(
     shape = _shape(field, references, naming, converts=converts)
     words = field_words(field)
     return FieldView(
-        name=name,
-        wire_name=field.name,
-        idl=idl_text(field.type),
+        name=Code(name),
+        wire_name=Code(field.name),
+        idl=Code(idl_text(field.type)),
         description=entry(name, field, words),
         docstring=attribute(field, words, file),
-        annotation=shape.annotation + _ignored(name),
-        parameter=shape.parameter,
-        store="\n".join(_store(slot, name, shape)).lstrip(),
-        doubt=shape.doubt,
+        annotation=Code(shape.annotation + _ignored(name)),
+        parameter=Code(shape.parameter),
+        store=Code("\n".join(_store(slot, name, shape)).lstrip()),
     )
+
+
+def doubt(
+    structure: ir.Message, references: References, naming: Naming, *, converts: bool
+) -> tuple[str, ...]:
+    """Return conditions that all hold for a first argument that is perhaps not of its field's type.
+
+    There are none for a field of numbers, which converts any argument.
+    """
+    first = structure.fields[:1]
+    return _shape(first[0], references, naming, converts=converts).doubt if first else ()
 
 
 class _Shape(NamedTuple):

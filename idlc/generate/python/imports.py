@@ -11,6 +11,7 @@ import msgspec
 
 from idlc.generate.python import lines
 from idlc.model import derive, ir, link, python_names
+from idlc.project.templates import Code, Text
 from idlc.wire import plan
 
 
@@ -169,16 +170,15 @@ TITLES: dict[ir.Kind, str] = {"msg": "Messages", "srv": "Services", "action": "A
 class NameView(msgspec.Struct, frozen=True):
     """A class, and the module that it is in."""
 
-    name: str
-    module: str
+    name: Code
+    module: Code
 
 
 class PackageView(msgspec.Struct, frozen=True):
     """A package that imports its modules when a name is asked for."""
 
-    path: str
-    title: str
-    imports: tuple[str, ...]
+    title: Text
+    imports: tuple[Code, ...]
     names: tuple[NameView, ...]
 
 
@@ -205,12 +205,11 @@ def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> 
     for name, module in homes.items():
         by_module[module].append(name)
     return PackageView(
-        path=f"{kind}/__init__.py",
-        title=f"{TITLES[kind]} of {model.package}, imported when they are asked for.",
+        title=Text(f"{TITLES[kind]} of {model.package}, imported when they are asked for."),
         imports=tuple(
-            line
+            Code(line)
             for module in sorted(by_module, key=natural)
             for line in statements(f".{module}", by_module[module], 4)
         ),
-        names=tuple(NameView(name, homes[name]) for name in sorted(homes, key=natural)),
+        names=tuple(NameView(Code(name), Code(homes[name])) for name in sorted(homes, key=natural)),
     )

@@ -1,4 +1,4 @@
-"""Types at run time, from `type_data.py`: messages are checked and read by them, field by field.
+"""Types at run time, from a package's `_type_data.py`: messages are checked and read by them.
 
 It serves all but the fast path: `validate`, `to_dict` and `from_dict`, the words of errors,
 `SLOT_TYPES` and rclpy's type descriptions.
@@ -11,7 +11,7 @@ import math
 from array import array
 from collections.abc import Callable
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
 from types import SimpleNamespace
@@ -26,7 +26,6 @@ from ..errors import (
     importing,
 )
 from ..names import public_name, slot_name, wire_name
-from ..objects import owner_of
 
 
 class Primitive(NamedTuple):
@@ -47,9 +46,6 @@ class Primitive(NamedTuple):
         limits = "" if self.high is None else f" from {self.low} to {self.high}"
         return f"{what}{limits} ({self.name})"
 
-
-#: The package that this support package is part of.
-OWN = __name__.rsplit(".", 3)[0]
 
 #: Largest finite float32.
 FLOAT32_MAX = 3.4028234663852886e38
@@ -85,7 +81,7 @@ class FieldInfo(NamedTuple):
     text: bool
     wide: bool
     text_bound: int | None
-    nested: str
+    nested: Structure | None
     size: int | None
     is_sequence: bool
     bound: int | None
@@ -111,52 +107,111 @@ class FieldInfo(NamedTuple):
         return self.primitive is not None and self.primitive.code not in "?c"
 
 
+class Types:
+    """What a package says of types, its own and all that they refer to, in `_type_data.py`.
+
+    Packages may describe types of one name in different ways, so nothing is kept by names alone.
+    """
+
+    def __init__(self, module: Any) -> None:
+        content = json.loads(module.JSON)
+        self.home: str = module.__package__
+        self.package: str = content["package"]
+        #: The prefix of other packages' modules.
+        self.around: str = content.get("around", "")
+        self.descriptions: dict[str, Any] = content["descriptions"]
+        self.hashes: dict[str, str] = content["hashes"]
+        self.sources: dict[str, str] = content["sources"]
+        self._structures: dict[str, Structure] = {}
+
+    def __getitem__(self, name: str) -> Structure:
+        """Return a type by its full name, package/kind/Name; it is always the same object."""
+        structure = self._structures.get(name)
+        if structure is None:
+            structure = self._structures.setdefault(name, Structure(self, name))
+        return structure
+
+
+class Structure:
+    """A type that has fields; a service or action has one for each of its parts."""
+
+    def __init__(self, types: Types, name: str) -> None:
+        self.types = types
+        self.name = name
+        #: The members as ROS 2 describes them, a dummy one included.
+        self.members: list[dict[str, Any]] = types.descriptions[name]["fields"]
+
+    @property
+    def is_own(self) -> bool:
+        """True if it belongs to the package that describes it."""
+        return self.name.partition("/")[0] == self.types.package
+
+    @property
+    def hash(self) -> str:
+        """The hash of the type (RIHS01)."""
+        return self.types.hashes[self.name]
+
+    @cached_property
+    def fields(self) -> tuple[FieldInfo, ...]:
+        """The fields, the dummy member left out."""
+        return tuple(
+            self._field(member) for member in self.members if member["name"] != DUMMY
+        )
+
+    def _field(self, member: dict[str, Any]) -> FieldInfo:
+        type_ = member["type"]
+        shape, element = divmod(type_["type_id"], 48)
+        nested = type_["nested_type_name"]
+        return FieldInfo(
+            name=member["name"],
+            primitive=PRIMITIVES.get(element),
+            text=element in STRING_IDS,
+            wide=element in WIDE_IDS,
+            text_bound=type_["string_capacity"] or None,
+            nested=self.types[nested] if nested else None,
+            size=type_["capacity"] if shape == 1 else None,
+            is_sequence=shape > 1,
+            bound=type_["capacity"] if shape == 2 else None,
+        )
+
+    @cached_property
+    def least(self) -> int:
+        """The fewest bytes that a message of it can take."""
+        sizes = (
+            4 if field.is_sequence else (field.size or 1) * least_element(field)
+            for field in self.fields
+        )
+        return sum(sizes) if self.fields else 1
+
+    def find_class(self) -> Any:
+        """Return the class of its messages, of the package that describes it or of another."""
+        package, kind, short = self.name.split("/")
+        root = self.types.home if self.is_own else self.types.around + package
+        with importing():
+            return getattr(import_module(f"{root}.{kind}"), public_name(short))
+
+
+_types_of = cache(Types)
+
+
+def structure_of(kind: type) -> Structure:
+    """Return the type of a generated class, or of a class that a user derives from one.
+
+    The class's module says which package describes it, wherever this module comes from.
+    """
+    return _structure_of(getattr(type(kind), "_message", None) or kind)
+
+
 @cache
-def types() -> dict[str, Any]:
-    """Return the content of `type_data.py`."""
-    module = import_module(f"{__name__.rsplit('.', 2)[0]}.type_data")
-    content: dict[str, Any] = json.loads(module.JSON)
-    return content
+def _structure_of(owner: type) -> Structure:
+    home, kind, _ = owner.__module__.rsplit(".", 2)
+    types = _types_of(import_module(f"{home}._type_data"))
+    return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
 def type_name(kind: type) -> str:
-    """Return a message class's full name, package/kind/Name."""
-    kind = owner_of(kind)
-    path = kind.__module__.split(".")
-    package = types()["package"] if kind.__module__.startswith(OWN + ".") else path[-3]
-    return f"{package}/{path[-2]}/{wire_name(kind.__name__)}"
-
-
-@cache
-def fields_of(name: str) -> tuple[FieldInfo, ...]:
-    """Return the fields of a type by its full name, the dummy member left out."""
-    fields = types()["descriptions"][name]["fields"]
-    return tuple(_field(field) for field in fields if field["name"] != DUMMY)
-
-
-def _field(field: dict[str, Any]) -> FieldInfo:
-    type_ = field["type"]
-    shape, element = divmod(type_["type_id"], 48)
-    return FieldInfo(
-        name=field["name"],
-        primitive=PRIMITIVES.get(element),
-        text=element in STRING_IDS,
-        wide=element in WIDE_IDS,
-        text_bound=type_["string_capacity"] or None,
-        nested=type_["nested_type_name"],
-        size=type_["capacity"] if shape == 1 else None,
-        is_sequence=shape > 1,
-        bound=type_["capacity"] if shape == 2 else None,
-    )
-
-
-def class_of(name: str) -> Any:
-    """Return the class of a type by its full name, of this package or of another."""
-    package, kind, short = name.split("/")
-    others = types().get("around", "")  # where other packages are, if not at the top
-    root = OWN if package == types()["package"] else others + package
-    with importing():
-        return getattr(import_module(f"{root}.{kind}"), public_name(short))
+    """Return a generated class's full name, package/kind/Name."""
+    return structure_of(kind).name
 
 
 def slot_types(kind: type) -> tuple[Any, ...]:
@@ -171,13 +226,13 @@ def slot_types(kind: type) -> tuple[Any, ...]:
             f"({error}): source your ROS 2 installation, or pip install "
             "ros-jazzy-rosidl-parser"
         ) from error
-    return tuple(_slot_type(definition, field) for field in fields_of(type_name(kind)))
+    return tuple(_slot_type(definition, field) for field in structure_of(kind).fields)
 
 
 def _slot_type(definition: Any, field: FieldInfo) -> Any:
     element: Any
     if field.nested:
-        package, kind, short = field.nested.split("/")
+        package, kind, short = field.nested.name.split("/")
         element = definition.NamespacedType([package, kind], short)
     elif field.text and field.text_bound is not None:
         bounded = definition.BoundedWString if field.wide else definition.BoundedString
@@ -220,7 +275,7 @@ def validate(message: Any, *, wire_only: bool = False) -> None:
 
     `wire_only` leaves out what the wire does not enforce: the bounds of strings.
     """
-    _message(message, type_name(type(message)), "", wire_only)
+    _message(message, structure_of(type(message)), "", wire_only)
 
 
 def validate_field(value: Any, field: FieldInfo) -> None:
@@ -239,11 +294,11 @@ def validate_count(values: Any, field: FieldInfo) -> None:
     _count(values, field, field.public)
 
 
-def _message(message: Any, name: str, path: str, wire_only: bool) -> None:
-    for field in fields_of(name):
+def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> None:
+    for field in structure.fields:
         place = inner_path(path, field.public)
         if not hasattr(message, field.slot):
-            raise ValidationError(path or "message", f"a {name}", message)
+            raise ValidationError(path or "message", f"a {structure.name}", message)
         value = getattr(message, field.slot)
         if field.is_list:
             _list(value, field, place, wire_only)
@@ -366,7 +421,9 @@ def refused(
         for candidate in PRIMITIVES.values()
         if kind in (candidate.code, candidate.name)
     )
-    field = FieldInfo(name, primitive, False, False, None, "", size, size is None, None)
+    field = FieldInfo(
+        name, primitive, False, False, None, None, size, size is None, None
+    )
     failure = ValidationError(
         name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
     )
@@ -403,60 +460,50 @@ def read_carefully(
     It takes what middlewares take although it is not right: text that is not UTF-8, text without
     its terminating zero. `maker` returns the function that makes empty messages of a class.
     """
-    name = type_name(kind)
+    structure = structure_of(kind)
 
-    def make(other: str) -> Any:
+    def make(other: Structure) -> Any:
         # what a constructor makes may be larger than the buffer
-        return maker(kind if other == name else class_of(other))()
+        return maker(kind if other is structure else other.find_class())()
 
-    return _Reader(data, order_of(data), make).message(name, "")
+    return _Reader(data, order_of(data), make).message(structure, "")
 
 
-def check_buffer(name: str, data: bytes) -> None:
+def check_buffer(structure: Structure, data: bytes) -> None:
     """Raise DecodeError, as `deserialize` does, unless `data` is a message of a type.
 
     No class is needed, so that those of other packages need not be installed.
     """
-    _Reader(data, order_of(data), lambda _: SimpleNamespace()).message(name, "")
-
-
-@cache
-def least(name: str) -> int:
-    """Return the fewest bytes that a structure can take."""
-    fields = fields_of(name)
-    sizes = (
-        4 if field.is_sequence else (field.size or 1) * least_element(field)
-        for field in fields
-    )
-    return sum(sizes) if fields else 1
+    _Reader(data, order_of(data), lambda _: SimpleNamespace()).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
     """Return the fewest bytes that a value of a field, or an element of it, can take."""
     if field.nested:
-        return least(field.nested)
+        return field.nested.least
     return 4 if field.primitive is None else field.primitive.size
 
 
 class _Reader:
     """Goes over a buffer and never further than it has bytes for.
 
-    `make` returns what takes the values of a structure, by its name.
+    `make` returns what takes the values of a structure.
     """
 
-    def __init__(self, data: bytes, order: str, make: Callable[[str], Any]) -> None:
+    def __init__(
+        self, data: bytes, order: str, make: Callable[[Structure], Any]
+    ) -> None:
         self.data = data
         self.order = order
         self.make = make
         self.at = 4
 
-    def message(self, name: str, path: str) -> Any:
+    def message(self, structure: Structure, path: str) -> Any:
         """Read a structure."""
-        message = self.make(name)
-        fields = fields_of(name)
-        if not fields:
-            self.take(1, 1, path or name)
-        for field in fields:
+        message = self.make(structure)
+        if not structure.fields:
+            self.take(1, 1, path or structure.name)
+        for field in structure.fields:
             place = inner_path(path, field.public)
             setattr(message, field.slot, self.field(field, place))
         return message

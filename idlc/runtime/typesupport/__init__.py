@@ -22,10 +22,9 @@ from importlib.util import module_from_spec
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from ..names import wire_name
+from ..on_demand.typeinfo import Structure, structure_of
 from . import c, services
 from .abi import has_hashes
-from .introspection import load
 
 #: Middlewares that take encoded messages through Fast DDS's type support.
 _OPAQUE = ("rmw_fastrtps_cpp", "rmw_zenoh_cpp")
@@ -119,9 +118,9 @@ _KINDS = (
 )
 
 
-def _extension(cls: type, name: str) -> _Extension | None:
+def _extension(cls: type, described: Structure) -> _Extension | None:
     """Return the extension module's part for a class, else None if it is absent or outdated."""
-    package, kind, short = name.split("/")
+    package, kind, short = described.name.split("/")
     if cls.__module__.partition(".")[0] != package:
         return None
     module = _import(package)
@@ -130,7 +129,7 @@ def _extension(cls: type, name: str) -> _Extension | None:
     suffix = f"{kind}__{_snake(short)}"
     for prefix, structure in _KINDS:
         support = getattr(module, f"{prefix}__{suffix}", None)
-        if support and _type_hash(support, structure) == load().hashes[name]:
+        if support and _type_hash(support, structure) == described.hash:
             return _Extension(module, suffix)
     return None
 
@@ -163,12 +162,6 @@ def _implementation() -> ModuleType:
     return implementation
 
 
-def _name(cls: Any) -> str:
-    """Return the full name of a class as ROS 2 writes it."""
-    kind = cls.__module__.split(".")[-2]
-    return f"{load().package}/{kind}/{wire_name(cls.__name__)}"
-
-
 def _handle(cls: Any) -> int:
     """Return the address of any class's type support, whoever made the class."""
     meta = type(cls)
@@ -184,13 +177,13 @@ def _set_capsules(cls: Any, capsules: dict[str, object]) -> None:
 
 @cache
 def _message(cls: Any) -> c.MessageSupport:
-    name = _name(cls)
-    if name.partition("/")[0] in _OF_RCL:
+    structure = structure_of(cls)
+    if structure.types.package in _OF_RCL:
         raise ImportError(
-            f"ROS reads the memory of {name} itself, and what it was built with is not "
+            f"ROS reads the memory of {structure.name} itself, and what it was built with is not "
             "here: install that package with your ROS 2, in the version that idlc compiled"
         )
-    return _implementation().message(cls, name)  # type: ignore[no-any-return]
+    return _implementation().message(cls, structure)  # type: ignore[no-any-return]
 
 
 @cache
@@ -206,7 +199,7 @@ def import_message(cls: Any) -> None:
     """Give `type(cls)` the capsules that rclpy reads from a message class."""
     if _base() is not None:
         _base().register(cls)
-    built = _extension(cls, _name(cls))
+    built = _extension(cls, structure_of(cls))
     if built:
         _set_capsules(cls, built.message())
         return
@@ -220,12 +213,14 @@ def import_service(cls: Any) -> None:
     request, response = map(_handle, (cls.Request, cls.Response))
     # ROS 2 Humble knows no events, and has no package that they need
     happened = _handle(cls.Event) if has_hashes() else 0
-    built = _extension(cls, _name(cls))
+    built = _extension(cls, structure_of(cls))
     if built:
         _set_capsules(cls, {_SUPPORT: built.service()})
         return
     event = services.event(cls, happened) if happened else services.Event()
-    support = services.service(_name(cls), request, response, event, _implementation())
+    support = services.service(
+        structure_of(cls), request, response, event, _implementation()
+    )
     _set_capsules(cls, {_SUPPORT: c.capsule(support)})
 
 
@@ -242,9 +237,9 @@ def import_action(cls: Any) -> None:
         _handle(parts.CancelGoalService),
     )
     messages = (_handle(parts.FeedbackMessage), _handle(parts.GoalStatusMessage))
-    built = _extension(cls, _name(cls))
+    built = _extension(cls, structure_of(cls))
     if built:
         _set_capsules(cls, {_SUPPORT: built.action()})
         return
-    support = services.action(_name(cls), its_services, messages)
+    support = services.action(structure_of(cls), its_services, messages)
     _set_capsules(cls, {_SUPPORT: c.capsule(support)})

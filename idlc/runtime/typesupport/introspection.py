@@ -1,7 +1,6 @@
 """Types as ROS 2 asks about them: hash, description, source text, members, C structures.
 
-The facts are JSON in `type_data.py`, written with the package and read only when rclpy asks
-for type support:
+The facts are JSON in a package's `_type_data.py`, read only when rclpy asks for type support:
 
     {"package": "pkg",
      "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
@@ -31,7 +30,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..on_demand import typeinfo
+from ..on_demand.typeinfo import Structure
 from . import c, callbacks
 from .abi import abi
 
@@ -48,6 +47,7 @@ class Field(NamedTuple):
     string_capacity: int
     nested_type_name: str
     default_value: str
+    nested: Structure | None
 
     @property
     def base(self) -> int:
@@ -60,35 +60,25 @@ class Field(NamedTuple):
         return self.type_id // 48
 
 
-class Types(NamedTuple):
-    """The facts about a package's types; fields by type."""
-
-    package: str
-    types: dict[str, list[Field]]
-    hashes: dict[str, str]
-    sources: dict[str, str]
+@cache
+def fields_of(structure: Structure) -> tuple[Field, ...]:
+    """Return a type's members, the dummy one included."""
+    fields = []
+    for member in structure.members:
+        name = member["type"]["nested_type_name"]
+        nested = structure.types[name] if name else None
+        default = member["default_value"]
+        field = Field(
+            member["name"], **member["type"], default_value=default, nested=nested
+        )
+        fields.append(field)
+    return tuple(fields)
 
 
 @cache
-def load() -> Types:
-    """Return the facts about this package's types."""
-    data = typeinfo.types()
-    types = {
-        name: [
-            Field(field["name"], **field["type"], default_value=field["default_value"])
-            for field in description["fields"]
-        ]
-        for name, description in data["descriptions"].items()
-    }
-    return Types(data["package"], types, data["hashes"], data["sources"])
-
-
-@cache
-def references(name: str) -> frozenset[str]:
-    """Return all types that `name` refers to, directly or not, itself excluded."""
-    direct = {
-        field.nested_type_name for field in load().types[name] if field.nested_type_name
-    }
+def references(structure: Structure) -> frozenset[Structure]:
+    """Return all types that a type refers to, directly or not, itself excluded."""
+    direct = {field.nested for field in fields_of(structure) if field.nested}
     return frozenset(direct.union(*map(references, direct)))
 
 
@@ -103,9 +93,10 @@ def _field(field: Field) -> c.Field:
 
 
 @cache
-def _individual(name: str) -> c.IndividualDescription:
-    fields = [_field(field) for field in load().types[name]]
-    return c.IndividualDescription(c.string(name), c.sequence(fields, c.Field))
+def _individual(structure: Structure) -> c.IndividualDescription:
+    fields = [_field(field) for field in fields_of(structure)]
+    name = c.string(structure.name)
+    return c.IndividualDescription(name, c.sequence(fields, c.Field))
 
 
 def _installed_text(name: str) -> str | None:
@@ -119,27 +110,27 @@ def _installed_text(name: str) -> str | None:
     return None
 
 
-def _source(name: str) -> c.Source:
+def _source(structure: Structure) -> c.Source:
     """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
-    own = name.startswith(f"{load().package}/")
-    text = load().sources.get(name) if own else _installed_text(name)
+    name, sources = structure.name, structure.types.sources
+    text = sources.get(name) if structure.is_own else _installed_text(name)
     encoding = "implicit" if text is None else name.split("/")[1]
     return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
 
 
-def _type_hash(name: str) -> c.TypeHash:
-    digest = bytes.fromhex(load().hashes[name].removeprefix("RIHS01_"))
+def _type_hash(structure: Structure) -> c.TypeHash:
+    digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
     return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
 
 
 @cache
-def about(name: str) -> c.About:
+def about(structure: Structure) -> c.About:
     """Return functions that never fail and never return NULL, as rcl demands."""
-    others = sorted(references(name))
-    individuals = c.sequence([_individual(n) for n in others], c.IndividualDescription)
-    description = c.Description(_individual(name), individuals)
-    sources = c.sequence([_source(n) for n in (name, *others)], c.Source)
-    values = (_type_hash(name), description, sources)
+    others = sorted(references(structure), key=lambda other: other.name)
+    individuals = c.sequence(list(map(_individual, others)), c.IndividualDescription)
+    description = c.Description(_individual(structure), individuals)
+    sources = c.sequence(list(map(_source, (structure, *others))), c.Source)
+    values = (_type_hash(structure), description, sources)
     return c.About(*(c.constant(c.pointer(value)) for value in values))
 
 
@@ -168,10 +159,11 @@ _MESSAGE = 18
 
 
 @cache
-def structure(name: str) -> type[ctypes.Structure]:
+def c_structure(structure: Structure) -> type[ctypes.Structure]:
     """Return the C structure that rosidl's C generator would make for a message."""
-    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(load().types[name])]
-    return type(name.replace("/", "__"), (ctypes.Structure,), {"_fields_": fields})
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(fields_of(structure))]
+    name = structure.name.replace("/", "__")
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
 def introspection_id(field: Field) -> int:
@@ -181,11 +173,7 @@ def introspection_id(field: Field) -> int:
 
 def element_type(field: Field) -> Any:
     """Return the C type of one element of a field."""
-    return (
-        structure(field.nested_type_name)
-        if field.base == NESTED
-        else _ELEMENTS[field.base][1]
-    )
+    return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
 
 
 def _c_type(field: Field) -> Any:
@@ -203,11 +191,11 @@ def _sequence_type(field: Field) -> Any:
     return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
 
 
-def placed_fields(name: str) -> list[tuple[Field, int]]:
+def placed_fields(structure: Structure) -> list[tuple[Field, int]]:
     """Return a message's fields and where each begins in the C structure."""
-    kind = structure(name)
+    kind = c_structure(structure)
     offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
-    return list(zip(load().types[name], offsets, strict=True))
+    return list(zip(fields_of(structure), offsets, strict=True))
 
 
 # members
@@ -293,8 +281,8 @@ def _member(field: Field, offset: int, functional: bool) -> Any:
         is_upper_bound=field.shape == BOUNDED_SEQUENCE,
         offset=offset,
     )
-    if field.base == NESTED:
-        member.members = handle(field.nested_type_name, functional)
+    if field.nested:
+        member.members = handle(field.nested, functional)
     if field.shape != SCALAR and functional:
         size = ctypes.sizeof(element_type(field))
         functions = elements(size, element_content(field))
@@ -308,13 +296,13 @@ def _member(field: Field, offset: int, functional: bool) -> Any:
     return member
 
 
-def members(name: str, functional: bool) -> Any:
+def members(structure: Structure, functional: bool) -> Any:
     """Return a message's members."""
-    placed = placed_fields(name)
+    placed = placed_fields(structure)
     table = [_member(field, offset, functional) for field, offset in placed]
-    size = ctypes.sizeof(structure(name))
-    finish = elements(size, content(name)).finish if functional else None
-    package, kind, short = name.split("/")
+    size = ctypes.sizeof(c_structure(structure))
+    finish = elements(size, content(structure)).finish if functional else None
+    package, kind, short = structure.name.split("/")
     return c.keep(
         _members_type()(
             namespace=f"{package}__{kind}".encode(),
@@ -328,16 +316,16 @@ def members(name: str, functional: bool) -> Any:
 
 
 @cache
-def handle(name: str, functional: bool) -> int:
+def handle(structure: Structure, functional: bool) -> int:
     """Return the address of a message's introspection type support.
 
     `functional`: with the functions by which message memory is written and read.
     """
     support = c.MessageTypeSupport(
         library().identifier,
-        ctypes.addressof(members(name, functional)),
+        ctypes.addressof(members(structure, functional)),
         library().same_handle,
-        about(name),
+        about(structure),
     )
     return c.pointer(support)
 
@@ -425,10 +413,10 @@ def _table(*entries: tuple[int, int, int, int]) -> int:
 
 
 @cache
-def content(name: str) -> int:
+def content(structure: Structure) -> int:
     """Return the table of a type, 0 if there is nothing to free in it."""
     entries = []
-    for field, offset in placed_fields(name):
+    for field, offset in placed_fields(structure):
         inner = element_content(field)
         count = {SCALAR: 1, ARRAY: field.capacity}.get(field.shape, 0)
         if inner or not count:
@@ -439,8 +427,8 @@ def content(name: str) -> int:
 
 def element_content(field: Field) -> int:
     """Return the table of one element of a field, 0 if there is nothing to free in it."""
-    if field.base == NESTED:
-        return content(field.nested_type_name)
+    if field.nested:
+        return content(field.nested)
     return _text() if element_type(field) is c.String else 0
 
 

@@ -20,6 +20,7 @@ from ctypes import (
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from ..on_demand.typeinfo import Structure
 from . import c, callbacks, introspection
 from .introspection import about
 
@@ -121,10 +122,10 @@ def event(cls: Any, handle: int) -> Event:
 
 
 def service(
-    name: str, request: int, response: int, event: Event, kind: ModuleType
+    structure: Structure, request: int, response: int, event: Event, kind: ModuleType
 ) -> int:
     """Return the address of a service's type support, made from its messages' handles."""
-    identifier, data = kind.service(name, request, response, event.handle)
+    identifier, data = kind.service(structure.name, request, response, event.handle)
     return c.pointer(
         c.ServiceTypeSupport(
             identifier,
@@ -133,14 +134,16 @@ def service(
             request,
             response,
             *event,
-            about(name),
+            about(structure),
         )
     )
 
 
-def action(name: str, services: tuple[int, int, int], messages: tuple[int, int]) -> int:
+def action(
+    structure: Structure, services: tuple[int, int, int], messages: tuple[int, int]
+) -> int:
     """Return the address of an action's type support.
 
     `services`: goal, result, cancel; `messages`: feedback, status.
     """
-    return c.pointer(c.ActionTypeSupport(*services, *messages, about(name)))
+    return c.pointer(c.ActionTypeSupport(*services, *messages, about(structure)))

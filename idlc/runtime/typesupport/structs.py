@@ -22,17 +22,17 @@ from typing import Any, NamedTuple, Protocol
 
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
+from ..on_demand.typeinfo import Structure
 from . import c, callbacks, introspection
 from .callbacks import RefusedError
 from .introspection import (
     ARRAY,
-    NESTED,
     SCALAR,
     Field,
     allocator,
+    c_structure,
     element_type,
     placed_fields,
-    structure,
 )
 
 _HEADER = 4
@@ -223,8 +223,8 @@ def allocate(sequence: int, count: int, stride: int) -> int:
 
 def _element_steps(field: Field) -> list[Step]:
     """Return the steps of one element that begins at 0."""
-    if field.base == NESTED:
-        return list(steps(field.nested_type_name))
+    if field.nested:
+        return list(steps(field.nested))
     kind = element_type(field)
     if kind is c.String:
         return [WideText(0) if field.base in _WIDE else Text(0)]
@@ -249,10 +249,10 @@ def _field_steps(field: Field, offset: int) -> list[Step]:
 
 
 @cache
-def steps(name: str) -> tuple[Step, ...]:
+def steps(structure: Structure) -> tuple[Step, ...]:
     """Return how a type moves, neighbouring runs joined."""
     joined: list[Step] = []
-    for field, offset in placed_fields(name):
+    for field, offset in placed_fields(structure):
         for step in _field_steps(field, offset):
             last = joined[-1] if joined else None
             if isinstance(step, Run) and isinstance(last, Run) and _follows(step, last):
@@ -271,16 +271,16 @@ def _follows(step: Run, last: Run) -> bool:
     )
 
 
-def whole(name: str) -> Step:
+def whole(structure: Structure) -> Step:
     """Return the step that moves a whole message."""
-    return Repeat(list(steps(name)), 0, 1, 1)
+    return Repeat(list(steps(structure)), 0, 1, 1)
 
 
-def _converter(cls: Any, name: str) -> object:
+def _converter(cls: Any, structure: Structure) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
-    message_step = whole(name)
+    message_step = whole(structure)
 
     def store(address: int, message: Any) -> None:
         try:
@@ -296,17 +296,19 @@ def _converter(cls: Any, name: str) -> object:
 
     methods = {
         "__setitem__": staticmethod(store),
-        "__getitem__": staticmethod(callbacks.taking(name, fetch)),
+        "__getitem__": staticmethod(callbacks.taking(structure.name, fetch)),
     }
     return type("Converter", (), methods)()
 
 
-def message(cls: Any, name: str) -> c.MessageSupport:
+def message(cls: Any, structure: Structure) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
-    size, content = ctypes.sizeof(structure(name)), introspection.content(name)
+    size = ctypes.sizeof(c_structure(structure))
+    content = introspection.content(structure)
     try:
-        addresses = introspection.memory_functions(size, content, _converter(cls, name))
-        handle = introspection.handle(name, functional=True)
+        converter = _converter(cls, structure)
+        addresses = introspection.memory_functions(size, content, converter)
+        handle = introspection.handle(structure, functional=True)
     except RefusedError as error:
         raise ImportError(
             f"idlc's type support for this middleware needs machine code, but {error}: "

@@ -18,8 +18,8 @@ ATOMIC = frozenset({bool, bytes, float, int, str})
 SMALL = 64
 #: Elements of large arrays that are compared at once.
 PIECE = 1 << 16
-#: The prefix of modules' names that is not shown.
-HIDDEN = ""
+#: Packages that are shown under other names than they are imported by.
+SHOWN: dict[str, str] = {}
 _memcmp_function: Any = None
 #: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
 _of_numpy: set[type] = set()
@@ -144,7 +144,10 @@ represented.__qualname__ = "__create_fn__.<locals>.__repr__"
 
 def _shown_name(kind: type) -> str:
     """Return a class's name after that of its package, its module left out."""
-    package = kind.__module__.rpartition(".")[0].removeprefix(HIDDEN)
+    package = kind.__module__.rpartition(".")[0]
+    home, _, last = package.rpartition(".")
+    if home in SHOWN:
+        package = f"{SHOWN[home]}.{last}"
     return f"{package}.{kind.__name__}" if package else kind.__name__
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..typeinfo import FieldInfo, fields_of, type_name, types
+from ..typeinfo import FieldInfo, Structure, structure_of
 from . import table_of
 from .plan import Instant, Lists, Node, Numbers, Strings, Struct
 from .table import columns_of
@@ -41,16 +41,16 @@ def to_arrow(
     while flat and any(pyarrow.types.is_struct(field.type) for field in rows.type):
         rows = _flattened(pyarrow, rows)
     batch = pyarrow.RecordBatch.from_struct_array(rows)
-    metadata = described(type_name(kind))
+    metadata = described(structure_of(kind))
     return pyarrow.Table.from_batches([batch.replace_schema_metadata(metadata)])
 
 
-def described(name: str) -> dict[str, str]:
+def described(structure: Structure) -> dict[str, str]:
     """Return what the metadata of a schema says of the type."""
     return {
-        "ros2.type": name,
-        "ros2.hash": types()["hashes"][name],
-        "ros2.definition": definition_of(name),
+        "ros2.type": structure.name,
+        "ros2.hash": structure.hash,
+        "ros2.definition": definition_of(structure),
     }
 
 
@@ -141,36 +141,36 @@ class _Arrays:
         return pa.Array.from_buffers(type_, len(column), buffers, children=[inner])
 
 
-def definition_of(name: str) -> str:
+def definition_of(structure: Structure) -> str:
     """Return a type's definition and those it refers to, as recordings have them.
 
     MCAP calls this form ros2msg.
     """
-    needed = [name]
+    needed = [structure]
     for type_ in needed:
-        nested = (field.nested for field in fields_of(type_) if field.nested)
+        nested = (field.nested for field in type_.fields if field.nested)
         needed += [other for other in dict.fromkeys(nested) if other not in needed]
-    parts = [_message_text(name)]
+    parts = [_message_text(structure)]
     parts += [
-        f"{SEPARATOR}\nMSG: {_short_name(other)}\n{_message_text(other)}"
+        f"{SEPARATOR}\nMSG: {_short_name(other.name)}\n{_message_text(other)}"
         for other in needed[1:]
     ]
     return "".join(parts)
 
 
-def _message_text(name: str) -> str:
+def _message_text(structure: Structure) -> str:
     """Return a message file, or what its fields would be in one."""
-    source = types()["sources"].get(name)
-    if source is None or "/msg/" not in name:
+    source = structure.types.sources.get(structure.name)
+    if source is None or "/msg/" not in structure.name:
         source = "".join(
-            f"{_field_type(field)} {field.name}\n" for field in fields_of(name)
+            f"{_field_type(field)} {field.name}\n" for field in structure.fields
         )
     return source if source.endswith("\n") else f"{source}\n"
 
 
 def _field_type(field: FieldInfo) -> str:
     if field.nested:
-        element = _short_name(field.nested)
+        element = _short_name(field.nested.name)
     elif field.primitive:
         element = field.primitive.name
     else:

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 from itertools import count
 from typing import Any, NamedTuple
 
-from ..typeinfo import FieldInfo, fields_of, least_element, spelling_hint
+from ..typeinfo import FieldInfo, Structure, least_element, spelling_hint
 
 
 class Leaf(NamedTuple):
@@ -161,30 +161,31 @@ INSTANTS = {
 
 
 @lru_cache(maxsize=64)
-def plan_of(name: str, fields: tuple[str, ...] | None, datetimes: bool) -> Level:
+def plan_of(
+    structure: Structure, fields: tuple[str, ...] | None, datetimes: bool
+) -> Level:
     """Return the plan of a type; raise ValueError for a field that it does not have."""
-    wanted = None if fields is None else _selection(name, fields)
-    level = _Builder(count(), datetimes, aligned=8).structure_level(name, wanted)
+    wanted = None if fields is None else _selection(structure, fields)
+    level = _Builder(count(), datetimes, aligned=8).structure_level(structure, wanted)
     # what comes after the last column matters to nobody
     while fields is not None and level.steps and not is_wanted(level.steps[-1]):
         level.steps.pop()
     return level
 
 
-def _selection(name: str, fields: tuple[str, ...]) -> dict[str, Any]:
+def _selection(structure: Structure, fields: tuple[str, ...]) -> dict[str, Any]:
     """Return dotted names as a tree."""
     tree: dict[str, Any] = {}
     for field in fields:
-        type_ = name
+        inside: Structure | None = structure
         *outer, last = field.split(".")
         for step in (*outer, last):
-            nested = (
-                {info.name: info.nested for info in fields_of(type_)} if type_ else {}
-            )
+            fields_inside = () if inside is None else inside.fields
+            nested = {info.name: info.nested for info in fields_inside}
             if step not in nested:
                 hint = spelling_hint(step, list(nested))
-                raise ValueError(f"{name} has no field {field!r}{hint}")
-            type_ = nested[step]
+                raise ValueError(f"{structure.name} has no field {field!r}{hint}")
+            inside = nested[step]
         at: Any = tree
         for step in outer:
             at = {} if at is None else at.setdefault(step, {})
@@ -207,18 +208,17 @@ class _Builder:
         self.aligned = aligned
         self.at = 0
 
-    def structure_level(self, name: str, wanted: Wanted) -> Level:
+    def structure_level(self, structure: Structure, wanted: Wanted) -> Level:
         """Return the level of a structure."""
-        self.level.node = self.structure(name, wanted)
+        self.level.node = self.structure(structure, wanted)
         return self.level
 
-    def structure(self, name: str, wanted: Wanted) -> Struct:
+    def structure(self, structure: Structure, wanted: Wanted) -> Struct:
         """Plan a structure."""
-        fields = fields_of(name)
-        if not fields:
+        if not structure.fields:
             self.place(1, 1)
         nodes: dict[str, Node] = {}
-        for field in fields:
+        for field in structure.fields:
             inner = None if wanted is None else wanted.get(field.name, NOTHING)
             node = self.field(field, inner)
             if inner != NOTHING:
@@ -248,7 +248,7 @@ class _Builder:
         """Plan a single value."""
         if field.nested:
             struct = self.structure(field.nested, wanted)
-            code = INSTANTS.get(field.nested)
+            code = INSTANTS.get(field.nested.name)
             if code is None or not self.datetimes or wanted is not None:
                 return struct
             seconds, nanoseconds = struct.fields.values()

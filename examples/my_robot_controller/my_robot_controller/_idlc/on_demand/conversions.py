@@ -11,11 +11,10 @@ from ..names import slot_name
 from ..objects import owner_of
 from .typeinfo import (
     FieldInfo,
-    class_of,
-    fields_of,
+    Structure,
     inner_path,
     spelling_hint,
-    type_name,
+    structure_of,
     validate,
     validate_count,
     validate_element,
@@ -28,13 +27,13 @@ if TYPE_CHECKING:
 
 def to_dict(message: Any) -> dict[str, Any]:
     """Return a message's fields by their names on the wire."""
-    return _to_dict(message, type_name(type(message)))
+    return _to_dict(message, structure_of(type(message)))
 
 
-def _to_dict(message: Any, name: str) -> dict[str, Any]:
+def _to_dict(message: Any, structure: Structure) -> dict[str, Any]:
     return {
         field.name: _plain(getattr(message, field.slot), field)
-        for field in fields_of(name)
+        for field in structure.fields
     }
 
 
@@ -60,20 +59,23 @@ def _plain_element(value: Any, field: FieldInfo) -> Any:
 
 def from_dict(kind: type, values: dict[str, Any]) -> Any:
     """Return a message of class `kind` from a dictionary as `to_dict` makes it."""
-    message = _from_dict(kind, type_name(kind), values, "")
+    message = _from_dict(kind, structure_of(kind), values, "")
     validate(message)
     return message
 
 
-def _from_dict(kind: Any, name: str, values: Any, path: str) -> Any:
+def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
     if not isinstance(values, dict):
-        raise ValidationError(path or "values", f"a dictionary of {name}", values)
-    fields = {field.name: field for field in fields_of(name)}
+        raise ValidationError(
+            path or "values", f"a dictionary of {structure.name}", values
+        )
+    fields = {field.name: field for field in structure.fields}
     message = kind()
     for key, value in values.items():
         field = fields.get(key)
         if field is None:
-            problem = f"{name} has no such field{spelling_hint(str(key), list(fields))}"
+            hint = spelling_hint(str(key), list(fields))
+            problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
         place = inner_path(path, field.public)
         _set(message, field, _value(value, field, place), path)
@@ -102,7 +104,7 @@ def _value(value: Any, field: FieldInfo, path: str) -> Any:
 
 def _element(value: Any, field: FieldInfo, path: str) -> Any:
     if field.nested:
-        return _from_dict(class_of(field.nested), field.nested, value, path)
+        return _from_dict(field.nested.find_class(), field.nested, value, path)
     primitive = field.primitive
     if primitive is not None and primitive.code == "c" and isinstance(value, int):
         if not 0 <= value <= 255:
@@ -182,7 +184,7 @@ def message_schema(cls: Any, reference: Any, handler: Any) -> Any:
     """
     schema = handler.resolve_ref_schema(reference)
     if schema["type"] == "dataclass":
-        own = {field.public: field for field in fields_of(type_name(cls))}
+        own = {field.public: field for field in structure_of(cls).fields}
         for entry in schema["schema"].get("fields", ()):
             if entry["name"] in own:  # subclasses have more
                 _check(entry, own[entry["name"]])

@@ -39,6 +39,7 @@ from typing import Any, NamedTuple
 
 from ..cdr import HEADERS, NATIVE
 from ..codec import encode_error, functions
+from ..on_demand.typeinfo import Structure
 from . import c, callbacks, introspection
 from .callbacks import RefusedError
 from .introspection import about
@@ -425,13 +426,14 @@ def _identifier() -> int:
     return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
 
 
-def message(cls: Any, name: str) -> c.MessageSupport:
+def message(cls: Any, structure: Structure) -> c.MessageSupport:
     """Return what rclpy needs to publish and take messages of a class."""
+    name = structure.name
     package, kind, short = name.split("/")
     support = c.keep(c.MessageTypeSupport(_identifier()))
     answers = {
         IDENTIFIER.encode(): ctypes.addressof(support),
-        introspection.IDENTIFIER.encode(): introspection.handle(name, functional=False),
+        introspection.IDENTIFIER.encode(): introspection.handle(structure, False),
     }
     memory = _memory_type(name, cls)
     try:
@@ -451,7 +453,7 @@ def message(cls: Any, name: str) -> c.MessageSupport:
         )
     )
     support.func = functions["resolve"]
-    support.about = about(name)
+    support.about = about(structure)
     return c.MessageSupport(
         ctypes.addressof(support),
         functions["create"],

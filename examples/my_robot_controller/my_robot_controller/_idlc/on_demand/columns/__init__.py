@@ -14,7 +14,7 @@ import numpy as np
 
 from ...errors import DecodeError
 from ..batches import failed
-from ..typeinfo import check_buffer, type_name
+from ..typeinfo import Structure, check_buffer, structure_of
 from .plan import Level, plan_of
 from .scan import Cursors, ScanResult, UnreadableError, VectorScan, scan_uniform
 from .source import Flat, Pieces, Source
@@ -99,14 +99,14 @@ def table_of(
     kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
 ) -> tuple[Table, Elements]:
     """Return what is in messages, and the rows of the table; raise DecodeError."""
-    name = type_name(kind)
+    structure = structure_of(kind)
     wanted = (fields,) if isinstance(fields, str) else fields
-    plan = plan_of(name, None if wanted is None else tuple(wanted), datetimes)
+    plan = plan_of(structure, None if wanted is None else tuple(wanted), datetimes)
     all_of_them = messages_of(messages)
     try:
         return _read(plan, all_of_them)
     except UnreadableError:
-        explain(name, plan, all_of_them)
+        explain(structure, plan, all_of_them)
 
 
 def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
@@ -144,7 +144,7 @@ def big_endian(messages: Messages) -> Any:
     return second == 0
 
 
-def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
+def explain(structure: Structure, plan: Level, messages: Messages) -> NoReturn:
     """Raise DecodeError for the first message that is not of a type."""
     first, last = 0, len(messages.starts)
     while last - first > 1:  # the first one that cannot be read is in between
@@ -155,7 +155,7 @@ def explain(name: str, plan: Level, messages: Messages) -> NoReturn:
         except UnreadableError:
             last = middle
     try:
-        check_buffer(name, messages.raw(first))
+        check_buffer(structure, messages.raw(first))
     except DecodeError as error:
         failed(error, first)
     raise AssertionError(f"[{first}] can be read by itself")
