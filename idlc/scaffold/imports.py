@@ -6,12 +6,14 @@ import sys
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from idlc.project.templates import Code
+
 
 class Import(NamedTuple):
     """An import of a module, or of names from it; several are on a line each."""
 
-    module: str
-    names: tuple[str, ...] = ()
+    module: Code
+    names: tuple[Code, ...] = ()
 
 
 class ImportList:
@@ -39,12 +41,12 @@ class ImportList:
 
         `plain` modules are imported as they are.
         """
-        imports = [Import(module) for module in plain]
+        imports = [Import(Code(module)) for module in plain]
         for module, names in self._names.items():
             renamed = {name for name in names if " as " in name}
-            imports += [Import(module, (name,)) for name in renamed]
+            imports += [Import(Code(module), (Code(name),)) for name in renamed]
             ordered = sorted(names - renamed, key=lambda name: (name.lower(), name))
-            imports += [Import(module, tuple(ordered))] if ordered else []
+            imports += [Import(Code(module), tuple(map(Code, ordered)))] if ordered else []
         imports.sort(key=lambda entry: (entry.module.lower(), *map(str.lower, entry.names[:1])))
         library = sys.stdlib_module_names
         standard = tuple(entry for entry in imports if entry.module.partition(".")[0] in library)

@@ -34,7 +34,7 @@ from idlc.scaffold.changes import (
 )
 from idlc.scaffold.edits import launch_py, setup_py
 from idlc.scaffold.node import render, render_test, test_packages
-from idlc.scaffold.package import package_view, rendered
+from idlc.scaffold.package import rendered_for
 from idlc.scaffold.spec import Plan, plan
 from idlc.scaffold.templates import Templates
 
@@ -112,8 +112,7 @@ def with_launch_entry(
         outcome = launch_py.add_node(texts[path], started)
         return _launched(entry, path, outcome)
     path = _launch_file(node.package, ())
-    plain = package_view(node.package)
-    text = rendered("package/launch.py.jinja", plain, templates)
+    text = rendered_for(node.package, "package/launch.py.jinja", templates)
     outcome = launch_py.add_node(text, started)
     if not isinstance(outcome, Edited):
         return _launched(entry, path, outcome)._replace(added={**entry.added, path: text})
@@ -134,10 +133,9 @@ def _launched(entry: Entry, path: str, outcome: Outcome) -> Entry:
 
 def _support(package: str, texts: Mapping[str, str], templates: Templates) -> dict[str, str]:
     """Return the files that nodes need beside them and that their package lacks."""
-    plain = package_view(package)
     support = {}
     if CONFTEST not in texts:
-        support[CONFTEST] = rendered("package/conftest.py.jinja", plain, templates)
+        support[CONFTEST] = rendered_for(package, "package/conftest.py.jinja", templates)
     if f"{package}/__init__.py" not in texts:
         support[f"{package}/__init__.py"] = ""
     return support

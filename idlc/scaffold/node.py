@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from idlc.model import derive, ir
+from idlc.project.templates import Code
 from idlc.scaffold import roles, samples, spec
 from idlc.scaffold.imports import Import, ImportList
 from idlc.scaffold.samples import Page
@@ -50,24 +51,24 @@ class Part(NamedTuple):
     """
 
     template: str
-    word: str
-    title: str
-    name: str
-    type: str
-    period: str
-    qos: str
-    patience: float
+    word: Code
+    title: Code
+    name: Code
+    type: Code
+    period: Code
+    qos: Code
+    patience: Code
     sample: Mapping[str, samples.Sample]
-    log: Mapping[str, str]
+    log: Mapping[str, Code]
 
 
 class ParameterView(NamedTuple):
     """A parameter and its property: its names in ROS 2 and in Python, its type, its default."""
 
-    name: str
-    word: str
-    annotation: str
-    default: str
+    name: Code
+    word: Code
+    annotation: Code
+    default: Code
 
     @property
     def is_list(self) -> bool:
@@ -82,11 +83,11 @@ class RequestView(NamedTuple):
     sends it. `cancel` is the coroutine that cancels it, if there is one.
     """
 
-    title: str
-    function: str
-    type: str
-    method: str
-    cancel: str
+    title: Code
+    function: Code
+    type: Code
+    method: Code
+    cancel: Code
     sample: samples.Sample
     arguments: tuple[samples.Argument, ...]
 
@@ -98,11 +99,11 @@ class NodeView(NamedTuple):
     `until`, `retire`. A node that runs `once` only sends its requests.
     """
 
-    name: str
-    class_name: str
-    does: tuple[str, ...]
+    name: Code
+    class_name: Code
+    does: tuple[Code, ...]
     imports: tuple[tuple[Import, ...], ...]
-    constants: tuple[str, ...]
+    constants: tuple[Code, ...]
     parameters: tuple[ParameterView, ...]
     parts: tuple[Part, ...]
     requests: tuple[RequestView, ...]
@@ -126,13 +127,13 @@ def view(planned: Plan) -> NodeView:
     class_name = spec.class_name(node.name)
     class_name += "Node" if class_name in page.names or class_name in _TAKEN else ""
     does = (
-        f"{endpoint.role.summary} {part.title}"
+        Code(f"{endpoint.role.summary} {part.title}")
         for endpoint, part in zip(node.endpoints, parts, strict=True)
         if endpoint.role.summary
     )
     return NodeView(
-        name=node.name,
-        class_name=class_name,
+        name=Code(node.name),
+        class_name=Code(class_name),
         does=tuple(does),
         imports=_imports(planned, page),
         constants=_constants(node),
@@ -158,13 +159,13 @@ def _bare_part(placed: Placed, page: Page) -> Part:
     sections = _sections(placed)
     return Part(
         template=f"node/{endpoint.role.name}.py.jinja",
-        word=word,
-        title=endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word,
-        name=repr(endpoint.topic),
-        type=page.use(interface.name) if interface else "",
+        word=Code(word),
+        title=Code(endpoint.topic if len(endpoint.topic) <= LONGEST_TITLE else word),
+        name=Code(repr(endpoint.topic)),
+        type=Code(page.use(interface.name) if interface else ""),
         period=_interval(endpoint.period or 1.0),
-        qos=endpoint.qos.source,
-        patience=round(PATIENCE + 3 * (endpoint.period or 0.0), 1),
+        qos=Code(endpoint.qos.source),
+        patience=Code(repr(round(PATIENCE + 3 * (endpoint.period or 0.0), 1))),
         sample={},
         log={variable: samples.logged(section, variable) for variable, section in sections},
     )
@@ -176,25 +177,31 @@ def _sections(placed: Placed) -> tuple[tuple[str, ir.Message], ...]:
     return tuple(zip(_VARIABLES[placed.endpoint.role.kind], sections, strict=True))
 
 
-def _interval(seconds: float) -> str:
+def _interval(seconds: float) -> Code:
     """Return a period in seconds as source."""
     text = repr(round(seconds, 6))
-    return text if abs(float(text) - seconds) < seconds * 1e-9 else f"1.0 / {1.0 / seconds:.6g}"
+    exact = abs(float(text) - seconds) < seconds * 1e-9
+    return Code(text if exact else f"1.0 / {1.0 / seconds:.6g}")
 
 
 def _helpers(node: spec.Node) -> frozenset[str]:
     return frozenset().union(*(endpoint.role.helpers for endpoint in node.endpoints))
 
 
-def _constants(node: spec.Node) -> tuple[str, ...]:
+def _constants(node: spec.Node) -> tuple[Code, ...]:
     """Return the lines that define constants of qualities of service."""
-    return tuple(dict.fromkeys(filter(None, (each.qos.constant for each in node.endpoints))))
+    lines = (endpoint.qos.constant for endpoint in node.endpoints)
+    return tuple(map(Code, dict.fromkeys(filter(None, lines))))
 
 
 def _parameter(parameter: spec.Parameter) -> ParameterView:
     value = parameter.default
-    default = repr(list(value) if isinstance(value, tuple) else value)
-    return ParameterView(repr(parameter.name), parameter.word, parameter.annotation, default)
+    return ParameterView(
+        name=Code(repr(parameter.name)),
+        word=Code(parameter.word),
+        annotation=Code(parameter.annotation),
+        default=Code(repr(list(value) if isinstance(value, tuple) else value)),
+    )
 
 
 def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
@@ -205,11 +212,11 @@ def _requests(planned: Plan, page: Page) -> Iterator[RequestView]:
         prefix = "" if alone else f"{word}_"
         positional = planned.once and alone
         yield RequestView(
-            title=request.title,
-            function=f"{word}_request",
-            type=page.use(message.name),
-            method=request.method.format(word),
-            cancel=request.cancel.format(word),
+            title=Code(request.title),
+            function=Code(f"{word}_request"),
+            type=Code(page.use(message.name)),
+            method=Code(request.method.format(word)),
+            cancel=Code(request.cancel.format(word)),
             sample=samples.from_arguments(message, page, prefix),
             arguments=tuple(samples.arguments(message, page, prefix, positional=positional)),
         )
@@ -256,11 +263,11 @@ class TestView(NamedTuple):
     done its work with the first answer.
     """
 
-    node: str
-    module: str
+    node: Code
+    module: Code
     imports: tuple[tuple[Import, ...], ...]
-    constants: tuple[str, ...]
-    offered: tuple[str, ...]
+    constants: tuple[Code, ...]
+    offered: tuple[Code, ...]
     parameters: tuple[ParameterView, ...]
     parts: tuple[Part, ...]
     lifecycle: bool
@@ -279,11 +286,11 @@ def view_of_test(planned: Plan) -> TestView:
     parts, imports = _tested(planned)
     served = (endpoint for endpoint in node.endpoints if endpoint.role.kind and node.lifecycle)
     return TestView(
-        node=node.name,
-        module=f"{node.package}.{node.name}",
+        node=Code(node.name),
+        module=Code(f"{node.package}.{node.name}"),
         imports=imports.groups(("pytest", "signal")),
         constants=_constants(node),
-        offered=tuple(sorted({repr(_resolved(endpoint, node.name)) for endpoint in served})),
+        offered=tuple(map(Code, sorted({repr(_resolved(each, node.name)) for each in served}))),
         parameters=tuple(map(_parameter, node.parameters)),
         parts=parts,
         lifecycle=node.lifecycle,
@@ -314,7 +321,7 @@ def _tested(planned: Plan) -> tuple[tuple[Part, ...], ImportList]:
     page = Page(planned.messages, taken=_TAKEN_BY_TESTS)
     parts = tuple(
         _bare_part(placed, page)._replace(
-            name=repr(placed.endpoint.topic.replace("~", node.name)),
+            name=Code(repr(placed.endpoint.topic.replace("~", node.name))),
         )
         for placed in planned.endpoints
     )

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from idlc.model import ir, python_names
+from idlc.project.templates import Code, Text
 
 #: The width of comments, which may be indented far.
 COMMENT = 64
@@ -81,16 +82,16 @@ def _spoken(name: ir.TypeName) -> tuple[str, str]:
 class FieldSample(NamedTuple):
     """A field with a sensible value: source, or a message that is spelled out."""
 
-    name: str
-    comment: tuple[str, ...]
-    value: str
+    name: Code
+    comment: tuple[Text, ...]
+    value: Code
     message: Sample | None = None
 
 
 class Sample(NamedTuple):
     """A message whose fields have sensible values; `type` is its class in the module."""
 
-    type: str
+    type: Code
     fields: tuple[FieldSample, ...]
 
 
@@ -103,17 +104,17 @@ def sample(
     """
     fields = []
     for field in message.fields:
-        name = python_names.field(field.name)
+        name = Code(python_names.field(field.name))
         nested = _nested(field, page)
         if field.name in values:
-            fields.append(FieldSample(name, (), values[field.name]))
+            fields.append(FieldSample(name, (), Code(values[field.name])))
         elif nested:
             spelled_out = sample(nested, page)
-            fields.append(FieldSample(name, _comment(message, field, page), "", spelled_out))
+            fields.append(FieldSample(name, _comment(message, field, page), Code(), spelled_out))
         elif not _has_long_default(field):
-            value = field_value(message, field, page)
+            value = Code(field_value(message, field, page))
             fields.append(FieldSample(name, _comment(message, field, page), value))
-    return Sample(page.use(message.name), tuple(fields))
+    return Sample(Code(page.use(message.name)), tuple(fields))
 
 
 def _has_long_default(field: ir.Field) -> bool:
@@ -122,21 +123,21 @@ def _has_long_default(field: ir.Field) -> bool:
     return len(items) > LEAVES or any(len(str(item)) > LONG_TEXT for item in items)
 
 
-def logged(message: ir.Message, variable: str) -> str:
+def logged(message: ir.Message, variable: str) -> Code:
     """Return the replacement field of an f-string that shows a message, or a short field of it."""
     short = [f for f in message.fields if isinstance(f.type, (ir.Primitive, ir.String))]
     if short and (len(short) == 1 or len(short) < len(message.fields)):
-        return f"{{{variable}.{python_names.field(short[0].name)}=}}"
-    return f"{{{variable}=}}"
+        return Code(f"{{{variable}.{python_names.field(short[0].name)}=}}")
+    return Code(f"{{{variable}=}}")
 
 
-def _comment(message: ir.Message, field: ir.Field, page: Page) -> tuple[str, ...]:
+def _comment(message: ir.Message, field: ir.Field, page: Page) -> tuple[Text, ...]:
     """Return the lines of the interface's comment on a field, if the package is the node's."""
     if message.name.package != page.own:
         return ()
     text = " ".join(filter(None, (clean(line) for line in field.comment)))
     unit = f"[{clean(field.unit)}]" if field.unit else ""
-    return tuple(textwrap.wrap(" ".join(filter(None, (text, unit))), COMMENT))
+    return tuple(map(Text, textwrap.wrap(" ".join(filter(None, (text, unit))), COMMENT)))
 
 
 def clean(text: str) -> str:
@@ -229,8 +230,8 @@ HELP_WIDTH = 60
 class Argument(NamedTuple):
     """An argument of the command line: its name, and how argparse reads it."""
 
-    name: str
-    words: tuple[str, ...]
+    name: Code
+    words: tuple[Code, ...]
 
 
 def from_arguments(message: ir.Message, page: Page, prefix: str) -> Sample:
@@ -270,7 +271,7 @@ def _argument(
             words.append("nargs='?'")
     text = textwrap.shorten(_help(field), HELP_WIDTH, placeholder=" ...").replace("%", "%%")
     words += [f"default={field_value(message, field, page)}", f"help={text!r}"]
-    return Argument(repr(name), tuple(words))
+    return Argument(Code(repr(name)), tuple(map(Code, words)))
 
 
 def _help(field: ir.Field) -> str:
