@@ -232,6 +232,7 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
         imports.add_all(endpoint.role.imports)
         imports.add("rclpy.qos", *endpoint.qos.imports)
     imports.add("rclpy.executors", "SingleThreadedExecutor")
+    imports.add("rclpy.utilities", "ok")
     if waits:
         imports.add("rclpy.task", "Future")
     if planned.asking:
@@ -240,6 +241,7 @@ def _imports(planned: Plan, page: Page) -> tuple[tuple[Import, ...], ...]:
         plain += ["argparse", "sys", "time"]
     if planned.once:
         imports.add("rclpy.signals", "SignalHandlerOptions")
+        imports.add("rclpy.utilities", "try_shutdown")
         imports.add("threading", "Event")
         plain.append("signal")
     else:

@@ -27,7 +27,7 @@ HELPERS = """
 def terminated():
     import os, signal
     os.kill(os.getpid(), signal.SIGTERM)
-    while rclpy.ok():
+    while ok():
         pass
 
 

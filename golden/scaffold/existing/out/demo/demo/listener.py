@@ -8,6 +8,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 
@@ -39,13 +40,13 @@ def main(args: list[str] | None = None) -> None:
         executor = SingleThreadedExecutor()
         node = Listener()
         executor.add_node(node)
-        while rclpy.ok():
+        while ok():
             # not without end: rclpy can miss a signal that comes while it starts
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
-        if rclpy.ok():  # otherwise a signal shut rclpy down before the node was complete
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
             raise
 
 

@@ -23,7 +23,10 @@ from rclpy.lifecycle import (
     TransitionCallbackReturn,
 )
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import (
+    ok,
+    remove_ros_args,
+)
 from std_msgs.msg import Empty
 from std_srvs.srv import Empty as std_srvs_srv_Empty
 from std_srvs.srv import SetBool
@@ -245,13 +248,13 @@ def main(args: list[str] | None = None) -> None:
         executor = SingleThreadedExecutor()
         node = Keeper(options)
         executor.add_node(node)
-        while rclpy.ok():
+        while ok():
             # not without end: rclpy can miss a signal that comes while it starts
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
-        if rclpy.ok():  # otherwise a signal shut rclpy down before the node was complete
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
             raise
 
 

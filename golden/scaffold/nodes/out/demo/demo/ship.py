@@ -21,7 +21,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
+from rclpy.utilities import (
+    ok,
+    remove_ros_args,
+    try_shutdown,
+)
 
 
 class Ship(Node):
@@ -147,11 +151,11 @@ def main(args: list[str] | None = None) -> int:
             dock_request(options),
         ),
     ]
-    while rclpy.ok() and not interrupted.is_set() and not all(task.done() for task in tasks):
+    while ok() and not interrupted.is_set() and not all(task.done() for task in tasks):
         executor.spin_once(timeout_sec=0.1)
     if interrupted.is_set():
         executor.spin_until_future_complete(executor.create_task(node.cancel_dock_goal))
-    rclpy.try_shutdown()
+    try_shutdown()
     if interrupted.is_set():
         return 130
     return 0 if all(task.result() for task in tasks) else 1

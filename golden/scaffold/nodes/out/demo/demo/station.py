@@ -16,6 +16,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.utilities import ok
 
 
 class Station(Node):
@@ -99,13 +100,13 @@ def main(args: list[str] | None = None) -> None:
         executor = SingleThreadedExecutor()
         node = Station()
         executor.add_node(node)
-        while rclpy.ok():
+        while ok():
             # not without end: rclpy can miss a signal that comes while it starts
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
-        if rclpy.ok():  # otherwise a signal shut rclpy down before the node was complete
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
             raise
 
 

@@ -18,6 +18,7 @@ from rclpy.qos import (
     qos_profile_sensor_data,
     QoSProfile,
 )
+from rclpy.utilities import ok
 from std_msgs.msg import String
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -104,13 +105,13 @@ def main(args: list[str] | None = None) -> None:
         executor = SingleThreadedExecutor()
         node = Talker()
         executor.add_node(node)
-        while rclpy.ok():
+        while ok():
             # not without end: rclpy can miss a signal that comes while it starts
             executor.spin_once(timeout_sec=1.0)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except Exception:
-        if rclpy.ok():  # otherwise a signal shut rclpy down before the node was complete
+        if ok():  # otherwise a signal shut rclpy down before the node was complete
             raise
 
 
