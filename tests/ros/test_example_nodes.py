@@ -93,8 +93,13 @@ def test_a_task_is_executed(start):
     server = start("execute_task_server")
     client = start("execute_task_client", "--server-timeout", "30", "paint")
     assert client.ends() == 0
-    steps = [f"feedback.current_status='{step}: paint'" for step in ("starting", "working", "finishing")]
-    assert client.said() == [*(f"execute_task: {s}" for s in steps), "execute_task: result.success=True"]
+    steps = [
+        f"feedback.current_status='{step}: paint'" for step in ("starting", "working", "finishing")
+    ]
+    assert client.said() == [
+        *(f"execute_task: {s}" for s in steps),
+        "execute_task: result.success=True",
+    ]
     assert server.end() == 0
 
 

@@ -97,7 +97,7 @@ def test_a_node_that_shuts_rclpy_down_itself_ends(package, tmp_path, ros_environ
 
 @pytest.mark.parametrize("moment", [0.0, 0.05, 0.1, 0.15, 0.2, 0.3])
 def test_a_signal_while_it_starts_ends_it(moment, package, tmp_path, ros_environment):
-    """rclpy shuts down under a node that is half made, and can miss the signal in its first wait."""
+    """rclpy shuts down under a node that is half made, or misses the signal in its first wait."""
     text = (package / "demo/stays.py").read_text()
     begun = "rclpy.init(args=args)\n"
     assert begun in text

@@ -2,7 +2,6 @@
 
 import os
 import random
-import re
 import shutil
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from idlc.project.templates import verbatim
 from idlc.scaffold import templates
 from idlc.scaffold.roles import ROLES
 from tests.scaffold.test_command import FOLDER, carry_out, nothing_installed, tree
+
 SEED = int(os.environ.get("SEED", "7"))
 nothing_installed = nothing_installed  # a fixture of every test here, too
 TALKER = ["scaffold", "node", "talker", "--publisher", "std_msgs/String:chatter"]

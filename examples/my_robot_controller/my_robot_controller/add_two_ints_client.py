@@ -23,7 +23,8 @@ from rclpy.utilities import (
 
 
 class AddTwoIntsClient(Node):
-    """The node add_two_ints_client.
+    """
+    The node add_two_ints_client.
 
     It calls add_two_ints.
     """

@@ -13,7 +13,8 @@ from rclpy.utilities import ok
 
 
 class AddTwoIntsServer(Node):
-    """The node add_two_ints_server.
+    """
+    The node add_two_ints_server.
 
     It serves add_two_ints.
     """

@@ -13,7 +13,8 @@ from rclpy.utilities import ok
 
 
 class CommandPublisher(Node):
-    """The node command_publisher.
+    """
+    The node command_publisher.
 
     It publishes robot_command.
     """

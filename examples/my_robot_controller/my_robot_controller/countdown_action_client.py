@@ -29,7 +29,8 @@ from rclpy.utilities import (
 
 
 class CountdownActionClient(Node):
-    """The node countdown_action_client.
+    """
+    The node countdown_action_client.
 
     It sends goals to countdown.
     """

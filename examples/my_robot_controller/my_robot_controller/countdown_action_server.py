@@ -20,7 +20,8 @@ from rclpy.utilities import ok
 
 
 class CountdownActionServer(Node):
-    """The node countdown_action_server.
+    """
+    The node countdown_action_server.
 
     It works on goals for countdown.
     """

@@ -29,7 +29,8 @@ from rclpy.utilities import (
 
 
 class ExecuteTaskClient(Node):
-    """The node execute_task_client.
+    """
+    The node execute_task_client.
 
     It sends goals to execute_task.
     """

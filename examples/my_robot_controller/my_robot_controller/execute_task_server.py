@@ -20,7 +20,8 @@ from rclpy.utilities import ok
 
 
 class ExecuteTaskServer(Node):
-    """The node execute_task_server.
+    """
+    The node execute_task_server.
 
     It works on goals for execute_task.
     """

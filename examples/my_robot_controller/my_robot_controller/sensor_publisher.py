@@ -13,7 +13,8 @@ from std_msgs.msg import String
 
 
 class SensorPublisher(Node):
-    """The node sensor_publisher.
+    """
+    The node sensor_publisher.
 
     It publishes sensor_data.
     """

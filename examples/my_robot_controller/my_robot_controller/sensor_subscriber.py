@@ -13,7 +13,8 @@ from std_msgs.msg import String
 
 
 class SensorSubscriber(Node):
-    """The node sensor_subscriber.
+    """
+    The node sensor_subscriber.
 
     It listens to sensor_data.
     """

@@ -13,7 +13,8 @@ from std_msgs.msg import String
 
 
 class Listener(Node):
-    """The node listener.
+    """
+    The node listener.
 
     It listens to chatter.
     """

@@ -13,7 +13,8 @@ from std_msgs.msg import String
 
 
 class Talker(Node):
-    """The node talker.
+    """
+    The node talker.
 
     It publishes chatter.
     """

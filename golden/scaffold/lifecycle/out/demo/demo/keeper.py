@@ -33,7 +33,8 @@ from std_srvs.srv import SetBool
 
 
 class Keeper(LifecycleNode):
-    """The lifecycle node keeper.
+    """
+    The lifecycle node keeper.
 
     It publishes beat.
     It listens to beat.

@@ -23,7 +23,8 @@ from rclpy.utilities import (
 
 
 class Asker(Node):
-    """The node asker.
+    """
+    The node asker.
 
     It calls ask.
     """

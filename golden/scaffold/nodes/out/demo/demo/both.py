@@ -30,7 +30,8 @@ from rclpy.utilities import (
 
 
 class Both(Node):
-    """The node both.
+    """
+    The node both.
 
     It calls ask.
     It sends goals to dock.

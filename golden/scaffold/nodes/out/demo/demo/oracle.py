@@ -13,7 +13,8 @@ from rclpy.utilities import ok
 
 
 class Oracle(Node):
-    """The node oracle.
+    """
+    The node oracle.
 
     It serves ask.
     """

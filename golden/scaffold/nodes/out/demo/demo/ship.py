@@ -29,7 +29,8 @@ from rclpy.utilities import (
 
 
 class Ship(Node):
-    """The node ship.
+    """
+    The node ship.
 
     It sends goals to dock.
     """

@@ -20,7 +20,8 @@ from rclpy.utilities import ok
 
 
 class Station(Node):
-    """The node station.
+    """
+    The node station.
 
     It works on goals for dock.
     """

@@ -25,7 +25,8 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Talker(Node):
-    """The node talker.
+    """
+    The node talker.
 
     It publishes command.
     It listens to ~/words.
