@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
-    from .hints import Join
+    from .conversions import Join
 
     #: A function that decodes bytes.
     Text: TypeAlias = Callable[[Any], str]

@@ -543,17 +543,3 @@ class Action(metaclass=ActionMeta):
 
     if not TYPE_CHECKING:
         Impl = OnDemand(_impl)
-
-
-__all__ = [
-    "Action",
-    "Imported",
-    "InterfaceMeta",
-    "Message",
-    "MessageMeta",
-    "Package",
-    "Service",
-    "complete",
-    "dataclass",
-    "table",
-]
