@@ -42,7 +42,7 @@ def to_ndarray(dtype: Any, size: int, values: Any, name: str) -> Any:
         return converted(dtype, size, values)
     except (TypeError, ValueError, OverflowError) as error:
         failure = error
-    from .typeinfo import refused
+    from .checked import refused
 
     raise refused(name, dtype.name, size, values, failure) from None
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, TypedDict, get_type_hints
 from typing import Any as Any
 from typing import TypeAlias as TypeAlias
 
+from .checked import validate, validate_count, validate_element
 from .errors import ValidationError
 from .names import slot_name
 from .objects import owner_of
@@ -21,9 +22,6 @@ from .typeinfo import (
     inner_path,
     spelling_hint,
     structure_of,
-    validate,
-    validate_count,
-    validate_element,
 )
 
 if TYPE_CHECKING:

@@ -281,7 +281,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .typeinfo import validate
+        from .checked import validate
 
         validate(self)
 

@@ -57,7 +57,7 @@ def to_array(code: str, values: Any, name: str) -> Any:
         return converted(code, values)
     except (TypeError, ValueError, OverflowError) as error:
         failure = error
-    from .typeinfo import refused
+    from .checked import refused
 
     raise refused(name, code, None, values, failure) from None
 
