@@ -29,9 +29,12 @@ from ctypes import (
     c_char,
     c_char_p,
     c_int,
+    c_int32,
+    c_int64,
     c_size_t,
     c_ssize_t,
     c_uint8,
+    c_uint32,
     c_uint64,
     c_void_p,
     py_object,
@@ -165,6 +168,18 @@ class ActionTypeSupport(ctypes.Structure):
         ("feedback_message", c_void_p),
         ("status_message", c_void_p),
         ("about", About),
+    )
+
+
+class EventInfo(ctypes.Structure):
+    """`rosidl_service_introspection_info_t`."""
+
+    _fields_ = (
+        ("event_type", c_uint8),
+        ("sec", c_int32),
+        ("nanosec", c_uint32),
+        ("client_gid", c_uint8 * 16),
+        ("sequence_number", c_int64),
     )
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
-    from .hints import Join
+    from .conversions import Join
 
     #: A function that decodes bytes.
     Text: TypeAlias = Callable[[Any], str]
@@ -210,7 +210,7 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .typeinfo import validate
+    from .checked import validate
 
     try:
         validate(message, wire_only=True)

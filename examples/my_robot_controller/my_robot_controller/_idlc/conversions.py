@@ -1,11 +1,18 @@
-"""Messages as dictionaries, as dataclasses, and as pydantic checks and writes them."""
+"""Messages as dictionaries, as dataclasses, and as pydantic checks and writes them.
+
+Also the names that only annotations use: whoever evaluates these comes here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable as Callable
+from collections.abc import Iterable as Iterable
 from functools import cache
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, TypedDict, get_type_hints
+from typing import Any as Any
+from typing import TypeAlias as TypeAlias
 
+from .checked import validate, validate_count, validate_element
 from .errors import ValidationError
 from .names import slot_name
 from .objects import owner_of
@@ -15,14 +22,37 @@ from .typeinfo import (
     inner_path,
     spelling_hint,
     structure_of,
-    validate,
-    validate_count,
-    validate_element,
 )
 
 if TYPE_CHECKING:
     import dataclasses
     from collections.abc import Iterator
+
+    from typing_extensions import Unpack as Unpack
+else:
+    try:
+        from typing import Unpack
+    except ImportError:  # Python 3.10
+
+        class Unpack:
+            """Stands for what is said of keyword arguments."""
+
+            def __class_getitem__(cls, options):
+                return options
+
+
+#: What numeric sequences take.
+Integers: TypeAlias = Iterable[int]
+Floats: TypeAlias = Iterable[float]
+#: The function that receives a message's parts.
+Join: TypeAlias = Callable[[list[Any]], Any]
+
+
+class Options(TypedDict, total=False):
+    """The keywords of every constructor besides the fields."""
+
+    #: Raise AssertionError when a wrong value is assigned, as rosidl's classes do.
+    check_fields: bool
 
 
 def to_dict(message: Any) -> dict[str, Any]:

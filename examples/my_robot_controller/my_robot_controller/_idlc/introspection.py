@@ -32,71 +32,29 @@ from struct import unpack_from
 from typing import Any, NamedTuple
 
 from . import c
-from .typeinfo import Structure
+from .typeinfo import ARRAY, BOUNDED_SEQUENCE, SCALAR, FieldInfo, Structure
 
 IDENTIFIER = "rosidl_typesupport_introspection_c"
 
 NESTED = 1
-SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
-
-
-class Field(NamedTuple):
-    """A field as described; `capacity` is an array's size or a sequence's bound."""
-
-    name: str
-    type_id: int
-    capacity: int
-    string_capacity: int
-    nested_type_name: str
-    default_value: str
-    nested: Structure | None
-
-    @property
-    def base(self) -> int:
-        """The type id of one element."""
-        return self.type_id % 48
-
-    @property
-    def shape(self) -> int:
-        """SCALAR, ARRAY, BOUNDED_SEQUENCE or SEQUENCE."""
-        return self.type_id // 48
-
-
-@cache
-def fields_of(structure: Structure) -> tuple[Field, ...]:
-    """Return a type's members, the dummy one included."""
-    fields = []
-    for member in structure.members:
-        name = member["type"]["nested_type_name"]
-        nested = structure.types[name] if name else None
-        default = member["default_value"]
-        field = Field(
-            member["name"], **member["type"], default_value=default, nested=nested
-        )
-        fields.append(field)
-    return tuple(fields)
 
 
 @cache
 def references(structure: Structure) -> frozenset[Structure]:
     """Return all types that a type refers to, directly or not, itself excluded."""
-    direct = {field.nested for field in fields_of(structure) if field.nested}
+    direct = {field.nested for field in structure.members if field.nested}
     return frozenset(direct.union(*map(references, direct)))
 
 
-def _field(field: Field) -> c.Field:
-    kind = c.FieldType(
-        field.type_id,
-        field.capacity,
-        field.string_capacity,
-        c.string(field.nested_type_name),
-    )
-    return c.Field(c.string(field.name), kind, c.string(field.default_value))
+def _field(field: FieldInfo) -> c.Field:
+    nested = c.string(field.nested.name if field.nested else "")
+    kind = c.FieldType(field.type_id, field.capacity, field.text_bound or 0, nested)
+    return c.Field(c.string(field.name), kind, c.string(field.default))
 
 
 @cache
 def _individual(structure: Structure) -> c.IndividualDescription:
-    fields = [_field(field) for field in fields_of(structure)]
+    fields = [_field(field) for field in structure.members]
     name = c.string(structure.name)
     return c.IndividualDescription(name, c.sequence(fields, c.Field))
 
@@ -386,22 +344,22 @@ _MESSAGE = 18
 @cache
 def c_structure(structure: Structure) -> type[ctypes.Structure]:
     """Return the C structure that rosidl's C generator would make for a message."""
-    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(fields_of(structure))]
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(structure.members)]
     name = structure.name.replace("/", "__")
     return type(name, (ctypes.Structure,), {"_fields_": fields})
 
 
-def introspection_id(field: Field) -> int:
+def introspection_id(field: FieldInfo) -> int:
     """Return how introspection calls the type of a field's elements."""
     return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
 
 
-def element_type(field: Field) -> Any:
+def element_type(field: FieldInfo) -> Any:
     """Return the C type of one element of a field."""
     return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
 
 
-def _c_type(field: Field) -> Any:
+def _c_type(field: FieldInfo) -> Any:
     if field.shape == SCALAR:
         return element_type(field)
     if field.shape == ARRAY:
@@ -409,18 +367,18 @@ def _c_type(field: Field) -> Any:
     return _sequence_type(field)
 
 
-def _sequence_type(field: Field) -> Any:
+def _sequence_type(field: FieldInfo) -> Any:
     if field.base == NESTED:
         return c.Sequence
     size = abi().strings if element_type(field) is c.String else abi().sequence
     return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
 
 
-def placed_fields(structure: Structure) -> list[tuple[Field, int]]:
+def placed_fields(structure: Structure) -> list[tuple[FieldInfo, int]]:
     """Return a message's fields and where each begins in the C structure."""
     kind = c_structure(structure)
     offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
-    return list(zip(fields_of(structure), offsets, strict=True))
+    return list(zip(structure.members, offsets, strict=True))
 
 
 # members
@@ -493,12 +451,12 @@ def library() -> Library:
     )
 
 
-def _member(field: Field, offset: int, functional: bool) -> Any:
+def _member(field: FieldInfo, offset: int, functional: bool) -> Any:
     """Return the member that describes a field to the middleware."""
     member = _member_type()(
         name=field.name.encode(),
         type_id=introspection_id(field),
-        string_upper_bound=field.string_capacity,
+        string_upper_bound=field.text_bound or 0,
         is_array=field.shape != SCALAR,
         array_size=field.capacity,
         is_upper_bound=field.shape == BOUNDED_SEQUENCE,
@@ -648,7 +606,7 @@ def content(structure: Structure) -> int:
     return _table(*entries) if entries else 0
 
 
-def element_content(field: Field) -> int:
+def element_content(field: FieldInfo) -> int:
     """Return the table of one element of a field, 0 if there is nothing to free in it."""
     if field.nested:
         return content(field.nested)

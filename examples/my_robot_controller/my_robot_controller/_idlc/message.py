@@ -281,7 +281,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .typeinfo import validate
+        from .checked import validate
 
         validate(self)
 
@@ -543,17 +543,3 @@ class Action(metaclass=ActionMeta):
 
     if not TYPE_CHECKING:
         Impl = OnDemand(_impl)
-
-
-__all__ = [
-    "Action",
-    "Imported",
-    "InterfaceMeta",
-    "Message",
-    "MessageMeta",
-    "Package",
-    "Service",
-    "complete",
-    "dataclass",
-    "table",
-]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from array import array
 
 from .names import slot_name
@@ -16,11 +15,8 @@ if TYPE_CHECKING:
 ATOMIC = frozenset({bool, bytes, float, int, str})
 #: Elements up to which Python compares two arrays of numbers before numpy has begun.
 SMALL = 64
-#: Elements of large arrays that are compared at once.
-PIECE = 1 << 16
 #: Packages that are shown under other names than they are imported by.
 SHOWN: dict[str, str] = {}
-_memcmp_function: Any = None
 #: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
 _of_numpy: set[type] = set()
 
@@ -41,7 +37,8 @@ def same(mine: Any, other: Any) -> bool:
             if mine.typecode in "fd":  # no nan is equal to another
                 return memoryview(mine) == memoryview(other)
             if len(mine) > SMALL:
-                return len(mine) == len(other) and _same_memory(mine, other)
+                # only `bytes` and `bytearray` compare memory at once
+                return len(mine) == len(other) and bytearray(mine) == memoryview(other)
     elif kind in _of_numpy and type(other) is kind and len(mine) <= SMALL:
         return bool(mine.data == other)
     elif kind.__module__ == "numpy" or type(other).__module__ == "numpy":
@@ -50,40 +47,6 @@ def same(mine: Any, other: Any) -> bool:
         _of_numpy.add(np.ndarray)
         return np.array_equal(mine, other)
     return bool(mine == other)
-
-
-def _same_memory(mine: array[Any], other: array[Any]) -> bool:
-    """Return whether two arrays of one size and kind hold the same bytes."""
-    if len(mine) <= PIECE:  # only `bytes` and `bytearray` compare memory at once
-        return bytearray(mine) == memoryview(other)
-    with (
-        memoryview(mine) as left,
-        memoryview(other) as right,
-    ):  # no thread moves them now
-        compare = _memcmp()
-        if compare is None:  # a copy of a piece stays in a cache
-            pieces = range(0, len(left), PIECE)
-            return all(
-                bytearray(left[at : at + PIECE]) == right[at : at + PIECE]
-                for at in pieces
-            )
-        (left_address, _), (right_address, _) = mine.buffer_info(), other.buffer_info()
-        return bool(compare(left_address, right_address, left.nbytes) == 0)
-
-
-def _memcmp() -> Any:
-    """Return the function of C, if ctypes has been loaded, as it is with numpy and rclpy."""
-    global _memcmp_function
-    if _memcmp_function is None and "ctypes" in sys.modules:
-        import ctypes
-
-        try:
-            function = ctypes.pythonapi["memcmp"]
-        except AttributeError:  # Windows
-            return None
-        function.argtypes = (ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
-        _memcmp_function = function  # not before: another thread may be waiting for it
-    return _memcmp_function
 
 
 def copied(message: Any) -> Any:

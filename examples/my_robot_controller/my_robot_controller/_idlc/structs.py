@@ -25,15 +25,12 @@ from .c import RefusedError
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, functions
 from .introspection import (
-    ARRAY,
-    SCALAR,
-    Field,
     allocator,
     c_structure,
     element_type,
     placed_fields,
 )
-from .typeinfo import Structure
+from .typeinfo import ARRAY, SCALAR, FieldInfo, Structure
 
 _HEADER = 4
 _COUNT = Struct("=I")
@@ -221,7 +218,7 @@ def allocate(sequence: int, count: int, stride: int) -> int:
     return int(data)
 
 
-def _element_steps(field: Field) -> list[Step]:
+def _element_steps(field: FieldInfo) -> list[Step]:
     """Return the steps of one element that begins at 0."""
     if field.nested:
         return list(steps(field.nested))
@@ -238,7 +235,7 @@ def _moved(step: Step, offset: int) -> Step:
     return Repeat([step], offset, 1, 1)
 
 
-def _field_steps(field: Field, offset: int) -> list[Step]:
+def _field_steps(field: FieldInfo, offset: int) -> list[Step]:
     elements = _element_steps(field)
     stride = ctypes.sizeof(element_type(field))
     if field.shape == SCALAR:
