@@ -17,8 +17,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from .cdr import NATIVE, order_of
-from .errors import DecodeError, importing
-from .names import public_name, slot_name, wire_name
+from .names import DecodeError, importing, public_name, slot_name, wire_name
 
 
 class Primitive(NamedTuple):

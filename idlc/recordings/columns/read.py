@@ -18,8 +18,7 @@ from idlc.recordings.columns.scan import (
 )
 from idlc.recordings.columns.source import Flat, Pieces, Source
 from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
-from idlc.runtime.errors import DecodeError
-from idlc.runtime.objects import owner_of
+from idlc.runtime.names import DecodeError, owner_of
 from idlc.runtime.typeinfo import check_buffer, structure_of
 
 #: From this mean size on, messages are not copied into one array.
