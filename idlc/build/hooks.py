@@ -108,14 +108,14 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 
 def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
     """Compile the package in the working folder into a wheel."""
-    from idlc.build.content import compiled
+    from idlc.build.content import compile_package
 
     declared, options = _declared(report), _options(settings, report)
     if declared is None or report.had_errors:
         return None
     name, project = declared
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-        content = compiled(name, Path(folder) / "classes" / name, options, report)
+        content = compile_package(name, Path(folder) / "classes" / name, options, report)
         if content is None:
             return None
         return _packed(name, project, content, Path(folder) / "prefix", directory, report)
@@ -124,7 +124,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     """Return the package's name and its `[project]` table; `None` after a problem."""
     from idlc.build import manifest
-    from idlc.build.manifest import completed
+    from idlc.build.manifest import complete_table
 
     load_settings(Root.here(), report)  # which reports what is no TOML
     if not Path(MANIFEST).is_file():
@@ -134,7 +134,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     if report.had_errors:
         return None
     declared = manifest.project(report)
-    project = completed(declared, report) if declared else {}
+    project = complete_table(declared, report) if declared else {}
     return None if report.had_errors else (declared["name"], project)
 
 

@@ -136,6 +136,12 @@ def test_the_core_does_no_io(module):
             assert node.func.id not in IO_CALLS, f"line {node.lineno}: calls {node.func.id}"
 
 
+def test_records_are_structs_or_named_tuples():
+    """The runtime knows dataclasses, because the generated classes are some."""
+    names = [name for name in MODULES if room(name) != "runtime"]
+    assert [name for name in names for each in imports(name) if each.module == "dataclasses"] == []
+
+
 def prints(node: ast.AST) -> bool:
     match node:
         case ast.Call(func=ast.Name(id="print")):
