@@ -24,7 +24,7 @@ from .names import (
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-    from dataclasses import Field, dataclass
+    from dataclasses import Field
     from typing import Any, ClassVar, Literal
 
     import typing_extensions

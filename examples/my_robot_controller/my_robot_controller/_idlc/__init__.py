@@ -10,10 +10,9 @@ from array import array as array
 # what generated code is written with
 from .cdr import *  # noqa: F403
 from .codec import *  # noqa: F403
-from .errors import *  # noqa: F403
 from .message import *  # noqa: F403
-from .names import lazily as lazily
-from .objects import same as same
+from .names import *  # noqa: F403
+from .names import lazily
 from .sequences import *  # noqa: F403
 
 #: What generated code expects of the runtime. Each runtime serves all code of its number.

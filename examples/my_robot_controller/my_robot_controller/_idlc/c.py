@@ -58,138 +58,72 @@ def keep(value: T) -> T:
     return value
 
 
-class String(ctypes.Structure):
-    """`rosidl_runtime_c__String` and its twin in type descriptions; `size` without the NUL."""
-
-    _fields_ = (("data", c_char_p), ("size", c_size_t), ("capacity", c_size_t))
-
-
-class Sequence(ctypes.Structure):
-    """Any `X__Sequence`; `data` points to `size` elements."""
-
-    _fields_ = (("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t))
+def structure(name: str, pointers: str = "", /, **fields: Any) -> Any:
+    """Return a C structure of some pointers, by their names, and of fields that follow them."""
+    types = dict.fromkeys(pointers.split(), c_void_p) | fields
+    return type(name, (ctypes.Structure,), {"_fields_": tuple(types.items())})
 
 
-class FlaggedSequence(ctypes.Structure):
-    """A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before."""
+_SIZES = {"size": c_size_t, "capacity": c_size_t}
+#: `rosidl_runtime_c__String` and its twin in type descriptions; `size` without the NUL.
+String = structure("String", data=c_char_p, **_SIZES)
+#: Any `X__Sequence`; `data` points to `size` elements.
+Sequence = structure("Sequence", "data", **_SIZES)
+#: A sequence of numbers or strings since ROS 2 Lyrical; flags of zero mean as before.
+FlaggedSequence = structure("FlaggedSequence", "data", **_SIZES, flags=c_uint64)
 
-    _fields_ = (*Sequence._fields_, ("flags", c_uint64))
+# `rosidl_runtime_c__type_description__FieldType`, and so on
+FieldType = structure(
+    "FieldType",
+    type_id=c_uint8,
+    capacity=c_uint64,
+    string_capacity=c_uint64,
+    nested_type_name=String,
+)
+Field = structure("Field", name=String, type=FieldType, default_value=String)
+IndividualDescription = structure("Individual", type_name=String, fields=Sequence)
+Description = structure(
+    "Description", type_description=IndividualDescription, referenced=Sequence
+)
+Source = structure(
+    "Source", type_name=String, encoding=String, raw_file_contents=String
+)
 
+#: `rosidl_type_hash_t`; version 1 is RIHS01.
+TypeHash = structure("TypeHash", version=c_uint8, value=c_uint8 * 32)
+#: The three functions by which rcl asks for hash, description and sources: never NULL.
+About = structure("About", "type_hash description sources")
 
-class FieldType(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__FieldType`."""
-
-    _fields_ = (
-        ("type_id", c_uint8),
-        ("capacity", c_uint64),
-        ("string_capacity", c_uint64),
-        ("nested_type_name", String),
-    )
-
-
-class Field(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__Field`."""
-
-    _fields_ = (("name", String), ("type", FieldType), ("default_value", String))
-
-
-class IndividualDescription(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__IndividualTypeDescription`."""
-
-    _fields_ = (("type_name", String), ("fields", Sequence))
-
-
-class Description(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__TypeDescription`."""
-
-    _fields_ = (("type_description", IndividualDescription), ("referenced", Sequence))
-
-
-class Source(ctypes.Structure):
-    """`rosidl_runtime_c__type_description__TypeSource`."""
-
-    _fields_ = (
-        ("type_name", String),
-        ("encoding", String),
-        ("raw_file_contents", String),
-    )
-
-
-class TypeHash(ctypes.Structure):
-    """`rosidl_type_hash_t`; version 1 is RIHS01."""
-
-    _fields_ = (("version", c_uint8), ("value", c_uint8 * 32))
-
-
-class About(ctypes.Structure):
-    """The three functions by which rcl asks for hash, description and sources: never NULL."""
-
-    _fields_ = (
-        ("type_hash", c_void_p),
-        ("description", c_void_p),
-        ("sources", c_void_p),
-    )
+# `rosidl_message_type_support_t`, and so on
+MessageTypeSupport = structure("Message", "identifier data func", about=About)
+ServiceTypeSupport = structure(
+    "Service",
+    "identifier data func request response event event_create event_destroy",
+    about=About,
+)
+ActionTypeSupport = structure(
+    "Action",
+    "goal_service result_service cancel_service feedback_message status_message",
+    about=About,
+)
+#: `rosidl_service_introspection_info_t`.
+EventInfo = structure(
+    "EventInfo",
+    event_type=c_uint8,
+    sec=c_int32,
+    nanosec=c_uint32,
+    client_gid=c_uint8 * 16,
+    sequence_number=c_int64,
+)
 
 
-class MessageTypeSupport(ctypes.Structure):
-    """`rosidl_message_type_support_t`."""
-
-    _fields_ = (
-        ("identifier", c_void_p),
-        ("data", c_void_p),
-        ("func", c_void_p),
-        ("about", About),
-    )
-
-
-class ServiceTypeSupport(ctypes.Structure):
-    """`rosidl_service_type_support_t`."""
-
-    _fields_ = (
-        ("identifier", c_void_p),
-        ("data", c_void_p),
-        ("func", c_void_p),
-        ("request", c_void_p),
-        ("response", c_void_p),
-        ("event", c_void_p),
-        ("event_create", c_void_p),
-        ("event_destroy", c_void_p),
-        ("about", About),
-    )
-
-
-class ActionTypeSupport(ctypes.Structure):
-    """`rosidl_action_type_support_t`."""
-
-    _fields_ = (
-        ("goal_service", c_void_p),
-        ("result_service", c_void_p),
-        ("cancel_service", c_void_p),
-        ("feedback_message", c_void_p),
-        ("status_message", c_void_p),
-        ("about", About),
-    )
-
-
-class EventInfo(ctypes.Structure):
-    """`rosidl_service_introspection_info_t`."""
-
-    _fields_ = (
-        ("event_type", c_uint8),
-        ("sec", c_int32),
-        ("nanosec", c_uint32),
-        ("client_gid", c_uint8 * 16),
-        ("sequence_number", c_int64),
-    )
-
-
-def string(text: str) -> String:
+def string(text: str) -> Any:
     """Return `text` as a C string with a size; its bytes live as long as the structure."""
     data = text.encode()
     return String(data, len(data), len(data) + 1)
 
 
-def sequence(items: list[Any], element: type[ctypes.Structure]) -> Sequence:
+def sequence(items: list[Any], element: Any) -> Any:
     """Return a sequence of copies of `items`, kept for ever."""
     array = keep((element * len(items))(*items))
     return Sequence(ctypes.addressof(array), len(items), len(items))

@@ -15,7 +15,7 @@ from array import array
 from struct import Struct, calcsize
 from sys import byteorder
 
-from .errors import DecodeError
+from .names import DecodeError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

@@ -15,14 +15,14 @@ from collections.abc import Set as AbstractSet
 from functools import cache
 from typing import Any
 
-from .errors import (
+from .names import (
     FieldCheckError,
     FieldNameError,
     FieldRangeError,
     FieldTypeError,
     ValidationError,
+    owner_of,
 )
-from .objects import owner_of
 from .typeinfo import (
     ARRAY,
     PRIMITIVES,

@@ -10,8 +10,7 @@ import struct
 from os import environ
 
 from .cdr import NATIVE, order_of
-from .errors import DecodeError, ValidationError
-from .objects import owner_of
+from .names import DecodeError, ValidationError, owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

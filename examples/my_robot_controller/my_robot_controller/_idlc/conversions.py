@@ -13,9 +13,7 @@ from typing import Any as Any
 from typing import TypeAlias as TypeAlias
 
 from .checked import validate, validate_count, validate_element
-from .errors import ValidationError
-from .names import slot_name
-from .objects import owner_of
+from .names import ValidationError, owner_of, slot_name
 from .typeinfo import (
     FieldInfo,
     Structure,

@@ -307,15 +307,56 @@ def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
     return c.taking(name, taken)
 
 
-def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
-    """Return the addresses of the functions by name; `answers` is what one of them gives."""
-    return {
-        "serialize": _serializer(),
-        "deserialize": _deserializer(),
-        "serialized_size": _size(),
-        "maximum_size": _unbounded(),
-        "resolve": c.resolver(answers),
+@cache
+def _python_functions() -> dict[str, int]:
+    """Return the addresses of functions in Python that Fast DDS calls."""
+    position, end = fast_cdr()
+    everything, characters, words = c.MEMORY, c.CHARACTERS, c.WORDS
+
+    def serialize(memory: Any, cdr: int) -> bool:
+        try:
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                everything[start:stop] = memory.body
+                words[here + position] = stop
+                return True
+        except BaseException:  # noqa: S110
+            pass
+        return False
+
+    def deserialize(cdr: int, memory: Any) -> bool:
+        try:
+            here = cdr >> 3
+            memory.received = characters[
+                words[here + position] - _HEADER : words[here + end]
+            ]
+            return True
+        except BaseException:
+            return False
+
+    def size(memory: Any) -> int:
+        try:
+            return memory.size  # type: ignore[no-any-return]
+        except BaseException:
+            return 0
+
+    def maximum(bounds_info: Any) -> int:
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            bounds_info[0] = b"\0"
+        except BaseException:  # noqa: S110
+            pass
+        return 0
+
+    bounds = ctypes.POINTER(c_char)
+    functions: dict[str, tuple[Any, Callable[..., object]]] = {
+        "serialize": (PYFUNCTYPE(c_bool, py_object, c_void_p), serialize),
+        "deserialize": (PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize),
+        "serialized_size": (PYFUNCTYPE(c_size_t, py_object), size),
+        "maximum_size": (PYFUNCTYPE(c_size_t, bounds), maximum),
     }
+    return {name: c.callback(*function) for name, function in functions.items()}
 
 
 def _plain_memory_type(base: type) -> type:
@@ -331,93 +372,27 @@ def _plain_memory_type(base: type) -> type:
     return type("Memory", (base,), {"__slots__": ("size",), "__rmatmul__": store_plain})
 
 
-@cache
-def _serializer() -> int:
-    position, end = fast_cdr()
-    everything, words = c.MEMORY, c.WORDS
-
-    def serialize(memory: Any, cdr: int) -> bool:
-        try:
-            here = cdr >> 3
-            start = words[here + position]
-            stop = start + memory.size
-            if stop <= words[here + end]:
-                everything[start:stop] = memory.body
-                words[here + position] = stop
-                return True
-        except BaseException:  # noqa: S110
-            pass
-        return False
-
-    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
-
-
-@cache
-def _deserializer() -> int:
-    position, end = fast_cdr()
-    characters, words = c.CHARACTERS, c.WORDS
-
-    def deserialize(cdr: int, memory: Any) -> bool:
-        try:
-            here = cdr >> 3
-            memory.received = characters[
-                words[here + position] - _HEADER : words[here + end]
-            ]
-            return True
-        except BaseException:
-            return False
-
-    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
-
-
-@cache
-def _size() -> int:
-    def size(memory: Any) -> int:
-        try:
-            return memory.size  # type: ignore[no-any-return]
-        except BaseException:
-            return 0
-
-    return c.callback(PYFUNCTYPE(c_size_t, py_object), size)
-
-
-@cache
-def _unbounded() -> int:
-    def maximum(bounds_info: Any) -> int:
-        try:  # noqa: SIM105 (a context manager would be called outside of it)
-            bounds_info[0] = b"\0"
-        except BaseException:  # noqa: S110
-            pass
-        return 0
-
-    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
-
-
-class _Callbacks(ctypes.Structure):
-    """`message_type_support_callbacks_t`."""
-
-    _fields_ = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("cdr_serialize", c_void_p),
-        ("cdr_deserialize", c_void_p),
-        ("get_serialized_size", c_void_p),
-        ("max_serialized_size", c_void_p),
-        ("key_callbacks", c_void_p),
-        # what later versions read: three words so far, zero for "none of it"
-        ("later", c_void_p * 9),
-    )
-
-
-class _ServiceCallbacks(ctypes.Structure):
-    """`service_type_support_callbacks_t`."""
-
-    _fields_ = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("request", c_void_p),
-        ("response", c_void_p),
-    )
+#: `message_type_support_callbacks_t`.
+_Callbacks = c.structure(
+    "Callbacks",
+    namespace=c_char_p,
+    name=c_char_p,
+    cdr_serialize=c_void_p,
+    cdr_deserialize=c_void_p,
+    get_serialized_size=c_void_p,
+    max_serialized_size=c_void_p,
+    key_callbacks=c_void_p,
+    # what later versions read: three words so far, zero for "none of it"
+    later=c_void_p * 9,
+)
+#: `service_type_support_callbacks_t`.
+_ServiceCallbacks = c.structure(
+    "ServiceCallbacks",
+    namespace=c_char_p,
+    name=c_char_p,
+    request=c_void_p,
+    response=c_void_p,
+)
 
 
 @cache
@@ -440,8 +415,9 @@ def message(cls: Any, structure: Structure) -> c.MessageSupport:
         functions = _native(answers, memory)
     except RefusedError:
         memory = _plain_memory_type(_memory_type(name, cls, apart=False))
-        functions = _python_functions(answers)
-        functions["create"] = c.address(PYFUNCTYPE(py_object)(memory))
+        create = c.address(PYFUNCTYPE(py_object)(memory))
+        resolve = c.resolver(answers)
+        functions = {**_python_functions(), "create": create, "resolve": resolve}
     support.data = c.pointer(
         _Callbacks(
             f"{package}::{kind}".encode(),

@@ -1,18 +1,5 @@
 """Types as ROS 2 asks about them: hash, description, source text, members, C structures.
 
-The facts are JSON in a package's `_type_data.py`, read only when rclpy asks for type support:
-
-    {"package": "pkg",
-     "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
-     "hashes": {"pkg/msg/Name": "RIHS01_…"},
-     "sources": {"pkg/msg/Name": "text of the interface file"}}
-
-`descriptions` and `hashes` hold every structure of the package, derived ones and the
-pseudo-structures of services and actions included, and all that these refer to;
-`sources` holds the files among them. A type id is a base plus 48 for a fixed array, 96
-for a bounded, 144 for an unbounded sequence (rosidl's
-`type_description_interfaces/msg/FieldType`).
-
 Introspection members are field names, types and C offsets, as a middleware walks them. Both
 kinds of type support need them. Fast DDS describes types to its peers from them and never
 looks at the memory; introspection-based middlewares read and write the memory that they
@@ -46,14 +33,14 @@ def references(structure: Structure) -> frozenset[Structure]:
     return frozenset(direct.union(*map(references, direct)))
 
 
-def _field(field: FieldInfo) -> c.Field:
+def _field(field: FieldInfo) -> Any:
     nested = c.string(field.nested.name if field.nested else "")
     kind = c.FieldType(field.type_id, field.capacity, field.text_bound or 0, nested)
     return c.Field(c.string(field.name), kind, c.string(field.default))
 
 
 @cache
-def _individual(structure: Structure) -> c.IndividualDescription:
+def _individual(structure: Structure) -> Any:
     fields = [_field(field) for field in structure.members]
     name = c.string(structure.name)
     return c.IndividualDescription(name, c.sequence(fields, c.Field))
@@ -70,7 +57,7 @@ def _installed_text(name: str) -> str | None:
     return None
 
 
-def _source(structure: Structure) -> c.Source:
+def _source(structure: Structure) -> Any:
     """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
     name, sources = structure.name, structure.types.sources
     text = sources.get(name) if structure.is_own else _installed_text(name)
@@ -78,13 +65,13 @@ def _source(structure: Structure) -> c.Source:
     return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
 
 
-def _type_hash(structure: Structure) -> c.TypeHash:
+def _type_hash(structure: Structure) -> Any:
     digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
     return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
 
 
 @cache
-def about(structure: Structure) -> c.About:
+def about(structure: Structure) -> Any:
     """Return functions that never fail and never return NULL, as rcl demands."""
     others = sorted(references(structure), key=lambda other: other.name)
     individuals = c.sequence(list(map(_individual, others)), c.IndividualDescription)
@@ -387,43 +374,42 @@ def placed_fields(structure: Structure) -> list[tuple[FieldInfo, int]]:
 @cache
 def _member_type() -> Any:
     """Return `rosidl_typesupport_introspection_c__MessageMember` of this ROS 2."""
-    layout = abi()
-    fields = (
-        ("name", c_char_p),
-        ("type_id", c_uint8),
-        ("string_upper_bound", c_size_t),
-        ("members", c_void_p),
-        ("flags", c_uint8 * (layout.is_array - 32)),  # whether it is a key
-        ("is_array", c_bool),
-        ("array_size", c_size_t),
-        ("is_upper_bound", c_bool),
-        ("offset", c_uint32),
-        ("default_value", c_void_p),
-        ("size_function", c_void_p),
-        ("get_const_function", c_void_p),
-        ("get_function", c_void_p),
-        ("fetch_function", c_void_p),
-        ("assign_function", c_void_p),
-        ("resize_function", c_void_p),
-        ("later", c_uint8 * (layout.member - 112)),  # whether it is a buffer
+    return c.structure(
+        "MessageMember",
+        name=c_char_p,
+        type_id=c_uint8,
+        string_upper_bound=c_size_t,
+        members=c_void_p,
+        flags=c_uint8 * (abi().is_array - 32),  # whether it is a key
+        is_array=c_bool,
+        array_size=c_size_t,
+        is_upper_bound=c_bool,
+        offset=c_uint32,
+        default_value=c_void_p,
+        size_function=c_void_p,
+        get_const_function=c_void_p,
+        get_function=c_void_p,
+        fetch_function=c_void_p,
+        assign_function=c_void_p,
+        resize_function=c_void_p,
+        later=c_uint8 * (abi().member - 112),  # whether it is a buffer
     )
-    return type("MessageMember", (ctypes.Structure,), {"_fields_": fields})
 
 
 @cache
 def _members_type() -> Any:
     """Return `rosidl_typesupport_introspection_c__MessageMembers` of this ROS 2."""
-    fields = (
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("count", c_uint32),
-        ("size_of", c_size_t),
-        ("flags", c_uint8 * (abi().members - 32)),  # whether there is a key
-        ("members", c_void_p),
-        ("init_function", c_void_p),
-        ("fini_function", c_void_p),
+    return c.structure(
+        "MessageMembers",
+        namespace=c_char_p,
+        name=c_char_p,
+        count=c_uint32,
+        size_of=c_size_t,
+        flags=c_uint8 * (abi().members - 32),  # whether there is a key
+        members=c_void_p,
+        init_function=c_void_p,
+        fini_function=c_void_p,
     )
-    return type("MessageMembers", (ctypes.Structure,), {"_fields_": fields})
 
 
 class Library(NamedTuple):
@@ -468,11 +454,11 @@ def _member(field: FieldInfo, offset: int, functional: bool) -> Any:
         size = ctypes.sizeof(element_type(field))
         functions = elements(size, element_content(field))
         if field.shape == ARRAY:
-            member.get_function = functions.in_array
+            member.get_function = functions["in_array"]
         else:
-            member.size_function = functions.length
-            member.get_function = functions.in_sequence
-            member.resize_function = functions.resize
+            member.size_function = functions["length"]
+            member.get_function = functions["in_sequence"]
+            member.resize_function = functions["resize"]
         member.get_const_function = member.get_function
     return member
 
@@ -482,7 +468,7 @@ def members(structure: Structure, functional: bool) -> Any:
     placed = placed_fields(structure)
     table = [_member(field, offset, functional) for field, offset in placed]
     size = ctypes.sizeof(c_structure(structure))
-    finish = elements(size, content(structure)).finish if functional else None
+    finish = elements(size, content(structure))["finish"] if functional else None
     package, kind, short = structure.name.split("/")
     return c.keep(
         _members_type()(
@@ -514,72 +500,40 @@ def handle(structure: Structure, functional: bool) -> int:
 # message memory
 
 
-class MemoryFunctions(NamedTuple):
-    """Addresses of functions that know one type of message, and its sequences and arrays.
-
-    `convert_from_py` and `convert_to_py` are the only ones that need Python: they call
-    `converter[address] = message` and `converter[address]`.
-    """
-
-    create: int
-    destroy: int
-    convert_from_py: int
-    convert_to_py: int
-    finish: int
-    resize: int
-    length: int
-    in_sequence: int
-    in_array: int
-
-
 @cache
-def elements(size: int, content: int) -> MemoryFunctions:
+def elements(size: int, content: int) -> dict[str, int]:
     """Return functions for all elements of a size and with a content to free."""
     return memory_functions(size, content, None)
 
 
-def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
-    """Return new functions; they live as long as the process."""
-    allocate, deallocate = allocator()
-    addresses = c.machine_code(
-        "structs",
-        {
-            "allocate": allocate,
-            "deallocate": deallocate,
-            "set_item": c.c_function("PySequence_SetItem"),
-            "get_item": c.c_function("PySequence_GetItem"),
-            "converter": id(c.keep(converter)),
-            "plan": content or _table(),
-            "sequence": _table((0, 0, size, content)),
-            "size": size,
-        },
-    )
-    return MemoryFunctions(*(addresses[name] for name in MemoryFunctions._fields))
+def memory_functions(size: int, content: int, converter: object) -> dict[str, int]:
+    """Return addresses of new functions, which live as long as the process, by their names.
 
-
-class _Allocator(ctypes.Structure):
-    """`rcutils_allocator_t`."""
-
-    _fields_ = tuple(
-        (name, c_void_p)
-        for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")
-    )
-
-
-class Allocator(NamedTuple):
-    """Addresses of the functions that give zeroed memory, and take memory back."""
-
-    zeroed: int
-    free: int
+    They know one type of message, and its sequences and arrays. `convert_from_py` and
+    `convert_to_py` are the only ones that need Python: they call `converter[address] = message`
+    and `converter[address]`.
+    """
+    words = {
+        "allocate": allocator().zero_allocate,
+        "deallocate": allocator().deallocate,
+        "set_item": c.c_function("PySequence_SetItem"),
+        "get_item": c.c_function("PySequence_GetItem"),
+        "converter": id(c.keep(converter)),
+        "plan": content or _table(),
+        "sequence": _table((0, 0, size, content)),
+        "size": size,
+    }
+    return c.machine_code("structs", words)
 
 
 @cache
-def allocator() -> Allocator:
-    """Return the allocator that all of rosidl uses."""
+def allocator() -> Any:
+    """Return the allocator (`rcutils_allocator_t`) that all of rosidl uses."""
     default = c.load_library("librcutils.so").rcutils_get_default_allocator
-    default.restype = _Allocator
-    functions = default()
-    return Allocator(functions.zero_allocate, functions.deallocate)
+    default.restype = c.structure(
+        "Allocator", "allocate deallocate reallocate zero_allocate state"
+    )
+    return default()
 
 
 # A table of words says what must be freed in a structure: how many entries, and for

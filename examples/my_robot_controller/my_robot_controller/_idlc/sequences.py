@@ -9,8 +9,7 @@ from __future__ import annotations
 from array import array
 
 from .cdr import NATIVE, single_bytes
-from .errors import FieldTypeError
-from .names import name_of
+from .names import FieldTypeError, name_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
