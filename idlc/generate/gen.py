@@ -27,11 +27,11 @@ from idlc.project import inputs, lock, settings
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
-from idlc.project.lock import load_lock
+from idlc.project.lock import Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.find import is_recording, split_recordings
+from idlc.recordings.find import split_recordings
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class GenOptions(NamedTuple):
     out: str = ""
     topics: tuple[str, ...] = ()
     check: bool = False
-    vendor_deps: bool = False
+    vendoring: Vendoring = ""
     force: bool = False
     ament: str = ""
     again: str = "idlc gen"
@@ -61,7 +61,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
-        vendor_deps=options.vendor_deps or settings.vendor_deps,
+        vendoring=options.vendoring or settings.vendoring,
     )
 
 
@@ -89,7 +89,9 @@ def in_package(options: GenOptions) -> GenOptions:
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
     runs = [options._replace(ament="")] if options.out else []
-    runs += [options] if options.ament else []  # the package may be named by OUT
+    if options.ament:  # last, because the package may be named by OUT
+        # all that is in a prefix is beside each other
+        runs.append(options._replace(vendoring="beside" if options.vendoring else ""))
     done: list[Generated] = []
     for run in runs:
         if not report.had_errors:
@@ -124,7 +126,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
-    with folders[0].exclusive(beside=options.vendor_deps or len(folders) > 1):
+    with folders[0].exclusive(beside=options.vendoring == "beside" or len(folders) > 1):
         done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.generate.prefix import write_setup_scripts
@@ -203,7 +205,7 @@ def _compile_and_write(
     refusable = _may_be_refused(requested.values(), library.distro)
     if not (options.check or report.had_errors or refusable):
         current = [
-            up_to_date(target, package.digests, library, options.vendor_deps)
+            up_to_date(target, package.digests, library, options.vendoring)
             for target, package in requested.items()
         ]
         if all(current):
@@ -217,7 +219,7 @@ def _compile_and_write(
     packages = []
     if not report.had_errors:
         packages = planned(
-            models, requested, compiler, check=options.check, vendor_deps=options.vendor_deps
+            models, requested, compiler, check=options.check, vendoring=options.vendoring
         )
     if options.check:
         for package in packages:
@@ -260,11 +262,8 @@ class Run(NamedTuple):
     def make(self, report: Report) -> tuple[Generated, ...]:
         """Write, and return the packages; empty after an error. Raises OSError."""
         root = Root.at(self.folder)
-        paths = tuple(
-            root.path(word) if is_recording(word, root) else word for word in self.options.paths
-        )
         scope = msgspec.structs.replace(self.options.scope, root=root)
-        return gen(self.options._replace(paths=paths, scope=scope), report)
+        return gen(self.options._replace(scope=scope), report)
 
 
 def run_for(path: Path, package: str) -> Run | None:
@@ -295,5 +294,5 @@ def _by_lock(path: Path, package: str) -> Run | None:
         if lock is not None and lock.package == package:
             settings = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), settings, name, vendor_deps=lock.vendor_deps))
+            return Run(home, GenOptions((".",), settings, name, vendoring=lock.vendoring))
     return None

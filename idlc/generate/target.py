@@ -21,7 +21,17 @@ from idlc.project.files import is_file, is_folder
 from idlc.project.find import KINDS, Exclusions, InterfaceFile, find
 from idlc.project.inputs import accept_name, by_home, output_folders, separate_homes
 from idlc.project.library import Library
-from idlc.project.lock import FILE, Lock, Obstacle, Tree, digest, encode, load_lock, meaning
+from idlc.project.lock import (
+    FILE,
+    Lock,
+    Obstacle,
+    Tree,
+    Vendoring,
+    digest,
+    encode,
+    load_lock,
+    meaning,
+)
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Scope
@@ -214,8 +224,7 @@ def unchanged(
     package: str,
     inputs: Mapping[str, str],
     library: Library,
-    *,
-    vendor_deps: bool = False,
+    vendoring: Vendoring = "",
 ) -> bool:
     """Return whether a run would leave the package in `out` unchanged.
 
@@ -223,7 +232,8 @@ def unchanged(
     """
     return (
         lock is not None
-        and (lock.idlc, lock.package, lock.vendor_deps) == (__version__, package, vendor_deps)
+        and (lock.idlc, lock.package) == (__version__, package)
+        and lock.vendors_as(vendoring)
         and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
@@ -336,12 +346,10 @@ class Target:
         return False
 
     def unchanged(
-        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return whether compiling the inputs would change nothing."""
-        is_unchanged = unchanged(
-            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
-        )
+        is_unchanged = unchanged(self._path, self.lock, self.package, inputs, library, vendoring)
         if is_unchanged:
             write.sweep(self._path)
         return is_unchanged
@@ -438,6 +446,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
+    if (old.vendor_deps, bool(old.vendored)) != (new.vendor_deps, bool(new.vendored)):
+        reasons.append("`--vendor-deps` was another")
     for before, after in pairs:
         reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
         reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]

@@ -11,7 +11,7 @@ import re
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
@@ -116,6 +116,11 @@ class _Header(msgspec.Struct):
     idlc: str
 
 
+#: The place of the types of other packages that are used: in the generated package, as whole
+#: packages beside it, or where they are installed.
+Vendoring: TypeAlias = Literal["private", "beside", ""]
+
+
 class Lock(msgspec.Struct, frozen=True, kw_only=True):
     """The record of one generated package.
 
@@ -137,6 +142,19 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     dependencies: dict[str, str]
     types: dict[str, str]
     outputs: dict[str, str]
+
+    @property
+    def vendoring(self) -> Vendoring:
+        """The place of other packages' types."""
+        if not self.vendor_deps:
+            return ""
+        return "beside" if self.vendored else "private"
+
+    def vendors_as(self, vendoring: Vendoring) -> bool:
+        """Return whether a run that vendors in this way would write the same files."""
+        if self.vendor_deps and not self.dependencies:  # the places differ for nothing
+            return bool(vendoring)
+        return self.vendoring == vendoring
 
 
 def digest(data: bytes) -> str:

@@ -104,6 +104,19 @@ SHOWN: dict[str, str] = {}
 _of_numpy: set[type] = set()
 
 
+def equal(message: Any, other: Any) -> bool:
+    """Compare a message with what is not of its class: a copy of it has the same fields."""
+    if hasattr(type(type(other)), "_message"):
+        from .typeinfo import is_copy
+
+        if is_copy(type(message), type(other)):
+            slots: list[str] = owner_of(type(message)).__slots__
+            return all(
+                same(getattr(message, slot), getattr(other, slot)) for slot in slots
+            )
+    return NotImplemented  # type: ignore[no-any-return]
+
+
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     kind = type(mine)
@@ -454,7 +467,11 @@ class Message(metaclass=MessageMeta):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         # the two oldest protocols of pickle do not know slots; theirs can say what later ones do
-        return super().__reduce_ex__(max(protocol, 2))
+        reduction = super().__reduce_ex__(max(protocol, 2))
+        from .typeinfo import structure_of
+
+        vendor = structure_of(type(self)).vendor
+        return vendor.reduced(self, reduction) if vendor else reduction
 
 
 if codec.CHECK_FIELDS:

@@ -32,6 +32,7 @@ from .typeinfo import (
     Structure,
     counted,
     inner_path,
+    is_copy,
     spelling_hint,
     structure_of,
 )
@@ -377,7 +378,8 @@ def _refusal(value: Any, field: FieldInfo) -> str:
 
 def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
     if field.nested:
-        right = isinstance(value, field.nested.find_class())
+        kind = field.nested.find_class()
+        right = isinstance(value, kind) or is_copy(type(value), kind)
         return "" if right else f"a {field.nested.name}"
     if field.text:
         types: Any = str if listed else (str, UserString)

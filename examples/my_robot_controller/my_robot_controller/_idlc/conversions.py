@@ -5,12 +5,9 @@ Also the names that only annotations use: whoever evaluates these comes here.
 
 from __future__ import annotations
 
-from collections.abc import Callable as Callable
-from collections.abc import Iterable as Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
-from typing import TYPE_CHECKING, TypedDict, get_type_hints
-from typing import Any as Any
-from typing import TypeAlias as TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
 from .checked import validate, validate_count, validate_element
 from .names import ValidationError, owner_of, slot_name
@@ -25,8 +22,6 @@ from .typeinfo import (
 if TYPE_CHECKING:
     import dataclasses
     from collections.abc import Iterator
-
-    from typing_extensions import Unpack as Unpack
 else:
     try:
         from typing import Unpack

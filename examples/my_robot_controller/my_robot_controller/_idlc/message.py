@@ -24,7 +24,7 @@ from .names import (
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-    from dataclasses import Field, dataclass
+    from dataclasses import Field
     from typing import Any, ClassVar, Literal
 
     import typing_extensions
@@ -102,6 +102,19 @@ SMALL = 64
 SHOWN: dict[str, str] = {}
 #: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
 _of_numpy: set[type] = set()
+
+
+def equal(message: Any, other: Any) -> bool:
+    """Compare a message with what is not of its class: a copy of it has the same fields."""
+    if hasattr(type(type(other)), "_message"):
+        from .typeinfo import is_copy
+
+        if is_copy(type(message), type(other)):
+            slots: list[str] = owner_of(type(message)).__slots__
+            return all(
+                same(getattr(message, slot), getattr(other, slot)) for slot in slots
+            )
+    return NotImplemented  # type: ignore[no-any-return]
 
 
 def same(mine: Any, other: Any) -> bool:
@@ -454,7 +467,11 @@ class Message(metaclass=MessageMeta):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         # the two oldest protocols of pickle do not know slots; theirs can say what later ones do
-        return super().__reduce_ex__(max(protocol, 2))
+        reduction = super().__reduce_ex__(max(protocol, 2))
+        from .typeinfo import structure_of
+
+        vendor = structure_of(type(self)).vendor
+        return vendor.reduced(self, reduction) if vendor else reduction
 
 
 if codec.CHECK_FIELDS:
