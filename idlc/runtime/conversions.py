@@ -11,27 +11,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
 from .checked import validate, validate_count, validate_element
 from .names import ValidationError, owner_of, slot_name
-from .typeinfo import (
-    FieldInfo,
-    Structure,
-    inner_path,
-    spelling_hint,
-    structure_of,
-)
+from .typeinfo import FieldInfo, Structure, inner_path, spelling_hint, structure_of
 
 if TYPE_CHECKING:
     import dataclasses
     from collections.abc import Iterator
 else:
-    try:
-        from typing import Unpack
-    except ImportError:  # Python 3.10
+    import typing
 
-        class Unpack:
-            """Stands for what is said of keyword arguments."""
-
-            def __class_getitem__(cls, options):
-                return options
+    # Python 3.10 has none, and anything that takes an index will do
+    Unpack = getattr(typing, "Unpack", typing.Optional)
 
 
 #: What numeric sequences take.
@@ -140,8 +129,8 @@ def _element(value: Any, field: FieldInfo, path: str) -> Any:
 
 
 @cache
-def dataclass_params() -> Any:
-    """Return the `__dataclass_params__` of all messages."""
+def dataclass_params(_kind: Any) -> Any:
+    """Return the `__dataclass_params__` of a class, which are those of all."""
     import dataclasses
 
     model: Any = dataclasses.make_dataclass("Message", [], slots=True)

@@ -48,36 +48,17 @@ class OnDemand:
     An error in that is an AttributeError, as code that looks at all attributes of a class expects.
     """
 
-    def __init__(self, make: Callable[[type], Any]) -> None:
-        self._make = make
+    def __init__(self, module: str, function: str) -> None:
+        self._module = f"{__package__}.{module}"
+        self._function = function
 
     def __get__(self, instance: object, owner: type) -> Any:
-        """Return the value."""
+        """Return what a function of the runtime makes for a class."""
         try:
-            return self._make(owner)
+            module = __import__(self._module, fromlist=[self._function])
+            return getattr(module, self._function)(owner)
         except Exception as error:
             raise AttributeError(str(error)) from error
-
-
-def slot_types(kind: type) -> tuple[Any, ...]:
-    """Return SLOT_TYPES of a message class."""
-    from . import typeinfo
-
-    return typeinfo.slot_types(kind)
-
-
-def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    """Return `__dataclass_fields__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_fields(kind)
-
-
-def dataclass_params(_kind: type) -> Any:
-    """Return `__dataclass_params__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_params()
 
 
 def _columns() -> Any:
@@ -315,10 +296,10 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
-        _codec_ = OnDemand(codec.codecs_of)
-        SLOT_TYPES = OnDemand(slot_types)
-        __dataclass_fields__ = OnDemand(dataclass_fields)
-        __dataclass_params__ = OnDemand(dataclass_params)
+        _codec_ = OnDemand("codec", "codecs_of")
+        SLOT_TYPES = OnDemand("typeinfo", "slot_types")
+        __dataclass_fields__ = OnDemand("conversions", "dataclass_fields")
+        __dataclass_params__ = OnDemand("conversions", "dataclass_params")
 
     @property
     def _check_fields(self) -> bool:
@@ -670,11 +651,11 @@ class Service(metaclass=ServiceMeta):
     """The base of services: `Request`, `Response` and `Event` are their messages."""
 
     if not TYPE_CHECKING:
-        Event = OnDemand(_event)
+        Event = OnDemand("message", "_event")
 
 
 class Action(metaclass=ActionMeta):
     """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
 
     if not TYPE_CHECKING:
-        Impl = OnDemand(_impl)
+        Impl = OnDemand("message", "_impl")

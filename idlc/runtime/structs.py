@@ -24,12 +24,7 @@ from . import c, introspection
 from .c import RefusedError
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, functions
-from .introspection import (
-    allocator,
-    c_structure,
-    element_type,
-    placed_fields,
-)
+from .introspection import allocator, c_structure, element_type, placed_fields
 from .typeinfo import ARRAY, SCALAR, FieldInfo, Structure
 
 _HEADER = 4
@@ -319,4 +314,4 @@ def service(name: str, *handles: int) -> tuple[int, int]:
         for handle in handles
     ]
     data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
-    return introspection.library().identifier, c.pointer(data)
+    return introspection.library()[0], c.pointer(data)
