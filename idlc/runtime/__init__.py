@@ -23,8 +23,6 @@ PROTOCOL = 1
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable as Iterable
-    from dataclasses import dataclass as dataclass
-    from typing import Any as Any
     from typing import TypeAlias as TypeAlias
 
     from typing_extensions import Unpack as Unpack
@@ -34,7 +32,7 @@ if TYPE_CHECKING:
     from .conversions import Join as Join
     from .conversions import Options as Options
 else:
-    _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
+    _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     __getattr__, __dir__ = lazily(
         __name__, dict.fromkeys(_HINTS.split(), "conversions")
     )

@@ -318,7 +318,9 @@ def _property(slot: Any, field: FieldInfo) -> property:
     store = slot.__set__
 
     def setter(message: Any, value: Any) -> None:
-        _check(value, field)
+        allowed = _refusal(value, field)
+        if allowed:
+            raise FieldCheckError(field.public, allowed, value)
         if field.is_list and field.is_numeric:
             value = _numbers(value, field)
         store(message, value)
@@ -336,12 +338,6 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
     if isinstance(value, np.ndarray):
         return value
     return np.array(value, field.primitive.name)
-
-
-def _check(value: Any, field: FieldInfo) -> None:
-    allowed = _refusal(value, field)
-    if allowed:
-        raise FieldCheckError(field.public, allowed, value)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:

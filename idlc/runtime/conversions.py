@@ -89,16 +89,12 @@ def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
             hint = spelling_hint(str(key), list(fields))
             problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
-        place = inner_path(path, field.public)
-        _set(message, field, _value(value, field, place), path)
+        made = _value(value, field, inner_path(path, field.public))
+        try:
+            setattr(message, field.public, made)
+        except ValidationError as error:
+            raise error.at(inner_path(path, error.path), ValidationError) from None
     return message
-
-
-def _set(message: Any, field: FieldInfo, value: Any, path: str) -> None:
-    try:
-        setattr(message, field.public, value)
-    except ValidationError as error:
-        raise error.at(inner_path(path, error.path), ValidationError) from None
 
 
 def _value(value: Any, field: FieldInfo, path: str) -> Any:

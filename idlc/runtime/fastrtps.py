@@ -105,10 +105,6 @@ def _load() -> tuple[ctypes.CDLL, _Names]:
     raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
 
 
-def _words_of(cdr: int) -> list[int]:
-    return c.WORDS[cdr >> 3 : (cdr >> 3) + _WORDS].tolist()
-
-
 def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
     """Return the only index of the three pairs, else None."""
     pattern = [word for position in positions for word in (begin, position)]
@@ -145,7 +141,8 @@ def fast_cdr() -> FastCdr:
     for text in (b"\1\2\3", b"\4\5"):
         append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
         position = position_of(here)
-        indices.add(_find(_words_of(here), begin, (position, begin, begin + size)))
+        words = c.WORDS[here >> 3 : (here >> 3) + _WORDS].tolist()
+        indices.add(_find(words, begin, (position, begin, begin + size)))
     index = indices.pop()
     if (
         indices

@@ -247,16 +247,11 @@ def _follows(step: Run, last: Run) -> bool:
     )
 
 
-def whole(structure: Structure) -> Step:
-    """Return the step that moves a whole message."""
-    return Repeat(list(steps(structure)), 0, 1, 1)
-
-
 def _converter(cls: Any, structure: Structure) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
-    message_step = whole(structure)
+    message_step = Repeat(list(steps(structure)), 0, 1, 1)
 
     def store(address: int, message: Any) -> None:
         try:

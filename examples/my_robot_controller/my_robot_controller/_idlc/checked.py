@@ -50,18 +50,8 @@ def validate(message: Any, *, wire_only: bool = False) -> None:
 
 def validate_field(value: Any, field: FieldInfo) -> None:
     """Raise ValidationError if a field, which is named by its path, cannot hold a value."""
-    check = _list if field.is_list else _element
+    check = _list if field.is_list else validate_element
     check(value, field, field.public, wire_only=True)
-
-
-def validate_element(value: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field, or a list in it, cannot hold a value."""
-    _element(value, field, field.public, wire_only=False)
-
-
-def validate_count(values: Any, field: FieldInfo) -> None:
-    """Raise ValidationError if a field cannot hold so many values."""
-    _count(values, field, field.public)
 
 
 def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> None:
@@ -73,20 +63,22 @@ def _message(message: Any, structure: Structure, path: str, wire_only: bool) -> 
         if field.is_list:
             _list(value, field, place, wire_only)
         else:
-            _element(value, field, place, wire_only)
+            validate_element(value, field, place, wire_only)
 
 
 def _list(values: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
     if isinstance(values, (str, dict)) or not hasattr(values, "__len__"):
         raise ValidationError(path, "a sequence", values)
-    _count(values, field, path)
+    validate_count(values, field, path)
     if field.primitive is not None and _holds(values, field.primitive):
         return
     for index, value in enumerate(values):
-        _element(value, field, f"{path}[{index}]", wire_only)
+        validate_element(value, field, f"{path}[{index}]", wire_only)
 
 
-def _count(values: Any, field: FieldInfo, path: str) -> None:
+def validate_count(values: Any, field: FieldInfo, path: str = "") -> None:
+    """Raise ValidationError if a field, by default named as it is, cannot hold so many values."""
+    path = path or field.public
     if field.size is not None and len(values) != field.size:
         problem = f"has {counted(len(values), 'element')}, needs {field.size}"
         raise ValidationError(path, f"{field.size} elements", values, problem)
@@ -104,7 +96,11 @@ def _holds(values: Any, primitive: Primitive) -> bool:
     return dtype is not None and dtype.name == primitive.name and values.ndim == 1
 
 
-def _element(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
+def validate_element(
+    value: Any, field: FieldInfo, path: str = "", wire_only: bool = False
+) -> None:
+    """Raise ValidationError if a field, or a list in it, cannot hold a value."""
+    path = path or field.public
     if field.nested:
         _message(value, field.nested, path, wire_only)
     elif field.text:
@@ -322,7 +318,9 @@ def _property(slot: Any, field: FieldInfo) -> property:
     store = slot.__set__
 
     def setter(message: Any, value: Any) -> None:
-        _check(value, field)
+        allowed = _refusal(value, field)
+        if allowed:
+            raise FieldCheckError(field.public, allowed, value)
         if field.is_list and field.is_numeric:
             value = _numbers(value, field)
         store(message, value)
@@ -340,12 +338,6 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
     if isinstance(value, np.ndarray):
         return value
     return np.array(value, field.primitive.name)
-
-
-def _check(value: Any, field: FieldInfo) -> None:
-    allowed = _refusal(value, field)
-    if allowed:
-        raise FieldCheckError(field.public, allowed, value)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:

@@ -11,27 +11,16 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict, get_type_hints
 
 from .checked import validate, validate_count, validate_element
 from .names import ValidationError, owner_of, slot_name
-from .typeinfo import (
-    FieldInfo,
-    Structure,
-    inner_path,
-    spelling_hint,
-    structure_of,
-)
+from .typeinfo import FieldInfo, Structure, inner_path, spelling_hint, structure_of
 
 if TYPE_CHECKING:
     import dataclasses
     from collections.abc import Iterator
 else:
-    try:
-        from typing import Unpack
-    except ImportError:  # Python 3.10
+    import typing
 
-        class Unpack:
-            """Stands for what is said of keyword arguments."""
-
-            def __class_getitem__(cls, options):
-                return options
+    # Python 3.10 has none, and anything that takes an index will do
+    Unpack = getattr(typing, "Unpack", typing.Optional)
 
 
 #: What numeric sequences take.
@@ -100,16 +89,12 @@ def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
             hint = spelling_hint(str(key), list(fields))
             problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
-        place = inner_path(path, field.public)
-        _set(message, field, _value(value, field, place), path)
+        made = _value(value, field, inner_path(path, field.public))
+        try:
+            setattr(message, field.public, made)
+        except ValidationError as error:
+            raise error.at(inner_path(path, error.path), ValidationError) from None
     return message
-
-
-def _set(message: Any, field: FieldInfo, value: Any, path: str) -> None:
-    try:
-        setattr(message, field.public, value)
-    except ValidationError as error:
-        raise error.at(inner_path(path, error.path), ValidationError) from None
 
 
 def _value(value: Any, field: FieldInfo, path: str) -> Any:
@@ -140,8 +125,8 @@ def _element(value: Any, field: FieldInfo, path: str) -> Any:
 
 
 @cache
-def dataclass_params() -> Any:
-    """Return the `__dataclass_params__` of all messages."""
+def dataclass_params(_kind: Any) -> Any:
+    """Return the `__dataclass_params__` of a class, which are those of all."""
     import dataclasses
 
     model: Any = dataclasses.make_dataclass("Message", [], slots=True)

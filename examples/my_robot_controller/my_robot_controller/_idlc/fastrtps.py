@@ -1,20 +1,17 @@
 """The opaque kind: rmw_fastrtps_cpp and others that use its type support.
 
-The middleware never looks into message memory here, so it is a `Memory` that holds the
-encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
-calls the two functions that copy the bytes while it holds the mutex of a writer or a
-reader, and another thread may wait for that mutex while it holds the interpreter's lock.
-Whoever gave that lock away in there would never get it back. So these functions are
-machine code that allocates nothing but `bytes`, which starts no garbage collection.
+Message memory is a `Memory` here, which holds the encoded bytes: encoding comes before the
+middleware is called, decoding after it. Fast DDS copies the bytes while it holds the mutex of
+a writer or a reader, and another thread may wait for that mutex while it holds the
+interpreter's lock. Whoever gave that lock away in there would never get it back. So what copies
+is machine code that allocates nothing but `bytes`, which starts no garbage collection. Where
+there can be none, it is Python in which the interpreter lets no other thread run: that may
+happen after a call and where it jumps. Only Python 3.11 and older may collect garbage.
 
-Where there can be no machine code, they are Python that lets no other thread run: the
-interpreter may do so after a call and where it jumps, so there is neither. Only Python
-3.11 and older may collect garbage in between.
-
-They read and write through three pointers inside Fast CDR's `Cdr`: where the next byte is,
+Both read and write through three pointers inside Fast CDR's `Cdr`: where the next byte is,
 where the message began, and where the buffer ends. Each is the second word of a pair whose
-first word is the start of the buffer. `fast_cdr` makes a `Cdr` of its own and looks for these
-pairs; where it does not find them, it raises ImportError instead of touching anybody's memory.
+first word is the start of the buffer. `fast_cdr` looks for these pairs in a `Cdr` of its own;
+where they are not found, it raises ImportError instead of touching anybody's memory.
 """
 
 from __future__ import annotations
@@ -23,16 +20,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Callable
-from ctypes import (
-    PYFUNCTYPE,
-    c_bool,
-    c_char,
-    c_char_p,
-    c_int,
-    c_size_t,
-    c_void_p,
-    py_object,
-)
+from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_void_p, py_object
 from functools import cache
 from struct import pack
 from typing import Any, NamedTuple
@@ -117,10 +105,6 @@ def _load() -> tuple[ctypes.CDLL, _Names]:
     raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
 
 
-def _words_of(cdr: int) -> list[int]:
-    return c.WORDS[cdr >> 3 : (cdr >> 3) + _WORDS].tolist()
-
-
 def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
     """Return the only index of the three pairs, else None."""
     pattern = [word for position in positions for word in (begin, position)]
@@ -138,7 +122,9 @@ def fast_cdr() -> FastCdr:
 
     try:
         new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
-        new_cdr = method(names.new, None, c_void_p, c_void_p, c_int, c_int)
+        new_cdr = method(
+            names.new, None, c_void_p, c_void_p, ctypes.c_int, ctypes.c_int
+        )
         append = method(names.append, c_void_p, c_void_p, c_void_p, c_size_t)
         position_of = method(names.position, c_void_p, c_void_p)
         begin_of = method(names.begin, c_void_p, c_void_p)
@@ -155,7 +141,8 @@ def fast_cdr() -> FastCdr:
     for text in (b"\1\2\3", b"\4\5"):
         append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
         position = position_of(here)
-        indices.add(_find(_words_of(here), begin, (position, begin, begin + size)))
+        words = c.WORDS[here >> 3 : (here >> 3) + _WORDS].tolist()
+        indices.add(_find(words, begin, (position, begin, begin + size)))
     index = indices.pop()
     if (
         indices
@@ -349,7 +336,7 @@ def _python_functions() -> dict[str, int]:
             pass
         return 0
 
-    bounds = ctypes.POINTER(c_char)
+    bounds = ctypes.POINTER(ctypes.c_char)
     functions: dict[str, tuple[Any, Callable[..., object]]] = {
         "serialize": (PYFUNCTYPE(c_bool, py_object, c_void_p), serialize),
         "deserialize": (PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize),

@@ -82,7 +82,7 @@ def about(structure: Structure) -> Any:
 
 
 # the C structures of this ROS 2: their layout is measured, never assumed
-
+#
 # Versions differ in what a middleware reads from introspection tables and in the size of
 # sequences, and nothing in them tells which version they are of. So before the first type
 # support of a process, the tables of two messages that are wherever rclpy is are compared
@@ -412,25 +412,16 @@ def _members_type() -> Any:
     )
 
 
-class Library(NamedTuple):
-    """Addresses in ROS 2's own libraries."""
-
-    identifier: int
-    same_handle: int
-    same_service: int
-
-
 @cache
-def library() -> Library:
+def library() -> tuple[int, int, int]:
     """Return addresses in the libraries that define what introspection is.
 
-    The identifier is rosidl's own string, because middlewares compare the pointers.
-    `same_handle` and `same_service` answer with the handle itself if the identifier
-    fits.
+    The identifier is rosidl's own string, because middlewares compare the pointers. The functions
+    for messages and for services answer with the handle itself if the identifier fits.
     """
     introspection = c.load_library(f"lib{IDENTIFIER}.so")
     runtime = c.load_library("librosidl_runtime_c.so")
-    return Library(
+    return (
         c_void_p.in_dll(introspection, f"{IDENTIFIER}__identifier").value or 0,
         c.address(runtime.get_message_typesupport_handle_function),
         c.address(runtime.get_service_typesupport_handle_function),
@@ -488,12 +479,9 @@ def handle(structure: Structure, functional: bool) -> int:
 
     `functional`: with the functions by which message memory is written and read.
     """
-    support = c.MessageTypeSupport(
-        library().identifier,
-        ctypes.addressof(members(structure, functional)),
-        library().same_handle,
-        about(structure),
-    )
+    identifier, same_handle, _ = library()
+    data = ctypes.addressof(members(structure, functional))
+    support = c.MessageTypeSupport(identifier, data, same_handle, about(structure))
     return c.pointer(support)
 
 

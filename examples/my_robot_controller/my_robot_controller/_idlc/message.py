@@ -25,18 +25,23 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from dataclasses import Field
-    from typing import Any, ClassVar, Literal
+    from typing import Any, ClassVar, Literal, TypeVar
 
     import typing_extensions
+    from typing_extensions import dataclass_transform
+
+    Kind = TypeVar("Kind", bound=type)
+
+    @dataclass_transform(kw_only_default=True)
+    def define(kind: Kind) -> Kind:
+        """Return a generated class, in which type checkers see the dataclass that it is."""
+        return kind
+
 else:
 
-    def dataclass(**_options):
-        """Leave the class as it is: the generated class already is what a dataclass has."""
-        return lambda cls: cls
-
-
-#: `dict` for generated classes, in which linters object to a display.
-table = dict
+    def define(kind):
+        """Return a generated class as it is."""
+        return kind
 
 
 # attributes on first access
@@ -48,36 +53,17 @@ class OnDemand:
     An error in that is an AttributeError, as code that looks at all attributes of a class expects.
     """
 
-    def __init__(self, make: Callable[[type], Any]) -> None:
-        self._make = make
+    def __init__(self, module: str, function: str) -> None:
+        self._module = f"{__package__}.{module}"
+        self._function = function
 
     def __get__(self, instance: object, owner: type) -> Any:
-        """Return the value."""
+        """Return what a function of the runtime makes for a class."""
         try:
-            return self._make(owner)
+            module = __import__(self._module, fromlist=[self._function])
+            return getattr(module, self._function)(owner)
         except Exception as error:
             raise AttributeError(str(error)) from error
-
-
-def slot_types(kind: type) -> tuple[Any, ...]:
-    """Return SLOT_TYPES of a message class."""
-    from . import typeinfo
-
-    return typeinfo.slot_types(kind)
-
-
-def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    """Return `__dataclass_fields__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_fields(kind)
-
-
-def dataclass_params(_kind: type) -> Any:
-    """Return `__dataclass_params__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_params()
 
 
 def _columns() -> Any:
@@ -315,10 +301,10 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
-        _codec_ = OnDemand(codec.codecs_of)
-        SLOT_TYPES = OnDemand(slot_types)
-        __dataclass_fields__ = OnDemand(dataclass_fields)
-        __dataclass_params__ = OnDemand(dataclass_params)
+        _codec_ = OnDemand("codec", "codecs_of")
+        SLOT_TYPES = OnDemand("typeinfo", "slot_types")
+        __dataclass_fields__ = OnDemand("conversions", "dataclass_fields")
+        __dataclass_params__ = OnDemand("conversions", "dataclass_params")
 
     @property
     def _check_fields(self) -> bool:
@@ -670,11 +656,11 @@ class Service(metaclass=ServiceMeta):
     """The base of services: `Request`, `Response` and `Event` are their messages."""
 
     if not TYPE_CHECKING:
-        Event = OnDemand(_event)
+        Event = OnDemand("message", "_event")
 
 
 class Action(metaclass=ActionMeta):
     """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
 
     if not TYPE_CHECKING:
-        Impl = OnDemand(_impl)
+        Impl = OnDemand("message", "_impl")

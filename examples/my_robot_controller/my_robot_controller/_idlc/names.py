@@ -151,24 +151,18 @@ class importing:
     def __exit__(
         self, _kind: object, error: BaseException | None, _trace: object
     ) -> None:
-        if isinstance(error, ImportError) and not isinstance(
-            error, MissingPackageError
-        ):
-            raise missing_package(error) from error
+        if not isinstance(error, ImportError) or isinstance(error, MissingPackageError):
+            return
+        package = (error.name or "").partition(".")[0] or "another package"
+        raise MissingPackageError(
+            f"this message needs {package}, which cannot be imported ({error}). "
+            f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
+            f"{package.replace('_', '-')}), or let those who generate this code run "
+            f"`idlc gen` with --vendor-deps: then it comes with what it needs.",
+            name=error.name,
+            path=error.path,
+        ) from error
 
 
 class MissingPackageError(ImportError):
     """Another package's messages cannot be imported."""
-
-
-def missing_package(error: ImportError) -> MissingPackageError:
-    """Return an ImportError that says how to get the package that `error` missed."""
-    package = (error.name or "").partition(".")[0] or "another package"
-    return MissingPackageError(
-        f"this message needs {package}, which cannot be imported ({error}). "
-        f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
-        f"{package.replace('_', '-')}), or let those who generate this code run "
-        f"`idlc gen` with --vendor-deps: then it comes with what it needs.",
-        name=error.name,
-        path=error.path,
-    )

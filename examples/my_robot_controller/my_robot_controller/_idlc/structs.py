@@ -24,12 +24,7 @@ from . import c, introspection
 from .c import RefusedError
 from .cdr import HEADERS, NATIVE
 from .codec import encode_error, functions
-from .introspection import (
-    allocator,
-    c_structure,
-    element_type,
-    placed_fields,
-)
+from .introspection import allocator, c_structure, element_type, placed_fields
 from .typeinfo import ARRAY, SCALAR, FieldInfo, Structure
 
 _HEADER = 4
@@ -252,16 +247,11 @@ def _follows(step: Run, last: Run) -> bool:
     )
 
 
-def whole(structure: Structure) -> Step:
-    """Return the step that moves a whole message."""
-    return Repeat(list(steps(structure)), 0, 1, 1)
-
-
 def _converter(cls: Any, structure: Structure) -> object:
     """Return an object that keeps messages at addresses: `[address] = message`, `[address]`."""
     encode = cls._codec_(NATIVE).encode
     _, decode = functions(cls)
-    message_step = whole(structure)
+    message_step = Repeat(list(steps(structure)), 0, 1, 1)
 
     def store(address: int, message: Any) -> None:
         try:
@@ -319,4 +309,4 @@ def service(name: str, *handles: int) -> tuple[int, int]:
         for handle in handles
     ]
     data = _ServiceMembers(f"{package}__{kind}".encode(), short.encode(), *members)
-    return introspection.library().identifier, c.pointer(data)
+    return introspection.library()[0], c.pointer(data)

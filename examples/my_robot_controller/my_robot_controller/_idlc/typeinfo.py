@@ -13,7 +13,6 @@ from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib import import_module
 from struct import Struct
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from .cdr import NATIVE, order_of
@@ -94,15 +93,8 @@ class FieldInfo:
 class Types:
     """What a package says of types, its own and all that they refer to, in `_type_data.py`.
 
-    That is JSON:
-
-        {"package": "pkg",
-         "descriptions": {"pkg/msg/Name": as in ROS 2's own Name.json},
-         "hashes": {"pkg/msg/Name": "RIHS01_…"},
-         "sources": {"pkg/msg/Name": "text of the interface file"}}
-
-    Messages that services and actions imply are in it, and the services and actions themselves. A
-    type id is a base plus 48 for an array, 96 for a bounded, 144 for an unbounded sequence.
+    Descriptions are those of ROS 2's own Name.json, those of services and actions and what these
+    imply included. A type id is a base plus 48 for an array, 96 or 144 for a sequence.
     Packages may describe types of one name in different ways, so nothing is kept by names alone.
     """
 
@@ -212,11 +204,6 @@ def is_copy(kind: type, other: type) -> bool:
     return structure_of(owner).hash == structure_of(others).hash
 
 
-def type_name(kind: type) -> str:
-    """Return a generated class's full name, package/kind/Name."""
-    return structure_of(kind).name
-
-
 def slot_types(kind: type) -> tuple[Any, ...]:
     """Return the fields' types as rosidl_parser.definition objects."""
     if "SLOT_TYPES" in kind.__dict__:  # the base of all messages
@@ -289,15 +276,7 @@ def read_carefully(
         # what a constructor makes may be larger than the buffer
         return maker(kind if other is structure else other.find_class())()
 
-    return _Reader(data, order_of(data), make).message(structure, "")
-
-
-def check_buffer(structure: Structure, data: bytes) -> None:
-    """Raise DecodeError, as `deserialize` does, unless `data` is a message of a type.
-
-    No class is needed, so that those of other packages need not be installed.
-    """
-    _Reader(data, order_of(data), lambda _: SimpleNamespace()).message(structure, "")
+    return CarefulReader(data, order_of(data), make).message(structure, "")
 
 
 def least_element(field: FieldInfo) -> int:
@@ -307,7 +286,7 @@ def least_element(field: FieldInfo) -> int:
     return 4 if field.primitive is None else field.primitive.size
 
 
-class _Reader:
+class CarefulReader:
     """Goes over a buffer and never further than it has bytes for.
 
     `make` returns what takes the values of a structure.

@@ -189,7 +189,7 @@ def import_service(cls: Any) -> None:
         handles = (request, response, happened)
         support = c.ServiceTypeSupport(
             *_implementation().service(structure.name, *handles),
-            introspection.library().same_service,
+            introspection.library()[2],
             *handles,
             *(_event_functions(cls) if happened else (0, 0)),
             introspection.about(structure),
