@@ -1,11 +1,10 @@
 # mypy: disable-error-code="import-not-found,import-untyped"
 # pyright: reportMissingImports=false, reportMissingTypeStubs=false
-"""Services and actions, and what ROS 2 adds to them: the same for all but the types that differ.
+"""What ROS 2 adds to services and actions: it is the same for all but the types that differ.
 
 A service gets an Event. An action gets two services, the message of its feedback, and `Impl`,
 in which rclpy looks for them. Their classes are composed when somebody asks for one, from the
-classes here and the type data of the package. Services and actions are names for their
-messages, never instances.
+classes here and the type data of the package.
 """
 
 from __future__ import annotations
@@ -17,22 +16,21 @@ from types import FunctionType
 
 from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
-from .errors import importing
-from .message import InterfaceMeta, Message, OnDemand, define, metaclass_of
-from .names import public_name, wire_name
-from .objects import equal, owner_of, same
+from .message import Message, OnDemand, Service, define, equal, same
+from .names import importing, owner_of, public_name, wire_name
 from .sequences import ListOf, sequence_reader, sequence_writer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+    from typing import Any, Generic, TypeAlias, TypeVar
 
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
+    from typing_extensions import Unpack
     from unique_identifier_msgs.msg import UUID
 
-    from .hints import Options, Unpack
+    from .conversions import Options
     from .typeinfo import FieldInfo, Structure, Types
 
     Goal = TypeVar("Goal")
@@ -55,93 +53,25 @@ else:
     Goal = Result = Feedback = Request = Response = None
 
 
-# services and actions
-
-
-class _GroupMeta(InterfaceMeta):
-    """Gives each service and action a metaclass of its own, for its type support."""
-
-    _interface: ClassVar[Any] = None
-    _composed: ClassVar[dict[str, Any] | None] = None
-    #: The attribute that stands for what ROS 2 adds.
-    _added: ClassVar[str]
-
-    def __new__(
-        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
-    ) -> Any:
-        if not bases:
-            return super().__new__(cls, name, bases, namespace)
-        metaclass = metaclass_of(cls, name, namespace)
-        created: Any = type.__new__(metaclass, name, bases, namespace)
-        metaclass._interface = created
-        if cls._added not in namespace:
-            module: Any = sys.modules[created.__module__]
-            module.__getattr__ = _getter(created)
-        return created
-
-    def __call__(cls, *_values: object, **_named: object) -> Any:
-        raise NotImplementedError(
-            f"{cls.__name__} is a name for its messages, not a message"
-        )
-
-
-class ServiceMeta(_GroupMeta):
-    """The metaclass of services."""
-
-    _added = "Event"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_service(cls._interface)
-
-
-class ActionMeta(_GroupMeta):
-    """The metaclass of actions."""
-
-    _added = "Impl"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_action(cls._interface)
-
-
-class Service(metaclass=ServiceMeta):
-    """The base of services: `Request`, `Response` and `Event` are their messages."""
-
-    #: Whether fields make lists of the values that they are given, as from Lyrical on.
-    _converts_ = False
-
-    if not TYPE_CHECKING:
-        Event = OnDemand(lambda service: compose(service) and service.Event)
-
-
-class Action(metaclass=ActionMeta):
-    """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
-
-    _converts_ = False
-
-    if not TYPE_CHECKING:
-        Impl = OnDemand(lambda action: compose(action) and action.Impl)
-
-
-def _import(module: str, name: str) -> Any:
-    with importing():
-        return getattr(__import__(module, fromlist=[name]), name)
-
-
 class ActionImpl:
     """What rclpy needs of an action: its attribute `Impl`."""
 
-    CancelGoalService = OnDemand(lambda _: _import("action_msgs.srv", "CancelGoal"))
-    GoalStatusMessage = OnDemand(
-        lambda _: _import("action_msgs.msg", "GoalStatusArray")
-    )
+    CancelGoalService = OnDemand("protocol", "import_cancel_goal")
+    GoalStatusMessage = OnDemand("protocol", "import_goal_status")
+
+
+def import_cancel_goal(_impl: type) -> Any:
+    """Return the service that cancels goals of any action."""
+    with importing():
+        from action_msgs.srv import CancelGoal
+    return CancelGoal
+
+
+def import_goal_status(_impl: type) -> Any:
+    """Return the message that an action server publishes of its goals."""
+    with importing():
+        from action_msgs.msg import GoalStatusArray
+    return GoalStatusArray
 
 
 # What the composed messages are made of: their fields as type checkers see them, constructors
@@ -258,45 +188,36 @@ if TYPE_CHECKING:
 _lock = allocate_lock()
 
 
-def _getter(group: Any) -> Any:
-    """Return the `__getattr__` of a module, which finds what ROS 2 adds."""
-    module, prefix = group.__module__, f"{wire_name(group.__name__)}_"
-
-    def get(name: str) -> Any:
-        if name.startswith(prefix) and name in compose(group):
-            return compose(group)[name]
-        raise AttributeError(f"module {module!r} has no attribute {name!r}")
-
-    return get
-
-
-def compose(group: Any) -> dict[str, Any]:
-    """Return what ROS 2 adds to a service or action, by the names in its module.
+def event_of(service: Any) -> Any:
+    """Return the event of a service, which the class then has, as its module has all names.
 
     Pickles look for classes there, and evaluated annotations for the names in them.
     """
-    from .typeinfo import structure_of
-
-    metaclass: Any = type(group)
+    service = service.__mro__[-3]  # a user may derive a class from it
     with _lock:
-        if metaclass._composed is None:
-            is_service = metaclass._added == "Event"
-            own = structure_of(group.Request if is_service else group.Goal)
-            composition = _Composition(group, own)
-            if is_service:
-                call = f"a call of {composition.name}"
-                group.Event = composition.add_event(composition.name, call)
-            else:
-                group.Impl = composition.add_impl()
-            metaclass._composed = composition.added
-        composed: dict[str, Any] = metaclass._composed
-    return composed
+        if "Event" not in vars(service):
+            composition = _Composition(service, service.Request)
+            call = f"a call of {composition.name}"
+            service.Event = composition.add_event(composition.name, call)
+    return service.Event
+
+
+def impl_of(action: Any) -> Any:
+    """Return what rclpy needs of an action, in the same way."""
+    action = action.__mro__[-3]
+    with _lock:
+        if "Impl" not in vars(action):
+            action.Impl = _Composition(action, action.Goal).add_impl()
+    return action.Impl
 
 
 class _Composition:
     """Makes the classes of one service or action; `added` has them by name."""
 
-    def __init__(self, group: Any, own: Structure) -> None:
+    def __init__(self, group: Any, section: Any) -> None:
+        from .typeinfo import structure_of
+
+        own = structure_of(section)
         self.types = own.types
         self.kind = own.name.rpartition("/")[0]
         self.module: str = group.__module__
@@ -333,7 +254,7 @@ class _Composition:
             for part in ("Request", "Response", "Event")
         }
         return self.add(
-            ServiceMeta, name, Service, f"{purpose}. Added by ROS 2.", parts
+            type(Service), name, Service, f"{purpose}. Added by ROS 2.", parts
         )
 
     def add_event(self, service: str, call: str) -> Any:
@@ -373,7 +294,7 @@ class _Composition:
         if self.converts:
             parts |= {field.name: ListOf() for field in fields if field.is_list}
         if shape in (ServiceEvent, SendGoalResponse, GetResultRequest):
-            parts["_codec_"] = OnDemand(_codecs)
+            parts["_codec_"] = OnDemand("protocol", "field_codecs")
         purpose = f"{shape.__doc__}".replace("a call", subject).replace(
             "a goal", subject
         )
@@ -470,7 +391,7 @@ def _spell(field: FieldInfo, boolean: str = "bool", listed: str = "{}[<={}]") ->
 # codecs of what is rarely sent
 
 
-def _codecs(kind: type) -> codec.Codecs:
+def field_codecs(kind: type) -> codec.Codecs:
     """Return codecs that read and write a message field by field, as the type data has them."""
     from .typeinfo import read_carefully, structure_of
 

@@ -1,29 +1,27 @@
-"""The base of generated messages, and their metaclass.
+"""The bases of generated messages, services and actions, and their metaclasses.
 
 A message class declares `_fields_and_field_types`. Its metaclass makes a slot of each field,
 named as rosidl names it (`_stamp`), and gives it its public name (`stamp`): the same slot, or a
 property that converts for numeric arrays. Nothing else is computed until it is asked for.
+Services and actions are names for their messages, never instances.
 """
 
 from __future__ import annotations
 
 import sys
+from array import array
 
 from . import codec
-from .names import public_name, slot_name
-from .objects import (
-    copied,
-    deeply_copied,
-    named_values,
+from .names import (
     owner_of,
-    pretty,
-    represented,
-    same,
+    public_name,
+    slot_name,
+    wire_name,
 )
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from dataclasses import Field
     from typing import Any, ClassVar, Literal, TypeVar
 
@@ -53,36 +51,17 @@ class OnDemand:
     An error in that is an AttributeError, as code that looks at all attributes of a class expects.
     """
 
-    def __init__(self, make: Callable[[type], Any]) -> None:
-        self._make = make
+    def __init__(self, module: str, function: str) -> None:
+        self._module = f"{__package__}.{module}"
+        self._function = function
 
     def __get__(self, instance: object, owner: type) -> Any:
-        """Return the value."""
+        """Return what a function of the runtime makes for a class."""
         try:
-            return self._make(owner)
+            module = __import__(self._module, fromlist=[self._function])
+            return getattr(module, self._function)(owner)
         except Exception as error:
             raise AttributeError(str(error)) from error
-
-
-def slot_types(kind: type) -> tuple[Any, ...]:
-    """Return SLOT_TYPES of a message class."""
-    from . import typeinfo
-
-    return typeinfo.slot_types(kind)
-
-
-def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
-    """Return `__dataclass_fields__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_fields(kind)
-
-
-def dataclass_params(_kind: type) -> Any:
-    """Return `__dataclass_params__` of a message class."""
-    from . import conversions
-
-    return conversions.dataclass_params()
 
 
 def _columns() -> Any:
@@ -95,6 +74,139 @@ def _columns() -> Any:
             f"pip install --upgrade 'idlc[recordings]'",
             name=error.name,
         ) from error
+
+
+# comparing, copying and showing messages
+
+#: Values that a copy may share.
+ATOMIC = frozenset({bool, bytes, float, int, str})
+#: Elements up to which Python compares two arrays of numbers before numpy has begun.
+SMALL = 64
+#: Packages that are shown under other names than they are imported by.
+SHOWN: dict[str, str] = {}
+#: The class of numpy's arrays, once one was met: to ask a class for its module takes longer.
+_of_numpy: set[type] = set()
+
+
+def equal(message: Any, other: Any) -> bool:
+    """Compare a message with what is not of its class: a copy of it has the same fields."""
+    if hasattr(type(type(other)), "_message"):
+        from .typeinfo import is_copy
+
+        if is_copy(type(message), type(other)):
+            slots: list[str] = owner_of(type(message)).__slots__
+            return all(
+                same(getattr(message, slot), getattr(other, slot)) for slot in slots
+            )
+    return NotImplemented  # type: ignore[no-any-return]
+
+
+def same(mine: Any, other: Any) -> bool:
+    """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
+    kind = type(mine)
+    if kind is array and type(other) is array:
+        if mine.typecode == other.typecode:
+            if mine.typecode in "fd":  # no nan is equal to another
+                return memoryview(mine) == memoryview(other)
+            if len(mine) > SMALL:
+                # only `bytes` and `bytearray` compare memory at once
+                return len(mine) == len(other) and bytearray(mine) == memoryview(other)
+    elif kind in _of_numpy and type(other) is kind and len(mine) <= SMALL:
+        return bool(mine.data == other)
+    elif kind.__module__ == "numpy" or type(other).__module__ == "numpy":
+        import numpy as np
+
+        _of_numpy.add(np.ndarray)
+        return np.array_equal(mine, other)
+    return bool(mine == other)
+
+
+def copied(message: Any) -> Any:
+    """Return a shallow copy."""
+    kind = type(message)
+    if owner_of(kind) is not kind:
+        return _reconstructed(message, lambda value: value)
+    duplicate = object.__new__(kind)
+    for slot in kind.__slots__:
+        setattr(duplicate, slot, getattr(message, slot))
+    return duplicate
+
+
+def deeply_copied(message: Any, memo: dict[int, Any]) -> Any:
+    """Return a copy that shares nothing that can change."""
+    from copy import deepcopy
+
+    kind = type(message)
+    if owner_of(kind) is not kind:
+        return _reconstructed(message, lambda value: deepcopy(value, memo), memo)
+    duplicate = memo[id(message)] = object.__new__(kind)
+    for slot in kind.__slots__:
+        value = getattr(message, slot)
+        if type(value) not in ATOMIC:
+            value = deepcopy(value, memo)
+        setattr(duplicate, slot, value)
+    return duplicate
+
+
+def _reconstructed(
+    message: Any, copy_of: Callable[[Any], Any], memo: dict[int, Any] | None = None
+) -> Any:
+    """Return a copy of an instance of a user's subclass, which may have more than slots."""
+    reduced: Any = object.__reduce_ex__(message, 4)
+    state = reduced[2]
+    duplicate = object.__new__(type(message))
+    if memo is not None:
+        memo[id(message)] = duplicate
+    for part in state if isinstance(state, tuple) else (state,):
+        for name, value in (part or {}).items():
+            object.__setattr__(duplicate, name, copy_of(value))
+    return duplicate
+
+
+def represented(message: Any) -> str:
+    """Return a message as rosidl shows it."""
+    parts = []
+    for field in message._fields_and_field_types:
+        value = getattr(message, slot_name(field))
+        shown = value.tolist() if type(value) is array else value
+        parts.append(f"{field}={shown!r}")
+    return f"{_shown_name(type(message))}({', '.join(parts)})"
+
+
+# pprint knows what can be shown field by field from where dataclasses make `__repr__`
+represented.__qualname__ = "__create_fn__.<locals>.__repr__"
+
+
+def _shown_name(kind: type) -> str:
+    """Return a class's name after that of its package, its module left out."""
+    package = kind.__module__.rpartition(".")[0]
+    home, _, last = package.rpartition(".")
+    if home in SHOWN:
+        package = f"{SHOWN[home]}.{last}"
+    return f"{package}.{kind.__name__}" if package else kind.__name__
+
+
+def named_values(message: Any) -> Iterator[tuple[str, Any]]:
+    """Yield each field's Python name and value, those that a user's subclass adds included."""
+    import dataclasses
+
+    for field in dataclasses.fields(message):
+        yield field.name, getattr(message, field.name)
+
+
+def pretty(message: Any, printer: Any, cycle: bool) -> None:
+    """Show a message on as many lines as it takes, with IPython's pretty printer."""
+    name = _shown_name(type(message))
+    if cycle:
+        printer.text(f"{name}(...)")
+        return
+    with printer.group(len(name) + 1, f"{name}(", ")"):
+        for index, (field, value) in enumerate(named_values(message)):
+            if index:
+                printer.text(",")
+                printer.breakable()
+            printer.text(f"{field}=")
+            printer.pretty(value.tolist() if type(value) is array else value)
 
 
 # messages
@@ -184,10 +296,10 @@ class Message(metaclass=MessageMeta):
         SLOT_TYPES: ClassVar[tuple[Any, ...]]
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     else:
-        _codec_ = OnDemand(codec.codecs_of)
-        SLOT_TYPES = OnDemand(slot_types)
-        __dataclass_fields__ = OnDemand(dataclass_fields)
-        __dataclass_params__ = OnDemand(dataclass_params)
+        _codec_ = OnDemand("codec", "codecs_of")
+        SLOT_TYPES = OnDemand("typeinfo", "slot_types")
+        __dataclass_fields__ = OnDemand("conversions", "dataclass_fields")
+        __dataclass_params__ = OnDemand("conversions", "dataclass_params")
 
     @property
     def _check_fields(self) -> bool:
@@ -281,7 +393,7 @@ class Message(metaclass=MessageMeta):
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .typeinfo import validate
+        from .checked import validate
 
         validate(self)
 
@@ -410,11 +522,89 @@ def _equal(self: Any, other: Any) -> Any:
     )
 
 
-__all__ = [
-    "InterfaceMeta",
-    "Message",
-    "MessageMeta",
-    "OnDemand",
-    "define",
-    "metaclass_of",
-]
+# services and actions
+
+
+def _getter(group: Any, prefix: str) -> Callable[[str], Any]:
+    """Return a module's `__getattr__`, which finds what ROS 2 adds to a service or action."""
+    module = group.__module__
+
+    def get(name: str) -> Any:
+        if name.startswith(prefix):
+            getattr(group, group._added)
+            if name in vars(sys.modules[module]):
+                return vars(sys.modules[module])[name]
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+
+    return get
+
+
+class _GroupMeta(InterfaceMeta):
+    """Gives each service and action a metaclass of its own, for its type support."""
+
+    _interface: ClassVar[Any] = None
+    #: The attribute that stands for what ROS 2 adds, in a class that is not itself part of it.
+    _added: ClassVar[str]
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
+    ) -> Any:
+        if not bases:
+            return super().__new__(cls, name, bases, namespace)
+        metaclass = metaclass_of(cls, name, namespace)
+        created: Any = type.__new__(metaclass, name, bases, namespace)
+        metaclass._interface = created
+        if cls._added not in namespace and len(created.__mro__) == 3:
+            module: Any = sys.modules[created.__module__]
+            module.__getattr__ = _getter(created, f"{wire_name(name)}_")
+        return created
+
+    def __call__(cls, *_values: object, **_named: object) -> Any:
+        raise NotImplementedError(
+            f"{cls.__name__} is a name for its messages, not a message"
+        )
+
+
+class ServiceMeta(_GroupMeta):
+    """The metaclass of services."""
+
+    _added = "Event"
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        typesupport.import_service(cls._interface)
+
+
+class ActionMeta(_GroupMeta):
+    """The metaclass of actions."""
+
+    _added = "Impl"
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        typesupport.import_action(cls._interface)
+
+
+class Service(metaclass=ServiceMeta):
+    """The base of services: `Request`, `Response` and `Event` are their messages."""
+
+    #: True if fields make lists of the values that they are given, as from Lyrical on.
+    _converts_ = False
+
+    if not TYPE_CHECKING:
+        Event = OnDemand("protocol", "event_of")
+
+
+class Action(metaclass=ActionMeta):
+    """The base of actions: `Goal`, `Result` and `Feedback` are their messages."""
+
+    _converts_ = False
+
+    if not TYPE_CHECKING:
+        Impl = OnDemand("protocol", "impl_of")

@@ -26,15 +26,20 @@ def countdown_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_goal = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_target_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._target_count)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._target_count,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_goal()
-        (message._target_count,) = read_values(data, 4)
+        (message._target_count,) = read_target_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -50,17 +55,24 @@ def countdown_result_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4si?").pack
     new_countdown_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i?", start=4).unpack_from
+    read_final_count = _idlc.layout(order, "i?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         parts = [
-            write_head(encapsulation, message._final_count, truths[message._success]),
+            write_head(
+                encapsulation,
+                message._final_count,
+                truths[message._success],
+            ),
         ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_result()
-        message._final_count, message._success = read_values(data, 4)
+        (
+            message._final_count,
+            message._success,
+        ) = read_final_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -75,15 +87,20 @@ def countdown_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4si").pack
     new_countdown_feedback = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "i", start=4).unpack_from
+    read_current_count = _idlc.layout(order, "i", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._current_count)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._current_count,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_countdown_feedback()
-        (message._current_count,) = read_values(data, 4)
+        (message._current_count,) = read_current_count(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -108,7 +125,7 @@ def countdown_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_goal = _idlc.maker(Countdown_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -128,8 +145,11 @@ def countdown_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_countdown_goal()
         message._goal = goal
-        uuid, goal._target_count = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            goal._target_count,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -148,7 +168,7 @@ def countdown_get_result_response_codec(
     write_head = _idlc.layout(order, "4sbi?").pack
     new_countdown_get_result_response = _idlc.maker(kind)
     new_countdown_result = _idlc.maker(Countdown_Result)
-    read_values = _idlc.layout(order, "bi?", start=4).unpack_from
+    read_status = _idlc.layout(order, "bi?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
@@ -166,7 +186,11 @@ def countdown_get_result_response_codec(
         message = new_countdown_get_result_response()
         result = new_countdown_result()
         message._result = result
-        message._status, result._final_count, result._success = read_values(data, 4)
+        (
+            message._status,
+            result._final_count,
+            result._success,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -191,7 +215,7 @@ def countdown_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_countdown_feedback = _idlc.maker(Countdown_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bi", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bi", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -211,8 +235,11 @@ def countdown_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_countdown_feedback()
         message._feedback = feedback
-        uuid, feedback._current_count = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            feedback._current_count,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)

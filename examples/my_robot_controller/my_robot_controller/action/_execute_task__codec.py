@@ -26,14 +26,18 @@ def execute_task_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_goal = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         task_name = message._task_name.encode()
         task_name_size = len(task_name)
         parts = [
-            write_head[task_name_size](encapsulation, task_name_size + 1, task_name),
+            write_head[task_name_size](
+                encapsulation,
+                task_name_size + 1,
+                task_name,
+            ),
         ]
         return join(parts)
 
@@ -59,15 +63,20 @@ def execute_task_result_codec(
     truths = _idlc.TRUTHS
     write_head = _idlc.layout(order, "4s?").pack
     new_execute_task_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "?", start=4).unpack_from
+    read_success = _idlc.layout(order, "?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, truths[message._success])]
+        parts = [
+            write_head(
+                encapsulation,
+                truths[message._success],
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_execute_task_result()
-        (message._success,) = read_values(data, 4)
+        (message._success,) = read_success(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -82,7 +91,7 @@ def execute_task_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.Texts(order, "4sI*")
     new_execute_task_feedback = _idlc.maker(kind)
-    read_count = _idlc.layout(order, "I", start=4).unpack_from
+    read_count = _idlc.layout(order, "I").unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
@@ -128,20 +137,20 @@ def execute_task_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_goal = _idlc.maker(ExecuteTask_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
-        task_name = goal._task_name.encode()
-        task_name_size = len(task_name)
+        goal_task_name = goal._task_name.encode()
+        goal_task_name_size = len(goal_task_name)
         parts = [
-            write_head[task_name_size](
+            write_head[goal_task_name_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
-                task_name_size + 1,
-                task_name,
+                goal_task_name_size + 1,
+                goal_task_name,
             ),
         ]
         return join(parts)
@@ -152,8 +161,11 @@ def execute_task_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_execute_task_goal()
         message._goal = goal
-        uuid, size = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            size,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")
@@ -176,18 +188,27 @@ def execute_task_get_result_response_codec(
     write_head = _idlc.layout(order, "4sb?").pack
     new_execute_task_get_result_response = _idlc.maker(kind)
     new_execute_task_result = _idlc.maker(ExecuteTask_Result)
-    read_values = _idlc.layout(order, "b?", start=4).unpack_from
+    read_status = _idlc.layout(order, "b?", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [write_head(encapsulation, message._status, truths[result._success])]
+        parts = [
+            write_head(
+                encapsulation,
+                message._status,
+                truths[result._success],
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_execute_task_get_result_response()
         result = new_execute_task_result()
         message._result = result
-        message._status, result._success = read_values(data, 4)
+        (
+            message._status,
+            result._success,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -212,20 +233,20 @@ def execute_task_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_execute_task_feedback = _idlc.maker(ExecuteTask_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16BI", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16BI", start=4).unpack_from
     text = reading.text
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         feedback = message._feedback
-        current_status = feedback._current_status.encode()
-        current_status_size = len(current_status)
+        feedback_current_status = feedback._current_status.encode()
+        feedback_current_status_size = len(feedback_current_status)
         parts = [
-            write_head[current_status_size](
+            write_head[feedback_current_status_size](
                 encapsulation,
                 bytes_of_uint8_16(goal_id._uuid),
-                current_status_size + 1,
-                current_status,
+                feedback_current_status_size + 1,
+                feedback_current_status,
             ),
         ]
         return join(parts)
@@ -236,8 +257,11 @@ def execute_task_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_execute_task_feedback()
         message._feedback = feedback
-        uuid, size = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            size,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         end = 23 + size
         if data[end]:
             raise ValueError("text without end")

@@ -26,15 +26,20 @@ def fill_goal_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_goal = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._level)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._level,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_goal()
-        (message._level,) = read_values(data, 4)
+        (message._level,) = read_level(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -49,15 +54,20 @@ def fill_result_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_result = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_reached = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._reached)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._reached,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_result()
-        (message._reached,) = read_values(data, 4)
+        (message._reached,) = read_reached(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -72,15 +82,20 @@ def fill_feedback_codec(
     encapsulation = _idlc.HEADERS[order]
     write_head = _idlc.layout(order, "4sf").pack
     new_fill_feedback = _idlc.maker(kind)
-    read_values = _idlc.layout(order, "f", start=4).unpack_from
+    read_level = _idlc.layout(order, "f", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
-        parts = [write_head(encapsulation, message._level)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._level,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_feedback()
-        (message._level,) = read_values(data, 4)
+        (message._level,) = read_level(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -105,13 +120,17 @@ def fill_send_goal_request_codec(
     new_uuid = _idlc.maker(UUID)
     new_fill_goal = _idlc.maker(Fill_Goal)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bf", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
         goal = message._goal
         parts = [
-            write_head(encapsulation, bytes_of_uint8_16(goal_id._uuid), goal._level),
+            write_head(
+                encapsulation,
+                bytes_of_uint8_16(goal_id._uuid),
+                goal._level,
+            ),
         ]
         return join(parts)
 
@@ -121,8 +140,11 @@ def fill_send_goal_request_codec(
         message._goal_id = goal_id
         goal = new_fill_goal()
         message._goal = goal
-        uuid, goal._level = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            goal._level,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -140,18 +162,27 @@ def fill_get_result_response_codec(
     write_head = _idlc.layout(order, "4sbf").pack
     new_fill_get_result_response = _idlc.maker(kind)
     new_fill_result = _idlc.maker(Fill_Result)
-    read_values = _idlc.layout(order, "bf", start=4).unpack_from
+    read_status = _idlc.layout(order, "bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         result = message._result
-        parts = [write_head(encapsulation, message._status, result._reached)]
+        parts = [
+            write_head(
+                encapsulation,
+                message._status,
+                result._reached,
+            ),
+        ]
         return join(parts)
 
     def decode(data: Any) -> Any:
         message = new_fill_get_result_response()
         result = new_fill_result()
         message._result = result
-        message._status, result._reached = read_values(data, 4)
+        (
+            message._status,
+            result._reached,
+        ) = read_status(data, 4)
         return message
 
     return _idlc.Codec(encode, decode)
@@ -176,7 +207,7 @@ def fill_feedback_message_codec(
     new_uuid = _idlc.maker(UUID)
     new_fill_feedback = _idlc.maker(Fill_Feedback)
     array_of_uint8_16 = _arrays.array_reader(order, "uint8", 16, reading)
-    read_values = _idlc.layout(order, "16Bf", start=4).unpack_from
+    read_goal_id_uuid = _idlc.layout(order, "16Bf", start=4).unpack_from
 
     def encode(message: Any, join: _idlc.Join) -> Any:
         goal_id = message._goal_id
@@ -196,8 +227,11 @@ def fill_feedback_message_codec(
         message._goal_id = goal_id
         feedback = new_fill_feedback()
         message._feedback = feedback
-        uuid, feedback._level = read_values(data, 4)
-        goal_id._uuid = array_of_uint8_16(uuid)
+        (
+            goal_id_uuid,
+            feedback._level,
+        ) = read_goal_id_uuid(data, 4)
+        goal_id._uuid = array_of_uint8_16(goal_id_uuid)
         return message
 
     return _idlc.Codec(encode, decode)
