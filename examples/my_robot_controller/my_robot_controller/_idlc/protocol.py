@@ -25,13 +25,16 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, Generic, TypeAlias, TypeVar
 
-    from builtin_interfaces.msg import Time
-    from service_msgs.msg import ServiceEventInfo
     from typing_extensions import Unpack
-    from unique_identifier_msgs.msg import UUID
 
     from .conversions import Options
     from .typeinfo import FieldInfo, Structure, Types
+
+    # isort: off (some may stand beside the package that this is copied to)
+    from builtin_interfaces.msg import Time
+    from service_msgs.msg import ServiceEventInfo
+    from unique_identifier_msgs.msg import UUID
+    # isort: on
 
     Goal = TypeVar("Goal")
     Result = TypeVar("Result")
@@ -63,15 +66,13 @@ class ActionImpl:
 def import_cancel_goal(_impl: type) -> Any:
     """Return the service that cancels goals of any action."""
     with importing():
-        from action_msgs.srv import CancelGoal
-    return CancelGoal
+        return __import__("action_msgs.srv", fromlist=["srv"]).CancelGoal
 
 
 def import_goal_status(_impl: type) -> Any:
-    """Return the message that an action server publishes of its goals."""
+    """Return the message in which an action server publishes the states of goals."""
     with importing():
-        from action_msgs.msg import GoalStatusArray
-    return GoalStatusArray
+        return __import__("action_msgs.msg", fromlist=["msg"]).GoalStatusArray
 
 
 # What the composed messages are made of: their fields as type checkers see them, constructors
