@@ -87,9 +87,11 @@ if TYPE_CHECKING:
     from .hints import Options as Options
     from .hints import TypeAlias as TypeAlias
     from .hints import Unpack as Unpack
+    from .typeinfo import type_hash as type_hash
 else:
     _HINTS = "Any Floats Integers Iterable Join Options TypeAlias Unpack"
-    __getattr__, __dir__ = lazily(__name__, dict.fromkeys(_HINTS.split(), "hints"))
+    _LAZY = {**dict.fromkeys(_HINTS.split(), "hints"), "type_hash": "typeinfo"}
+    __getattr__, __dir__ = lazily(__name__, _LAZY)
 
 __all__ = [
     "ENDS",
