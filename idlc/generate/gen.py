@@ -32,7 +32,7 @@ from idlc.project.lock import Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.find import is_recording, split_recordings
+from idlc.recordings.find import split_recordings
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -273,11 +273,8 @@ class Run(NamedTuple):
     def make(self, report: Report) -> tuple[Generated, ...]:
         """Write, and return the packages; empty after an error. Raises OSError."""
         root = Root.at(self.folder)
-        paths = tuple(
-            root.path(word) if is_recording(word, root) else word for word in self.options.paths
-        )
         scope = msgspec.structs.replace(self.options.scope, root=root)
-        return gen(self.options._replace(paths=paths, scope=scope), report)
+        return gen(self.options._replace(scope=scope), report)
 
 
 def run_for(path: Path, package: str) -> Run | None:

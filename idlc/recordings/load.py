@@ -126,7 +126,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
-    recording = read_topics(path, report)
+    recording = read_topics(path, where.root, report)
     groups = versions(recording.topics) if recording else []
     if len(groups) != 1:
         from idlc.recordings.packages import check_versions

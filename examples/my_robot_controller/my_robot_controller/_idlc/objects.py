@@ -38,9 +38,9 @@ def is_copy(kind: type, other: type) -> bool:
     owner, others = (getattr(type(each), "_message", None) for each in (kind, other))
     if owner is None or others is None or owner.__name__ != others.__name__:
         return False
-    from .typeinfo import structure_of
+    from .typeinfo import type_hash
 
-    return structure_of(owner).hash == structure_of(others).hash
+    return type_hash(owner) == type_hash(others)
 
 
 def equal(message: Any, other: Any) -> bool:

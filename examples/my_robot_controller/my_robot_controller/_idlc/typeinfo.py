@@ -222,6 +222,11 @@ def _structure_of(owner: type) -> Structure:
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 
+def type_hash(kind: type) -> str:
+    """Return a generated class's type hash."""
+    return structure_of(kind).hash
+
+
 def type_name(kind: type) -> str:
     """Return a generated class's full name, package/kind/Name."""
     return structure_of(kind).name
