@@ -10,7 +10,6 @@ from threading import Event
 
 import rclpy
 
-
 copied = sys.argv[1] == "copied"
 for package in ("std_msgs", "geometry_msgs") if copied else ():
     sys.modules[package] = None  # importing it fails, as if it were not installed
