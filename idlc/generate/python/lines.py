@@ -99,16 +99,6 @@ def _broken(
     return result
 
 
-def import_from(module: str, names: Sequence[str], indent: int = 0, width: int = 0) -> list[str]:
-    """Return the lines of an import statement."""
-    margin = " " * indent
-    line = f"{margin}from {module} import {', '.join(names)}"
-    if len(line) <= (width or WIDTH) or " as " in line:
-        return [line]
-    items = [f"{margin}    {name}," for name in names]
-    return [f"{margin}from {module} import (", *items, f"{margin})"]
-
-
 def _spread(conditions: Sequence[str], word: str, indent: int) -> list[str]:
     """Return conditions joined by a word, on one line, or on one each."""
     margin = " " * indent
