@@ -185,7 +185,7 @@ def test_a_type_of_another_hash_is_refused(library, tmp_path):
     ]
     for code in ("from lib.ros.msg import Track", "import lib.ros.vendor.std_msgs"):
         error = fails(code, library, folder)
-        assert error.startswith("lib.ros._idlc.errors.MissingPackageError: track_msgs uses")
+        assert "MissingPackageError: track_msgs uses" in error
         assert "std_msgs/msg/Header" in error
         assert all(digest in error for digest in hashes)
         assert str(folder / "std_msgs") in error
