@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from .protocol import SendGoalRequest as SendGoalRequest
     from .protocol import SendGoalResponse as SendGoalResponse
     from .protocol import ServiceEvent as ServiceEvent
+    from .typeinfo import type_hash as type_hash
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
-    __getattr__, __dir__ = lazily(
-        __name__, dict.fromkeys(_HINTS.split(), "conversions")
-    )
+    _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}
+    __getattr__, __dir__ = lazily(__name__, _LAZY)

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from .conversions import Options
     from .typeinfo import FieldInfo, Structure, Types
 
-    # isort: off (some may stand beside the package that this is copied to)
+    # in some folders, one of these stands beside the package that this is copied to
+    # isort: off
     from builtin_interfaces.msg import Time
     from service_msgs.msg import ServiceEventInfo
     from unique_identifier_msgs.msg import UUID
