@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from .conversions import Integers as Integers
     from .conversions import Join as Join
     from .conversions import Options as Options
+    from .typeinfo import type_hash as type_hash
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
-    __getattr__, __dir__ = lazily(
-        __name__, dict.fromkeys(_HINTS.split(), "conversions")
-    )
+    _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}
+    __getattr__, __dir__ = lazily(__name__, _LAZY)
