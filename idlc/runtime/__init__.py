@@ -27,20 +27,9 @@ if TYPE_CHECKING:
 
     from typing_extensions import Unpack as Unpack
 
-    from .conversions import Floats as Floats
-    from .conversions import Integers as Integers
-    from .conversions import Join as Join
-    from .conversions import Options as Options
-    from .protocol import ActionImpl as ActionImpl
-    from .protocol import FeedbackMessage as FeedbackMessage
-    from .protocol import GetResult as GetResult
-    from .protocol import GetResultRequest as GetResultRequest
-    from .protocol import GetResultResponse as GetResultResponse
-    from .protocol import SendGoal as SendGoal
-    from .protocol import SendGoalRequest as SendGoalRequest
-    from .protocol import SendGoalResponse as SendGoalResponse
-    from .protocol import ServiceEvent as ServiceEvent
-    from .typeinfo import type_hash as type_hash
+    from .conversions import *
+    from .protocol import *
+    from .typeinfo import *
 else:
     _HINTS = "Floats Integers Iterable Join Options TypeAlias Unpack"
     _LAZY = {**dict.fromkeys(_HINTS.split(), "conversions"), "type_hash": "typeinfo"}

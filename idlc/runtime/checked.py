@@ -24,9 +24,6 @@ from .names import (
     owner_of,
 )
 from .typeinfo import (
-    ARRAY,
-    PRIMITIVES,
-    SEQUENCE,
     FieldInfo,
     Primitive,
     Structure,
@@ -158,29 +155,20 @@ def _float(value: Any, primitive: Primitive, path: str) -> None:
         raise ValidationError(path, primitive.allowed, value)
 
 
-def refused(
-    name: str, kind: str, size: int | None, values: Any, error: Exception
-) -> ValidationError:
+def refused(message: Any, name: str, values: Any, error: Exception) -> ValidationError:
     """Return the error for values that a field of numbers does not take.
 
-    `kind` is the name of their type, or its code in `struct`. `error` is what Python or
-    numpy said, and one of its kind is returned: rosidl's classes raise that.
+    `error` is what Python or numpy said, and one of its kind is returned: rosidl's classes
+    raise that.
     """
-    base, primitive = next(
-        (base, candidate)
-        for base, candidate in PRIMITIVES.items()
-        if kind in (candidate.code, candidate.name)
-    )
-    shape = 48 * (SEQUENCE if size is None else ARRAY)
-    type_ = {"type_id": base + shape, "capacity": size, "string_capacity": 0}
-    field = FieldInfo({"name": name, "default_value": "", "type": type_}, None)
-    failure = ValidationError(
-        name, f"numbers ({primitive.name})", values, f"{error} ({primitive.name})"
-    )
-    if isinstance(values, (bytes, bytearray)) and size is None:
-        problem = (
-            f"has {counted(len(values), 'byte')}, needs a multiple of {primitive.size}"
-        )
+    fields = structure_of(type(message)).fields
+    field = next(field for field in fields if field.public == name)
+    assert field.primitive is not None
+    kind = field.primitive.name
+    failure = ValidationError(name, f"numbers ({kind})", values, f"{error} ({kind})")
+    if isinstance(values, (bytes, bytearray)) and field.is_sequence:
+        size = field.primitive.size
+        problem = f"has {counted(len(values), 'byte')}, needs a multiple of {size}"
         failure = ValidationError(name, "whole numbers of bytes", values, problem)
     elif (
         isinstance(values, (list, tuple))

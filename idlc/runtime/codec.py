@@ -16,7 +16,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from functools import partial
-    from typing import Any, Protocol, TypeAlias
+    from typing import Any, TypeAlias
 
     from .conversions import Join
 
@@ -25,13 +25,8 @@ if TYPE_CHECKING:
     #: `serialize(message, byteorder="little")` and `deserialize(buffer, copy=True)`.
     Functions: TypeAlias = tuple[Callable[..., bytes], Callable[..., Any]]
 
-    class Codecs(Protocol):
-        """Gives the codec of a byte order, making it on first use."""
-
-        def __call__(self, order: str, reading: Reading = ...) -> Codec:
-            """Return the codec whose `decode` makes values as `reading` says."""
-            ...
-
+    #: Gives the codec of a byte order, whose `decode` makes values as a `Reading` says.
+    Codecs: TypeAlias = Callable[..., "Codec"]
 else:
     # functools takes longer to import than all that is here
     from _functools import partial
@@ -124,17 +119,8 @@ def functions(kind: type) -> Functions:
     """
     owner = owner_of(kind)
     pair: Functions | None = owner.__dict__.get("_functions_")
-    if pair is None:
-        pair = owner._functions_ = _functions(owner)
-        serialize, deserialize = pair
-        methods = {"serialize": serialize, "deserialize": staticmethod(deserialize)}
-        for name, function in methods.items():
-            if name not in owner.__dict__:
-                setattr(owner, name, function)
-    return pair
-
-
-def _functions(owner: Any) -> Functions:
+    if pair is not None:
+        return pair
     codecs = owner._codec_
     little = codecs("<")
     encode, decode = little.encode, little.decode
@@ -160,6 +146,11 @@ def _functions(owner: Any) -> Functions:
     base = owner.__mro__[1]
     serialize.__doc__ = base.serialize.__doc__
     deserialize.__doc__ = base.deserialize.__doc__
+    owner._functions_ = serialize, deserialize
+    methods = {"serialize": serialize, "deserialize": staticmethod(deserialize)}
+    for name, function in methods.items():
+        if name not in owner.__dict__:
+            setattr(owner, name, function)
     return serialize, deserialize
 
 
@@ -202,8 +193,7 @@ def recover(kind: type, buffer: Any, failure: Exception) -> Any:
         raise failure
     from .typeinfo import read_carefully
 
-    data = bytes(buffer)
-    return read_carefully(kind, data, maker)
+    return read_carefully(kind, bytes(buffer), maker)
 
 
 def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
@@ -245,23 +235,21 @@ def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[b
 
 def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]:
     """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
-    owner = owner_of(kind)
-    codecs = owner._codec_
+    if owner_of(kind) is not kind:
+        return [
+            _indexed(kind, buffer, copy, index) for index, buffer in enumerate(buffers)
+        ]
+    codecs = kind._codec_
     decode = codecs("<", READINGS[bytes.decode, copy]).decode
     result: list[Any] = []
     put = result.append
-    rest = iter(buffers)
-    if kind is owner:
-        for buffer in rest:
-            try:
-                if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
-                    put(decode(buffer))
-                else:
-                    put(read(codecs, buffer, copy))
-            except FAILURES:
-                put(_indexed(kind, buffer, copy, len(result)))
-    else:
-        for buffer in rest:
+    for buffer in buffers:
+        try:
+            if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                put(decode(buffer))
+            else:
+                put(read(codecs, buffer, copy))
+        except FAILURES:
             put(_indexed(kind, buffer, copy, len(result)))
     return result
 

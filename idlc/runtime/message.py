@@ -12,12 +12,7 @@ import sys
 from array import array
 
 from . import codec
-from .names import (
-    owner_of,
-    public_name,
-    slot_name,
-    wire_name,
-)
+from .names import owner_of, public_name, slot_name, wire_name
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -471,39 +466,28 @@ def _subclass(
 ) -> Any:
     """Return the subclass; its `deserialize` and `==` are of its own kind."""
     if "__slots__" in namespace:
-        fields = {field for base in bases for field in _field_names(base)}
-        namespace["__slots__"] = _without_fields(fields, namespace["__slots__"])
+        # fields have slots, which second ones would hide: dataclass(slots=True) asks for them
+        fields = {
+            name for base in bases for name in getattr(base, "__match_args__", ())
+        }
+        slots = namespace["__slots__"]
+        if isinstance(slots, dict):
+            slots = {name: doc for name, doc in slots.items() if name not in fields}
+        elif not isinstance(slots, str):
+            slots = tuple(name for name in slots if name not in fields)
+        namespace["__slots__"] = slots
         namespace.pop("__weakref__", None)  # dataclass() of Python 3.10 forgets it
     created: Any = type.__new__(metaclass, name, bases, namespace, **options)
     owner = metaclass._message
     if owner is not None:
         codec.extended(owner)
-        if created.__eq__ is owner.__eq__ and _holds_numbers(owner):
+        # a property may hold a `numpy.ndarray`, compared element by element
+        holders = (vars(owner)[name] for name in owner.__match_args__)
+        if created.__eq__ is owner.__eq__ and any(
+            isinstance(holder, property) for holder in holders
+        ):
             created.__eq__ = _equal
     return created
-
-
-def _field_names(kind: type) -> tuple[str, ...]:
-    return getattr(kind, "__match_args__", ())
-
-
-def _without_fields(fields: set[str], slots: Any) -> Any:
-    """Return slots without those of fields, which have theirs: a second one would hide them.
-
-    `dataclass(slots=True)` asks for them.
-    """
-    if isinstance(slots, str):
-        return slots
-    if isinstance(slots, dict):
-        return {name: doc for name, doc in slots.items() if name not in fields}
-    return tuple(name for name in slots if name not in fields)
-
-
-def _holds_numbers(owner: Any) -> bool:
-    """Return whether a field may hold a `numpy.ndarray`, compared element by element."""
-    return any(
-        isinstance(owner.__dict__[name], property) for name in _field_names(owner)
-    )
 
 
 def _equal(self: Any, other: Any) -> Any:
@@ -518,7 +502,7 @@ def _equal(self: Any, other: Any) -> Any:
     return owner.__eq__(self, other) and all(
         same(getattr(self, name), getattr(other, name))
         for name, field in kind.__dataclass_fields__.items()
-        if field.compare and name not in _field_names(owner)
+        if field.compare and name not in owner.__match_args__
     )
 
 
@@ -545,6 +529,8 @@ class _GroupMeta(InterfaceMeta):
     _interface: ClassVar[Any] = None
     #: The attribute that stands for what ROS 2 adds, in a class that is not itself part of it.
     _added: ClassVar[str]
+    #: The function of `typesupport` that sets its capsule.
+    _import: ClassVar[str]
 
     def __new__(
         cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any]
@@ -559,6 +545,13 @@ class _GroupMeta(InterfaceMeta):
             module.__getattr__ = _getter(created, f"{wire_name(name)}_")
         return created
 
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        """Set the capsule that rclpy reads from this metaclass."""
+        from . import typesupport
+
+        getattr(typesupport, cls._import)(cls._interface)
+
     def __call__(cls, *_values: object, **_named: object) -> Any:
         raise NotImplementedError(
             f"{cls.__name__} is a name for its messages, not a message"
@@ -569,26 +562,14 @@ class ServiceMeta(_GroupMeta):
     """The metaclass of services."""
 
     _added = "Event"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_service(cls._interface)
+    _import = "import_service"
 
 
 class ActionMeta(_GroupMeta):
     """The metaclass of actions."""
 
     _added = "Impl"
-
-    @classmethod
-    def __import_type_support__(cls) -> None:
-        """Set the capsule that rclpy reads from this metaclass."""
-        from . import typesupport
-
-        typesupport.import_action(cls._interface)
+    _import = "import_action"
 
 
 class Service(metaclass=ServiceMeta):

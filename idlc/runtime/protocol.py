@@ -18,7 +18,7 @@ from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
 from .message import Message, OnDemand, Service, define, equal, same
 from .names import importing, owner_of, public_name, wire_name
-from .sequences import ListOf, sequence_reader, sequence_writer
+from .sequences import ListOf, sequence_writer
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -401,14 +401,6 @@ def field_codecs(kind: type) -> codec.Codecs:
     structure = structure_of(owner)
 
     def make(_owner: Any, order: str, reading: codec.Reading) -> codec.Codec:
-        def numbers(message: Any, field: Any, raw: Any) -> Any:
-            if field.is_sequence:
-                reading_of = reading.of(type(message))
-                return sequence_reader(order, field.primitive.code, reading_of)(raw)
-            from .arrays import array_reader
-
-            return array_reader(order, field.primitive.name, field.size, reading)(raw)
-
         def encode(message: Any, join: Any) -> Any:
             writer = _Writer(order)
             writer.message(message, structure)
@@ -417,7 +409,7 @@ def field_codecs(kind: type) -> codec.Codecs:
         def decode(data: Any) -> Any:
             if not reading.copy:
                 data = memoryview(data)
-            return read_carefully(owner, data, codec.maker, numbers)
+            return read_carefully(owner, data, codec.maker, reading)
 
         return codec.Codec(encode, decode, bulk=True)
 
