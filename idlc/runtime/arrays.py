@@ -48,6 +48,9 @@ def converted(dtype: Any, size: int, values: Any) -> Any:
     raise ValueError(f"needs an array of {size} elements, not of shape {result.shape}")
 
 
+_DTYPES = [np.dtype(name.lower()) for name in NUMBERS]
+INT8, UINT8, INT16, UINT16, INT32, UINT32, INT64, UINT64, FLOAT32, FLOAT64 = _DTYPES
+
 zeros = np.zeros
 
 
@@ -82,8 +85,8 @@ if TYPE_CHECKING:
     Float32Array: TypeAlias = NumberArray[np.float32]
     Float64Array: TypeAlias = NumberArray[np.float64]
 else:
-    for _name, _code in NUMBERS.items():
-        _parts = {"code": _code, "dtype": np.dtype(_name.lower())}
+    for (_name, _code), _dtype in zip(NUMBERS.items(), _DTYPES, strict=True):
+        _parts = {"code": _code, "dtype": _dtype}
         globals()[f"{_name}Array"] = type(f"{_name}Array", (NumberArray,), _parts)
 
 

@@ -119,40 +119,31 @@ def _too_many(path: str, what: str, count: int, bound: int, value: object) -> No
 
 def _primitive(value: Any, primitive: Primitive, path: str) -> None:
     if primitive.code == "?":
-        number = isinstance(value, (int, float)) and value in (0, 1)
-        if not number and type(value).__name__ not in {"bool_", "bool"}:
-            raise ValidationError(path, primitive.allowed, value)
+        right = isinstance(value, (int, float)) and value in (0, 1)
+        right = right or type(value).__name__ in {"bool_", "bool"}
     elif primitive.code == "c":
-        if not isinstance(value, bytes) or len(value) != 1:
-            raise ValidationError(path, primitive.allowed, value)
-    elif primitive.code in "fd":
-        _float(value, primitive, path)
+        right = isinstance(value, bytes) and len(value) == 1
     else:
-        _integer(value, primitive, path)
-
-
-def _integer(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = value.__index__()
-    except (AttributeError, TypeError):
-        raise ValidationError(path, primitive.allowed, value) from None
-    assert primitive.low is not None
-    assert primitive.high is not None
-    if not primitive.low <= number <= primitive.high:
+        right = _is_in_range(value, primitive, path)
+    if not right:
         raise ValidationError(path, primitive.allowed, value)
 
 
-def _float(value: Any, primitive: Primitive, path: str) -> None:
-    try:
-        number = float(value) if not isinstance(value, (str, bytes)) else None
-    except (TypeError, ValueError, OverflowError):
-        number = None
-    if number is None:
-        raise ValidationError(path, f"a number ({primitive.name})", value)
-    if primitive.high is None or not math.isfinite(number):
-        return
-    if abs(number) > primitive.high:
-        raise ValidationError(path, primitive.allowed, value)
+def _is_in_range(value: Any, primitive: Primitive, path: str) -> bool:
+    if primitive.code not in "fd":
+        try:
+            number = value.__index__()
+        except (AttributeError, TypeError):
+            return False
+    else:
+        try:
+            number = float("" if isinstance(value, (str, bytes)) else value)
+        except (TypeError, ValueError, OverflowError):
+            allowed = f"a number ({primitive.name})"
+            raise ValidationError(path, allowed, value) from None
+        if not math.isfinite(number):
+            return True
+    return primitive.high is None or bool(primitive.low <= number <= primitive.high)
 
 
 def refused(message: Any, name: str, values: Any, error: Exception) -> ValidationError:
@@ -202,7 +193,7 @@ def construct(
     TypeError for an unknown keyword and for a first field of another type: ROS's tools try
     `type(field)(value)`, and go over the fields of a dictionary only after a TypeError.
     """
-    kind = type(message)
+    kind: Any = type(message)
     unknown = [name for name in options if name != "check_fields"]
     check = bool(options.get("check_fields"))
     fields = structure_of(kind).fields
@@ -214,11 +205,22 @@ def construct(
         )
         error = FieldNameError if check else FieldTypeError
         raise error("", "absent", options[unknown[0]], problem)
-    if check:
-        _assign(message, fields, arguments)
-    elif fields:
-        _check_first(owner_of(kind), fields[0], arguments[fields[0].public])
-    return check
+    owner: Any = owner_of(kind)
+    defaults = owner.__init__.__defaults__ or ()
+    if not check:
+        if fields:
+            _check_first(owner, fields[0], arguments[fields[0].public])
+        return False
+    default = owner(check_fields=False)
+    message.__class__ = checked_class(kind)
+    for field, without in zip(fields, defaults, strict=True):
+        value = arguments[field.public]
+        if value is None and without is None:
+            value = getattr(default, field.slot)
+        elif field.is_sequence and field.is_numeric:
+            value = array(field.primitive.code, value)  # type: ignore[union-attr]
+        setattr(message, field.public, value)
+    return True
 
 
 def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
@@ -231,22 +233,6 @@ def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
         check(value, field, field.public, wire_only=True)
     except ValidationError as error:
         raise error.at(error.path, FieldTypeError) from None
-
-
-def _assign(
-    message: Any, fields: tuple[FieldInfo, ...], arguments: dict[str, Any]
-) -> None:
-    kind: Any = type(message)
-    owner = owner_of(kind)
-    default = owner(check_fields=False)
-    message.__class__ = checked_class(kind)
-    for field, without in zip(fields, owner.__init__.__defaults__ or (), strict=True):
-        value = arguments[field.public]
-        if value is None and without is None:
-            value = getattr(default, field.slot)
-        elif field.is_sequence and field.is_numeric:
-            value = array(field.primitive.code, value)  # type: ignore[union-attr]
-        setattr(message, field.public, value)
 
 
 def become_checked(message: Any, check: bool) -> None:
@@ -370,19 +356,17 @@ def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -
 def _refusal_of_primitive(value: Any, primitive: Primitive, *, listed: bool) -> str:
     code = primitive.code
     if code == "?":
-        return "" if isinstance(value, bool) else primitive.allowed
-    if code == "c":
+        right = isinstance(value, bool)
+    elif code == "c":
         types: Any = bytes if listed else (bytes, bytearray)
         right = isinstance(value, types) and (listed or len(value) == 1)
-        return "" if right else primitive.allowed
-    if code in "fd":
+    elif code in "fd":
         if not isinstance(value, float):
             return f"a float ({primitive.name})"
-        far = code == "f" and abs(value) > _FLOAT32 and not math.isinf(value)
-        limited = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
-        return limited.allowed if far else ""
-    assert primitive.low is not None
-    assert primitive.high is not None
-    if isinstance(value, int) and primitive.low <= value <= primitive.high:
-        return ""
-    return primitive.allowed
+        right = code == "d" or not _FLOAT32 < abs(value) < math.inf
+        primitive = primitive._replace(low=-_FLOAT32, high=_FLOAT32)
+    else:
+        assert primitive.low is not None
+        assert primitive.high is not None
+        right = isinstance(value, int) and primitive.low <= value <= primitive.high
+    return "" if right else primitive.allowed
