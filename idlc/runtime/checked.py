@@ -94,22 +94,19 @@ def validate_element(
     path = path or field.public
     if field.nested:
         _message(value, field.nested, path, wire_only)
-    elif field.text:
-        _text(value, field, path, wire_only)
-    else:
-        assert field.primitive is not None
+    elif field.primitive is not None:
         _primitive(value, field.primitive, path)
-
-
-def _text(value: Any, field: FieldInfo, path: str, wire_only: bool) -> None:
-    if not isinstance(value, str):
+    elif not isinstance(value, str):
         raise ValidationError(path, "a str", value)
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        raise ValidationError(path, "a str without lone surrogates", value) from None
-    if not wire_only and field.text_bound is not None and len(value) > field.text_bound:
-        _too_many(path, "character", len(value), field.text_bound, value)
+    else:
+        try:
+            value.encode()
+        except UnicodeEncodeError:
+            allowed = "a str without lone surrogates"
+            raise ValidationError(path, allowed, value) from None
+        bound = None if wire_only else field.text_bound
+        if bound is not None and len(value) > bound:
+            _too_many(path, "character", len(value), bound, value)
 
 
 def _too_many(path: str, what: str, count: int, bound: int, value: object) -> None:
@@ -235,15 +232,6 @@ def _check_first(owner: Any, field: FieldInfo, value: Any) -> None:
         raise error.at(error.path, FieldTypeError) from None
 
 
-def become_checked(message: Any, check: bool) -> None:
-    """Let a message check its fields from now on, or no longer."""
-    kind: Any = type(message)
-    if check and not issubclass(kind, Checked):
-        message.__class__ = checked_class(kind)
-    elif not check and issubclass(kind, Checked):
-        message.__class__ = kind.__base__
-
-
 class Checked:
     """The base of the classes whose instances check their fields."""
 
@@ -304,9 +292,7 @@ def _numbers(value: Any, field: FieldInfo) -> Any:
         return value if isinstance(value, array) else array(field.primitive.code, value)
     import numpy as np
 
-    if isinstance(value, np.ndarray):
-        return value
-    return np.array(value, field.primitive.name)
+    return np.asanyarray(value, field.primitive.name)
 
 
 def _refusal(value: Any, field: FieldInfo) -> str:

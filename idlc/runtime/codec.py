@@ -15,7 +15,7 @@ from .names import DecodeError, ValidationError, owner_of
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
-    from functools import partial
+    from functools import partial as partial
     from typing import Any, TypeAlias
 
     from .conversions import Join
@@ -139,9 +139,14 @@ def functions(kind: type) -> Functions:
             if type(buffer) is bytes and buffer[1] == 1 and not buffer[0] and copy:
                 return decode(buffer)
             return read(codecs, buffer, copy)
-        except FAILURES as error:
-            failure = error
-        return recover(owner, buffer, failure)
+        except DecodeError:
+            raise
+        except FAILURES:
+            pass
+        # middlewares take some of what is not right
+        from .typeinfo import read_carefully
+
+        return read_carefully(owner, bytes(buffer), maker)
 
     base = owner.__mro__[1]
     serialize.__doc__ = base.serialize.__doc__
@@ -176,24 +181,6 @@ def deserialize(kind: Any, buffer: Any, *, copy: bool = True) -> Any:
     for slot in owner.__slots__:
         setattr(result, slot, getattr(message, slot))
     return result
-
-
-def extended(owner: Any) -> None:
-    """Let a generated class read messages of any class that extends it.
-
-    Until there is one, its `deserialize` is a static method, which is faster.
-    """
-    if "deserialize" not in owner._fields_and_field_types:
-        owner.deserialize = classmethod(deserialize)
-
-
-def recover(kind: type, buffer: Any, failure: Exception) -> Any:
-    """Return the message after all, if a middleware would; raise DecodeError otherwise."""
-    if isinstance(failure, DecodeError):
-        raise failure
-    from .typeinfo import read_carefully
-
-    return read_carefully(kind, bytes(buffer), maker)
 
 
 def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
@@ -303,10 +290,3 @@ def maker(kind: Any) -> Callable[[], Any]:
         return message
 
     return make
-
-
-def is_checked(kind: type) -> bool:
-    """Return whether the instances of a class check their fields."""
-    # only what has imported that module has such instances
-    module = f"{__package__}.checked"
-    return any(base.__module__ == module for base in kind.__mro__)

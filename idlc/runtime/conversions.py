@@ -83,25 +83,22 @@ def _from_dict(kind: Any, structure: Structure, values: Any, path: str) -> Any:
             hint = spelling_hint(str(key), list(fields))
             problem = f"{structure.name} has no such field{hint}"
             raise ValidationError(inner_path(path, key), "absent", value, problem)
-        made = _value(value, field, inner_path(path, field.public))
+        place = inner_path(path, field.public)
+        made = value
+        if not field.is_list:
+            made = _element(value, field, place)
+        elif not field.is_numeric:
+            if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
+                raise ValidationError(place, "a list", value)
+            made = [
+                _element(element, field, f"{place}[{index}]")
+                for index, element in enumerate(value)
+            ]
         try:
             setattr(message, field.public, made)
         except ValidationError as error:
             raise error.at(inner_path(path, error.path), ValidationError) from None
     return message
-
-
-def _value(value: Any, field: FieldInfo, path: str) -> Any:
-    if not field.is_list:
-        return _element(value, field, path)
-    if field.is_numeric:
-        return value
-    if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
-        raise ValidationError(path, "a list", value)
-    return [
-        _element(element, field, f"{path}[{index}]")
-        for index, element in enumerate(value)
-    ]
 
 
 def _element(value: Any, field: FieldInfo, path: str) -> Any:

@@ -16,7 +16,7 @@ from types import FunctionType
 
 from . import codec
 from .cdr import HEADERS, TRUTHS, counter, flags, listed, octets, wide_text
-from .message import Message, OnDemand, Service, define, equal, same
+from .message import Message, OnDemand, Service, define, equal
 from .names import importing, owner_of, public_name, wire_name
 from .sequences import ListOf, sequence_writer
 
@@ -76,8 +76,7 @@ def import_goal_status(_impl: type) -> Any:
         return __import__("action_msgs.msg", fromlist=["msg"]).GoalStatusArray
 
 
-# What the composed messages are made of: their fields as type checkers see them, constructors
-# and docstrings
+# the fields of composed messages, as type checkers see them, constructors and docstrings
 
 
 @define
@@ -200,7 +199,9 @@ def event_of(service: Any) -> Any:
         if "Event" not in vars(service):
             composition = _Composition(service, service.Request)
             call = f"a call of {composition.name}"
-            service.Event = composition.add_event(composition.name, call)
+            service.Event = composition.add_message(
+                f"{composition.name}_Event", ServiceEvent, call
+            )
     return service.Event
 
 
@@ -229,16 +230,17 @@ class _Composition:
         self.added: dict[str, Any] = {}
 
     def add_impl(self) -> Any:
-        """Add all that an action gets."""
         goal = f"a {self.name} goal"
         sending, getting = f"{self.name}_SendGoal", f"{self.name}_GetResult"
         feedback = f"{self.name}_FeedbackMessage"
         self.add_message(f"{sending}_Request", SendGoalRequest, goal)
         self.add_message(f"{sending}_Response", SendGoalResponse, goal)
-        self.add_event(sending, f"a call that starts {goal}")
+        self.add_message(f"{sending}_Event", ServiceEvent, f"a call that starts {goal}")
         self.add_message(f"{getting}_Request", GetResultRequest, goal)
         self.add_message(f"{getting}_Response", GetResultResponse, goal)
-        self.add_event(getting, "a call that waits for a result")
+        self.add_message(
+            f"{getting}_Event", ServiceEvent, "a call that waits for a result"
+        )
         parts = {
             "FeedbackMessage": self.add_message(feedback, FeedbackMessage, goal),
             "SendGoalService": self.add_service(sending, f"Starts {goal}"),
@@ -259,14 +261,9 @@ class _Composition:
             type(Service), name, Service, f"{purpose}. Added by ROS 2.", parts
         )
 
-    def add_event(self, service: str, call: str) -> Any:
-        """Add the event of a service."""
-        return self.add_message(f"{service}_Event", ServiceEvent, call)
-
     def add(
         self, make: Any, name: str, base: type, doc: str, parts: dict[str, Any]
     ) -> Any:
-        """Add a class."""
         name = public_name(name)
         place = {"__module__": self.module, "__qualname__": name, "__doc__": doc}
         self.scope[name] = self.added[name] = made = make(name, (base,), place | parts)
@@ -281,7 +278,7 @@ class _Composition:
             "__match_args__": tuple(hints),
             "__annotations__": hints,
             "__init__": self.constructor(shape.__init__, name, hints),
-            "__eq__": _equal,
+            "__eq__": equal,
             "_fill": _fill,
             "_usual": type(defaults[0]),
             "_makers": {
@@ -317,7 +314,6 @@ class _Composition:
         return bound
 
     def hint(self, field: FieldInfo) -> str:
-        """Return the annotation of a field."""
         if field.nested is None:
             return _plain(field).__name__
         kind, _, short = field.nested.name.rpartition("/")
@@ -331,7 +327,6 @@ class _Composition:
         return hint
 
     def maker(self, field: FieldInfo) -> Callable[[], Any]:
-        """Return a function that makes the default of a field."""
         if field.is_list:
             return list
         if field.nested is None:
@@ -366,17 +361,7 @@ def _fill(self: Any, options: Any, *values: Any) -> None:
         setattr(self, name, make() if value is None else value)
 
 
-def _equal(self: Any, other: Any) -> Any:
-    owner = owner_of(type(self))
-    if not isinstance(other, owner):
-        return equal(self, other)
-    return all(
-        same(getattr(self, slot), getattr(other, slot)) for slot in owner.__slots__
-    )
-
-
 def _plain(field: FieldInfo) -> type:
-    """Return the Python type of a field of numbers."""
     return bool if _spell(field) == "bool" else int
 
 
@@ -431,7 +416,6 @@ class _Writer:
         self.at += padding + len(raw)
 
     def message(self, message: Any, structure: Structure) -> None:
-        """Write a structure."""
         if not structure.fields:
             self.put(b"\0", 1)
         for field in structure.fields:
@@ -463,7 +447,6 @@ class _Writer:
             self.put(raw, primitive.size)
 
     def element(self, value: Any, field: FieldInfo) -> None:
-        """Write one value."""
         if field.nested:
             self.message(value, field.nested)
         elif field.primitive is not None:
