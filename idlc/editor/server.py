@@ -80,7 +80,9 @@ METHODS = {
     "textDocument/foldingRange": Method("structure", "folds", "DocumentParams"),
     "textDocument/selectionRange": Method("structure", "selections", "PositionsParams"),
     "textDocument/documentLink": Method("structure", "links", "DocumentParams"),
-    "workspace/textDocumentContent": Method("navigation", "built_in_text", "TextDocumentContentParams"),
+    "workspace/textDocumentContent": Method(
+        "navigation", "built_in_text", "TextDocumentContentParams"
+    ),
     "textDocument/formatting": Method("formatting", "document", "DocumentParams"),
     "textDocument/rangeFormatting": Method("formatting", "part", "RangeParams"),
     "textDocument/onTypeFormatting": Method("formatting", "typed", "PositionParams"),
