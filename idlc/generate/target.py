@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -204,6 +205,8 @@ def folder_targets(
 
 
 _PACKAGE = Path(__file__).parents[1]
+#: The folder of a generated package that holds its copy of the runtime.
+_COPY = "_idlc/"
 #: The sources of idlc that affect the output: a change counts although the version stays.
 _ROOMS = ("check", "diagnostics", "generate", "language", "model", "runtime", "wire")
 _MAKERS = (
@@ -235,6 +238,7 @@ def unchanged(
         and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
+        and _carries_this_runtime(lock)
         and not _idlc_is_newer(out / FILE)
         and all(_dependency(name, library) == old for name, old in lock.dependencies.items())
     )
@@ -269,9 +273,31 @@ def _has(content: bytes, expected: str, path: str) -> bool:
         return True
     if digest(content) != expected:
         return False
-    if "_idlc/" in path and len(_support) < _MOST:
+    if _COPY in path and len(_support) < _MOST:
         _support[expected] = content
     return True
+
+
+def _carries_this_runtime(lock: Lock) -> bool:
+    """Return whether the copy of the runtime is this idlc's, or there is none.
+
+    Its version does not say so: those of two builds between two releases are equal.
+    """
+    copy = {
+        path.rpartition(_COPY)[2]: content
+        for path, content in lock.outputs.items()
+        if f"/{_COPY}" in f"/{path}"
+    }
+    return not copy or copy == _runtime()
+
+
+@lru_cache(maxsize=1)
+def _runtime() -> dict[str, str]:
+    runtime = _PACKAGE / "runtime"
+    return {
+        path.relative_to(runtime).as_posix(): digest(path.read_bytes())
+        for path in runtime.rglob("*.py")
+    }
 
 
 def _idlc_is_newer(path: Path) -> bool:
@@ -321,6 +347,12 @@ class Target:
         """Return the folder of another package next to this one."""
         name = (Path(self.name).parent / package).as_posix()
         return Target(name, package, self._root, self.report, force=self._force)
+
+    def locks_beside(self) -> dict[str, Lock]:
+        """Return the locks of the packages in the folder that this one is in, by their folders."""
+        folders = sorted(path.parent for path in self.path.parent.glob(f"*/{FILE}"))
+        locks = ((folder.name, load_lock(folder, "", Report())) for folder in folders)
+        return {name: lock for name, lock in locks if lock}
 
     @cached_property
     def lock(self) -> Lock | None:
@@ -392,6 +424,15 @@ class Target:
 
         return write.apply(changes, self.name, self.report, render)
 
+    def remove(self, changes: Plan) -> bool:
+        """Remove planned files and the lock; report IDL612 and return `False` otherwise."""
+        lock = Change(FILE, changes.recorded, None)
+        whole = Plan(self.path, (*changes.changes, lock), {})
+        is_done = write.apply(whole, self.name, self.report)
+        with suppress(OSError):  # other files stay
+            self.path.rmdir()
+        return is_done
+
     def drift(self, changes: Plan, record: Lock, again: str) -> None:
         """Report IDL616 for each file that is not what the command `again` would write."""
         hint = f"run `{again}`"
@@ -433,6 +474,13 @@ class Target:
         return ""
 
 
+_MODES: dict[Vendoring, str] = {
+    "": "without `--vendor-deps`",
+    "private": "with `--vendor-deps`",
+    "beside": "with `--vendor-deps=beside`",
+}
+
+
 def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
     """Return the differences between the last run and one now; empty without any."""
     pairs = [(old.inputs, new.inputs)]
@@ -445,8 +493,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append("it was written for another distribution of ROS 2")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
-    if (old.vendor_deps, bool(old.vendored)) != (new.vendor_deps, bool(new.vendored)):
-        reasons.append("`--vendor-deps` was another")
+    if old.vendoring != new.vendoring:
+        reasons.append(f"it was written {_MODES[old.vendoring]}")
     for before, after in pairs:
         reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
         reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]

@@ -240,9 +240,8 @@ def apply(plan: Plan, name: str, report: Report, render: Render | None = None) -
             if not changes:
                 with contextlib.suppress(OSError):  # a package that cannot be written may be right
                     os.utime(plan.out / plan.record)
-        if is_locked:
-            sweep(home)
-        elif os.path.lexists(home / STAGE):
+        sweep(home)
+        if not is_locked and os.path.lexists(home / STAGE):
             path = shown(name, (home / STAGE).relative_to(plan.out).as_posix())
             message = f"`{path}` is another run's, and this file system locks no folders"
             hint = "wait for that run, or remove the folder if none is running"
@@ -267,9 +266,10 @@ def _recorded(changes: list[Change], plan: Plan, render: Render) -> list[Change]
 
 
 def sweep(folder: Path) -> None:
-    """Remove the drafts that killed runs left in a folder."""
-    for stage in _stages(folder):
-        _remove(stage)
+    """Remove the drafts that killed runs left in a folder, if no other run can be at work."""
+    with exclusive(folder) as is_locked:
+        for stage in _stages(folder) if is_locked else ():
+            _remove(stage)
 
 
 def _remove(stage: Path) -> None:
