@@ -52,7 +52,8 @@ def _compiled(package: str) -> type:
     if not inputs:
         return distribution_class(package, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
-    gen(GenOptions((".",), where, home, vendor_deps=settings.vendor_deps), report)
+    runtime, vendor = settings.runtime, settings.vendor_deps
+    done = gen(GenOptions((".",), where, home, runtime=runtime, vendor_deps=vendor), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)
@@ -62,6 +63,8 @@ def _compiled(package: str) -> type:
     files = shared(model, manifest, libraries, report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
-    parts = {*support_packages(), *(key.partition("/")[0] for key in inputs[0].digests)}
+    parts = {key.partition("/")[0] for key in inputs[0].digests}
+    if done[0].runtime == "carried":
+        parts.update(support_packages())
     generated = (package, *(f"{package}.{part}" for part in parts))
     return distribution_class(package, files, generated, libraries.build_tag)

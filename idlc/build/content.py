@@ -67,7 +67,7 @@ def compiled(name: str, classes: Path, options: Options, report: Report) -> Cont
         return None
     _refuse_code(name, root, report)
     generated = Report()
-    gen(GenOptions((".",), where, str(classes)), generated)
+    gen(GenOptions((".",), where, str(classes), runtime=config.runtime), generated)
     # the environment of a build need not be able to import the package
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     report.extend(each for each in generated if each.code != unimportable)

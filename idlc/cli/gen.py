@@ -93,7 +93,8 @@ def _line(package: Generated, check: bool) -> str:
     needs = "" if check or not package.needs else f"; imports {', '.join(package.needs)}"
     return (
         f"{package.package}: {counted(package.interfaces, 'interface')} → "
-        f"{counted(package.files, 'file')} in {one_line(package.out)}{note}{needs}\n"
+        f"{counted(package.files, 'file')} in {one_line(package.out)}, "
+        f"runtime {package.runtime}{note}{needs}\n"
     )
 
 
@@ -181,6 +182,11 @@ All options can be kept in pyproject.toml:
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
 @click.option(
     "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
+)
+@click.option(
+    "--runtime",
+    type=click.Choice(["carried", "installed"]),
+    help="Have a copy of the runtime in OUT, or import idlc-runtime. As before, at first carried.",
 )
 @click.option("--force", is_flag=True, help="Replace edited and foreign files, keeping copies.")
 @options.report_style

@@ -42,7 +42,7 @@ class GenOptions(NamedTuple):
     """The arguments of `idlc gen`, which writes to `out`, into the prefix `ament`, or both.
 
     Types of `topics` of recordings are written; none means all. `again` is the command for hints
-    that writes the files which `check` compares.
+    that writes the files which `check` compares. Without `runtime`, each package keeps its own.
     """
 
     paths: tuple[str, ...]
@@ -50,6 +50,7 @@ class GenOptions(NamedTuple):
     out: str = ""
     topics: tuple[str, ...] = ()
     check: bool = False
+    runtime: lock.Runtime | None = None
     vendor_deps: bool = False
     force: bool = False
     ament: str = ""
@@ -61,6 +62,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
     return options._replace(
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
+        runtime=options.runtime or settings.runtime,
         vendor_deps=options.vendor_deps or settings.vendor_deps,
     )
 
@@ -149,7 +151,12 @@ def _targets(
     """Return the folder that each package is written to."""
     if not options.ament:
         return folder_targets(
-            packages, options.out, options.scope.root, report, force=options.force
+            packages,
+            options.out,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
         )
     from idlc.generate.prefix import Overlay  # imported only where one is written
 
@@ -161,7 +168,14 @@ def _targets(
     distros = [distro.name for distro in options.scope.distros]
     overlays = [
         Overlay(
-            prefix, name, home, options.scope.root, report, force=options.force, distros=distros
+            prefix,
+            name,
+            home,
+            options.scope.root,
+            report,
+            force=options.force,
+            runtime=options.runtime,
+            distros=distros,
         )
         for name, home in homes
     ]

@@ -55,7 +55,7 @@ def package_of(
 
     `vendored` are the packages that are written because of it, with --vendor-deps.
     """
-    from idlc.generate.python.render import render_package
+    from idlc.generate.python.render import installed_runtime, render_package
     from idlc.project import templates
     from idlc.wire.layout import oversized
 
@@ -64,8 +64,9 @@ def package_of(
         target.report.extend(refused)
         return None
     templates.keep_compiled()
+    runtime = installed_runtime(model.package) if target.runtime == "installed" else None
     with stage("render", model.package):
-        modules = {file.path: file.text for file in render_package(model)}
+        modules = {file.path: file.text for file in render_package(model, runtime=runtime)}
         files = _with_surroundings(model, modules, target)
     plan = target.plan(files, check=check)
     if plan is None:
@@ -81,6 +82,7 @@ def package_of(
         lock.Lock(
             idlc=__version__,
             package=model.package,
+            runtime=target.runtime,
             vendor_deps=vendored is not None,
             converts_values=model.distro.converts_values or UNSET,
             vendored=tuple(vendored or ()),
@@ -197,6 +199,7 @@ class Generated(NamedTuple):
     out: str
     interfaces: int
     files: int
+    runtime: lock.Runtime
     written: int = 0
     removed: int = 0
     needs: tuple[str, ...] = ()
@@ -207,8 +210,12 @@ def generated(package: Package) -> Generated:
     removed = sum(change.new is None for change in package.plan.changes)
     written = len(package.plan.changes) - removed
     target = package.target
-    files = len(package.plan.outputs)
-    return Generated(target.package, target.name, len(package.lock.inputs), files, written, removed)
+    return _outcome(target, package.lock)._replace(written=written, removed=removed)
+
+
+def _outcome(target: Target, record: lock.Lock) -> Generated:
+    counts = len(record.inputs), len(record.outputs)
+    return Generated(target.package, target.name, *counts, record.runtime)
 
 
 def up_to_date(
@@ -223,11 +230,7 @@ def up_to_date(
         names = library.interfaces(package)
         if not folders[-1].unchanged(as_inputs(names, library), library):
             return ()
-    return tuple(
-        Generated(folder.package, folder.name, len(folder.lock.inputs), len(folder.lock.outputs))
-        for folder in folders
-        if folder.lock
-    )
+    return tuple(_outcome(folder, folder.lock) for folder in folders if folder.lock)
 
 
 def with_needs(

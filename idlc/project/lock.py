@@ -11,7 +11,7 @@ import re
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
@@ -116,6 +116,10 @@ class _Header(msgspec.Struct):
     idlc: str
 
 
+#: How a package has its runtime: as a copy of its own, or from the distribution idlc-runtime.
+Runtime: TypeAlias = Literal["carried", "installed"]
+
+
 class Lock(msgspec.Struct, frozen=True, kw_only=True):
     """The record of one generated package.
 
@@ -129,6 +133,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     format: int = FORMAT
     idlc: str
     package: str
+    runtime: Runtime = "carried"
     vendor_deps: bool = False
     converts_values: bool | msgspec.UnsetType = msgspec.UNSET
     vendored: tuple[str, ...] = ()

@@ -23,6 +23,7 @@ from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, listed, unknown_distro
 from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
+from idlc.project.lock import Runtime
 from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
 Switch = Annotated[bool, Meta(title="true or false")]
+Mode = Annotated[Runtime | None, Meta(title="`carried` or `installed`")]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 
@@ -133,6 +135,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     exclude: Texts = ()
     out: Text = ""
     package: Text = ""
+    runtime: Mode = None
     vendor_deps: Switch = False
     distro: TextOrTexts = ()
     templates: Text = ""
@@ -153,6 +156,7 @@ class Config(msgspec.Struct, frozen=True):
     package: str | None = None
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
+    runtime: Runtime | None = None
     vendor_deps: bool = False
     distro: tuple[str, ...] = ()
     templates: str | None = None
@@ -230,6 +234,7 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
         package=settings.package or None,
         include=tuple(_typed(folder, path, root) for path in settings.include),
         exclude=settings.exclude,
+        runtime=settings.runtime,
         vendor_deps=settings.vendor_deps,
         distro=_distros(settings.distro, place, report),
         templates=_typed(folder, settings.templates, root) if settings.templates else None,

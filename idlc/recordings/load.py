@@ -338,11 +338,10 @@ def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     """Yield the files of packages, which share the support code of this idlc."""
     from idlc.generate.python.render import render_package
 
+    runtime = (RenderedFile("_idlc.py", SUPPORT),)
     for package, model in models.items():
-        yield RenderedFile(f"{package}/_idlc.py", SUPPORT)
-        for file in render_package(model, parent):
-            if not file.path.startswith("_idlc/"):
-                yield RenderedFile(f"{package}/{file.path}", file.text)
+        for file in render_package(model, parent, runtime):
+            yield RenderedFile(f"{package}/{file.path}", file.text)
 
 
 def _key(texts: Iterable[str], *, converts: bool) -> str:

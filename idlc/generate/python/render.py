@@ -27,6 +27,8 @@ from idlc.model.describe import IndividualDict
 from idlc.model.names import snake_case
 from idlc.project.templates import Code, RenderedFile, Text
 from idlc.project.templates import code as code_environment
+from idlc.runtime import PROTOCOL
+from idlc.version import RUNTIME, __version__
 from idlc.wire import plan
 
 
@@ -306,7 +308,7 @@ def _template(name: str) -> jinja2.Template:
 
 
 @cache
-def runtime_files() -> tuple[RenderedFile, ...]:
+def carried_runtime() -> tuple[RenderedFile, ...]:
     """Return the support package, a verbatim copy of idlc.runtime."""
     runtime = PACKAGE / "runtime"
     return tuple(
@@ -317,9 +319,19 @@ def runtime_files() -> tuple[RenderedFile, ...]:
     )
 
 
+def installed_runtime(package: str) -> tuple[RenderedFile]:
+    """Return the module that takes the runtime from the distribution idlc-runtime."""
+    template = _template("message/runtime.py.jinja")
+    required, version = Code(RUNTIME), Code(__version__)
+    text = template.render(
+        package=Code(package), required=required, version=version, protocol=PROTOCOL
+    )
+    return (RenderedFile("_idlc.py", text),)
+
+
 def support_packages() -> list[str]:
-    """Return the Python packages that the support package consists of, itself first."""
-    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in runtime_files()})
+    """Return the Python packages that a copy of the runtime consists of, itself first."""
+    return sorted({file.path.rpartition("/")[0].replace("/", ".") for file in carried_runtime()})
 
 
 def module_files(
@@ -332,10 +344,13 @@ def module_files(
         yield RenderedFile(module.path, template.render(module=module.view))
 
 
-def render_package(model: link.Model, parent: str = "") -> tuple[RenderedFile, ...]:
+def render_package(
+    model: link.Model, parent: str = "", runtime: Iterable[RenderedFile] | None = None
+) -> tuple[RenderedFile, ...]:
     """Return all files of a generated package but its lock, sorted by path.
 
-    Other packages are imported from the Python package `parent`, if that is not empty.
+    Other packages are imported from the Python package `parent`, if that is not empty. `runtime`
+    are the files of its `_idlc`, by default a copy of the runtime.
     The model must be without errors: no `Unknown` type, no missing one.
     """
     modules = python_names.modules(interface.name for interface in model.own)
@@ -348,4 +363,5 @@ def render_package(model: link.Model, parent: str = "") -> tuple[RenderedFile, .
     # a package without it would lose to any other of its name, wherever that stands on the path
     files.append(RenderedFile("__init__.py", f'"""The interfaces of {model.package}."""\n'))
     files.append(RenderedFile("py.typed", ""))
-    return tuple(sorted((*files, *runtime_files()), key=lambda file: file.path))
+    files += carried_runtime() if runtime is None else runtime
+    return tuple(sorted(files, key=lambda file: file.path))
