@@ -142,6 +142,9 @@ site: $(SITE_ENV)/installed ## write the documentation site into build/site
 release-check: $(RELEASE_ENV)/installed ## rehearse a release: archives, metadata, workflows
 	$(RELEASE_ENV)/bin/python -m maintenance.release check $(ARGS)
 
+runtime-wheel: $(TEST_ENV)/installed ## build idlc-runtime, what --runtime installed imports, into dist/
+	$(TEST_ENV)/bin/python -m build --outdir dist maintenance/runtime
+
 lock: ## choose the versions for CI again, and write down their hashes
 	@$(PYTHON) -m venv $(LOCK_ENV)
 	@$(LOCK_ENV)/bin/python $(PIP_INSTALL) 'uv>=0.8'

@@ -6,22 +6,36 @@ from idlc.version import __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from idlc.recordings.batches import Batch, delimited, split_delimited, split_mcap_chunk
     from idlc.recordings.load import load
     from idlc.recordings.recording import Recording
 
-__all__ = ["Recording", "__version__", "load"]
+__all__ = [
+    "Batch",
+    "Recording",
+    "__version__",
+    "delimited",
+    "load",
+    "split_delimited",
+    "split_mcap_chunk",
+]
+
+#: What programs use, and the modules that are imported when they ask for it.
+_MODULES = {
+    "Batch": "batches",
+    "Recording": "recording",
+    "delimited": "batches",
+    "load": "load",
+    "split_delimited": "batches",
+    "split_mcap_chunk": "batches",
+}
 
 
 def __getattr__(name: str) -> object:
-    """Import what programs use when they ask for it."""
-    if name == "Recording":
-        from idlc.recordings.recording import Recording
-
-        return Recording
-    if name == "load":
-        from idlc.recordings.load import load
-
-        return load
+    """Import what a program asks for."""
+    if name in _MODULES:
+        module = __import__(f"idlc.recordings.{_MODULES[name]}", fromlist=[name])
+        return getattr(module, name)
     raise AttributeError(f"module 'idlc' has no attribute {name!r}")
 
 

@@ -42,7 +42,7 @@ class Content(NamedTuple):
     libraries: Libraries
 
 
-def compiled(name: str, classes: Path, options: Options, report: Report) -> Content | None:
+def compile_package(name: str, classes: Path, options: Options, report: Report) -> Content | None:
     """Compile the package in the working folder, its classes into a folder of their own.
 
     Returns `None` after a problem.

@@ -110,14 +110,14 @@ def sdist(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 
 def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | None:
     """Compile the package in the working folder into a wheel."""
-    from idlc.build.content import compiled
+    from idlc.build.content import compile_package
 
     declared, options = _declared(report), _options(settings, report)
     if declared is None or report.had_errors:
         return None
     name, project = declared
     with tempfile.TemporaryDirectory(prefix="idlc-") as folder:
-        content = compiled(name, Path(folder) / "classes" / name, options, report)
+        content = compile_package(name, Path(folder) / "classes" / name, options, report)
         if content is None:
             return None
         return _packed(name, project, content, Path(folder) / "prefix", directory, report)
@@ -126,7 +126,7 @@ def wheel(directory: str, settings: Mapping[str, Any], report: Report) -> str | 
 def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     """Return the package's name and its `[project]` table; `None` after a problem."""
     from idlc.build import manifest
-    from idlc.build.manifest import completed
+    from idlc.build.manifest import complete_table
 
     config = load_settings(Root.here(), report)
     if not Path(MANIFEST).is_file():
@@ -136,7 +136,7 @@ def _declared(report: Report) -> tuple[str, dict[str, Any]] | None:
     if report.had_errors:
         return None
     declared = manifest.project(config.runtime, report)
-    project = completed(declared, report) if declared else {}
+    project = complete_table(declared, report) if declared else {}
     if config.runtime == "installed" and not names_runtime(project.get("dependencies", ())):
         message = "the classes import `idlc_runtime`, which [project] does not require"
         hint = f'add "{RUNTIME}" to `dependencies`'

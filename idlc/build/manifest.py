@@ -115,7 +115,7 @@ else:
     import tomli as tomllib
 
 
-def completed(declared: dict[str, Any], report: Report) -> dict[str, Any]:
+def complete_table(declared: dict[str, Any], report: Report) -> dict[str, Any]:
     """Return the table with what package.xml declares in place of what is absent or dynamic.
 
     Without a table all of it is taken. With one, as the standard demands, only the fields that

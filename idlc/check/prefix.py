@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from idlc.check.compiler import models_of, stage
-from idlc.check.run import Checked
+from idlc.check.run import CheckResult
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, first_few
 from idlc.generate.native.inspect import Inspected, inspect
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _AGAIN = "build the package again, with idlc installed, or run `idlc gen SOURCES --ament PREFIX`"
 
 
-def check_prefix(folder: str, root: Root, report: Report) -> Checked:
+def check_prefix(folder: str, root: Root, report: Report) -> CheckResult:
     """Report each package in a prefix, or in the prefixes in a folder, that stops recorders."""
     folders = prefixes(root.absolute(folder))
     if not folders:
@@ -68,7 +68,7 @@ def check_prefix(folder: str, root: Root, report: Report) -> Checked:
         message = f"no package with interfaces is registered in `{folder}`"
         hint = "build one with idlc, or name the prefix in which it is installed"
         report.add(codes.NO_SUCH_PATH.of(folder, message, hint=hint))
-    return Checked(tuple(files), len(files))
+    return CheckResult(tuple(files), len(files))
 
 
 def _model(package: InstalledPackage) -> Model | None:

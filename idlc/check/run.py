@@ -35,7 +35,7 @@ class CheckOptions(msgspec.Struct, frozen=True):
     fix: bool = False
 
 
-class Checked(msgspec.Struct, frozen=True):
+class CheckResult(msgspec.Struct, frozen=True):
     """The checked files and packages, and the number of edits that were made.
 
     `distros` are the distributions that they were checked for, if there are several.
@@ -47,7 +47,7 @@ class Checked(msgspec.Struct, frozen=True):
     distros: tuple[str, ...] = ()
 
 
-def check(options: CheckOptions, report: Report) -> Checked:
+def check(options: CheckOptions, report: Report) -> CheckResult:
     """Report the problems of the files in paths, and of their packages.
 
     With `fix`, problems with a harmless edit are fixed, and the others reported.
@@ -67,7 +67,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
             break
         from idlc.project.atomic import edit
 
-        done = edit(edits, options.scope.root, report, tidied)
+        done = edit(edits, options.scope.root, report, keep_layout)
         fixed += done
         if not done:
             break
@@ -78,7 +78,7 @@ def check(options: CheckOptions, report: Report) -> Checked:
 
 def _with_recordings(
     recordings: Sequence[str], others: Sequence[str], options: CheckOptions, report: Report
-) -> Checked:
+) -> CheckResult:
     """Report the problems of recordings, and of other paths if there are any."""
     from idlc.recordings.packages import check_recordings
 
@@ -86,18 +86,18 @@ def _with_recordings(
     check_recordings(recordings, options.scope, problems)
     report.extend(problem for problem in problems if options.selection.wants(problem))
     report.notes += problems.notes
-    checked = Checked(())
+    checked = CheckResult(())
     if others:
         checked = check(msgspec.structs.replace(options, paths=tuple(others)), report)
     return msgspec.structs.replace(checked, files=(*recordings, *checked.files))
 
 
-def tidied(name: str, old: str, new: str) -> str:
+def keep_layout(name: str, old: str, new: str) -> str:
     """Return an edited file in its old layout: `idlc fmt`'s, or without long lines."""
     if name.endswith("setup.py"):
-        from idlc.check.package.setup_edits import wrapped
+        from idlc.check.package.setup_edits import wrap_lines
 
-        return wrapped(old, new)
+        return wrap_lines(old, new)
     from idlc.diagnostics.source import Source
     from idlc.language.format import format_file
     from idlc.language.parse import parse
@@ -108,7 +108,7 @@ def tidied(name: str, old: str, new: str) -> str:
     return format_file(parse(Source(name, new)))
 
 
-def _check_once(options: CheckOptions, report: Report) -> tuple[Checked, list[Diagnostic]]:
+def _check_once(options: CheckOptions, report: Report) -> tuple[CheckResult, list[Diagnostic]]:
     scope = options.scope
     root = scope.root
     listing = list_files(options.paths, root, report, scope.exclude)
@@ -123,8 +123,8 @@ def _check_once(options: CheckOptions, report: Report) -> tuple[Checked, list[Di
         models += checker.check(packages, options.selection, reports[distro])
     files = tuple(file.shown for file in listing.files)
     distros = tuple(reports) if len(reports) > 1 else ()
-    checked = Checked(files, len(packages), distros=distros)
-    return checked, judged(reports, models, options.selection)
+    checked = CheckResult(files, len(packages), distros=distros)
+    return checked, select_problems(reports, models, options.selection)
 
 
 def checkers(
@@ -199,7 +199,7 @@ class Checker:
         return msgspec.structs.replace(current, inputs=package.digests)
 
 
-def judged(
+def select_problems(
     reports: Mapping[str, Report], models: Iterable[Model], selection: Selection
 ) -> list[Diagnostic]:
     """Return the problems to show from the reports of all distributions, each once."""
@@ -213,9 +213,9 @@ def judged(
     if len(reports) == 1:
         (everything,) = reports.values()
         return _selected(everything, sources, selection)
-    from idlc.diagnostics.report import merged, without_overruled
+    from idlc.diagnostics.report import merge, without_overruled
 
-    return list(without_overruled(_selected(merged(reports), sources, selection)))
+    return list(without_overruled(_selected(merge(reports), sources, selection)))
 
 
 def _selected(report: Report, sources: Sequence[Source], selection: Selection) -> list[Diagnostic]:

@@ -114,7 +114,7 @@ def _show(
     verdict: Verdict | GraphVerdict | RecordedVerdict | None,
     typed: BreakingArguments,
 ) -> None:
-    from idlc.check.run import Checked
+    from idlc.check.run import CheckResult
     from idlc.cli import output
     from idlc.diagnostics.formats import notice
 
@@ -130,7 +130,7 @@ def _show(
         if verdict:
             sys.stdout.write(f"{_summary(verdict, typed.levels)}\n")
     else:
-        output.write_report(report, style, Checked(()), sys.stdout, command="breaking")
+        output.write_report(report, style, CheckResult(()), sys.stdout, command="breaking")
         if style == "github" and verdict:
             sys.stdout.write(notice("idlc breaking", _summary(verdict, typed.levels)))
 
@@ -166,7 +166,7 @@ def _seen(verdict: GraphVerdict | RecordedVerdict) -> str:
     if silent := facts.get("silent"):
         text += f"; without type hash: {silent}"
     if others := facts.get("others"):
-        text += f"; {counted(others, 'change')} that no reader sees, which --level tells"
+        text += f"; {counted(others, 'change')} that no reader sees; --level shows them"
     return text
 
 

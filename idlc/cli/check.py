@@ -58,7 +58,7 @@ def command(
     PATH is a folder of packages, a package folder, a folder of interface files, or a .msg, .srv
     or .action file; without it, `paths` in pyproject.toml, or the working folder.
 
-    For several distributions, each problem is told once, with those for which it holds.
+    For several distributions, each problem is reported once, with those for which it holds.
 
     Categories of rules are correctness, portability, style and package; `idlc explain` knows each.
     """

@@ -76,12 +76,12 @@ def command(subject: str, fields: str | None, **arguments: Any) -> int:
     from idlc.diagnostics.report import Report
     from idlc.project.root import Root
     from idlc.recordings.export import ColumnsOptions, columns
-    from idlc.recordings.find import expanded, split_recordings
+    from idlc.recordings.find import expand, split_recordings
 
     report = Report()
     names = None if fields is None else tuple(name.strip() for name in fields.split(","))
     recordings, topics = split_recordings(arguments.pop("topics"), Root.here())
-    paths = (*expanded(subject), *recordings)
+    paths = (*expand(subject), *recordings)
     request = ColumnsOptions(paths or (subject,), tuple(topics), fields=names, **arguments)
     with progress_bar(sys.stderr) as update:
         written = columns(request, report, update)

@@ -24,7 +24,7 @@ class CheckArguments(NamedTuple):
 
 def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None) -> int:
     """Check paths, or those in pyproject.toml, or the working folder; return the exit status."""
-    from idlc.check.run import Checked, CheckOptions, check
+    from idlc.check.run import CheckOptions, CheckResult, check
     from idlc.check.select import selection
     from idlc.cli import output
     from idlc.diagnostics.report import Report
@@ -36,7 +36,7 @@ def check_paths(paths: tuple[str, ...], arguments: CheckArguments | None = None)
     settings = load_settings(Root.here(), report)
     configured = selection(settings, report)
     chosen = configured.with_lists(arguments.select, arguments.ignore)
-    checked = Checked(())
+    checked = CheckResult(())
     if arguments.prefix is not None:
         from idlc.check.prefix import check_prefix
 

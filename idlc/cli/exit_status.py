@@ -54,9 +54,13 @@ def status_of(command: Callable[[], object]) -> int:
     """Carry a command out and return the exit status; only a debugged run shows a traceback."""
     set_up()
     try:
-        os.getcwd()  # noqa: PTH109 - a server starts without pathlib
-    except OSError:
+        os.stat(os.getcwd())  # noqa: PTH109, PTH116 - a server starts without pathlib
+    except FileNotFoundError:
         sys.stderr.write("Error: the working folder is gone\n")
+        return 2
+    except OSError as error:  # its path may be too long
+        reason = (error.strerror or str(error)).lower()
+        sys.stderr.write(f"Error: the working folder cannot be opened: {reason}\n")
         return 2
     try:
         status = command()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from idlc.project.root import Root
 
 
-class Formatted(NamedTuple):
+class FormattedFile(NamedTuple):
     """A file before and after; both are `None` if its syntax errors forbid a layout."""
 
     path: str
@@ -32,7 +32,7 @@ class Formatted(NamedTuple):
 
 def fmt(
     paths: Sequence[str], root: Root, exclude: Exclusions, report: Report, *, write: bool
-) -> Iterator[Formatted]:
+) -> Iterator[FormattedFile]:
     """Yield each file that paths mean, laid out; with `write`, after writing it.
 
     Files with syntax errors are reported and left alone.
@@ -53,12 +53,12 @@ def fmt(
         yield formatted
 
 
-def _format(file: InterfaceFile, source: Source, report: Report) -> Formatted:
+def _format(file: InterfaceFile, source: Source, report: Report) -> FormattedFile:
     from idlc.check.format import laid_out
     from idlc.model import ir
 
     new = laid_out(source, ir.TypeName("package", file.kind, file.name), report)
-    return Formatted(file.shown) if new is None else Formatted(file.shown, source.text, new)
+    return FormattedFile(file.shown) if new is None else FormattedFile(file.shown, source.text, new)
 
 
 def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: bool) -> int:
@@ -71,7 +71,7 @@ def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: 
 
     report = Report()
     settings = load_settings(Root.here(), report)
-    files: list[Formatted] = []
+    files: list[FormattedFile] = []
     done = "changed" if write else "would change"
     if not report.had_errors:
         left_out = scope(settings, exclude=exclude).exclude
@@ -89,7 +89,7 @@ def run(paths: tuple[str, ...], exclude: tuple[str, ...], *, write: bool, diff: 
     return output.status(report) or int(not write and any(file.changed for file in files))
 
 
-def _summary(files: Sequence[Formatted], done: str) -> str:
+def _summary(files: Sequence[FormattedFile], done: str) -> str:
     from idlc.diagnostics.terminal import counted
 
     changed = sum(file.changed for file in files)
@@ -102,7 +102,7 @@ def _summary(files: Sequence[Formatted], done: str) -> str:
     return ", ".join(f"{counted(count, 'file')} {what}" for what, count in numbers.items() if count)
 
 
-def _diff(file: Formatted, stream: TextIO) -> Iterator[str]:
+def _diff(file: FormattedFile, stream: TextIO) -> Iterator[str]:
     """Yield a unified diff: for a program as it is, for a terminal without control characters."""
     from difflib import unified_diff
 

@@ -99,9 +99,9 @@ def _single(context: click.Context, option: click.Parameter, value: str | None) 
 
 
 def _several(_: click.Context, __: click.Parameter, value: str | None) -> str | None:
-    from idlc.model.distros import BY_NAME, listed, unknown_distro
+    from idlc.model.distros import BY_NAME, split_names, unknown_distro
 
-    for name in listed(value) if value is not None else ():
+    for name in split_names(value) if value is not None else ():
         if name not in BY_NAME:
             raise click.UsageError(f"there is no distribution {name!r}; {unknown_distro(name)}")
     return value

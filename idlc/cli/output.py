@@ -16,7 +16,7 @@ from idlc.diagnostics.text import one_line, visible
 from idlc.version import __version__
 
 if TYPE_CHECKING:
-    from idlc.check.run import Checked
+    from idlc.check.run import CheckResult
 
 #: The text in our console scripts.
 _OURS = b"idlc.cli.main"
@@ -121,7 +121,7 @@ def status(report: Report) -> int:
 def write_report(
     report: Report,
     style: str,
-    checked: Checked,
+    checked: CheckResult,
     stream: TextIO,
     *,
     command: str = "check",

@@ -18,7 +18,7 @@ from idlc.compare.packages import (
     added_package,
     against,
     allowances,
-    combined,
+    combine,
     compare,
     compare_hashes,
     part_to_raise,
@@ -160,7 +160,7 @@ class Side(NamedTuple):
     error: str
 
 
-def earlier(
+def read_baseline(
     options: BreakingOptions, packages: tuple[inputs.Inputs, ...], report: Report
 ) -> Side | None:
     """Return the packages as they are in a folder or git revision; `None` after errors."""
@@ -197,7 +197,7 @@ def _compare(
             for package, model in old.items()
         ]
         come = (model for package, model in new.items() if package not in old)
-        whole = combined([*changes, *map(added_package, come)])
+        whole = combine([*changes, *map(added_package, come)])
     elsewhere = {*map(str, others), *submodules}
     report.extend(
         _not_compared(names, reason, options, hint)
@@ -372,7 +372,7 @@ def _version(packages: tuple[inputs.Inputs, ...], root: Root, report: Report) ->
     return next((statement.text for statement in statements if statement.tag == "version"), None)
 
 
-class Earlier:
+class Baseline:
     """The version that settings name: a git revision, or a folder; empty for any other.
 
     It is compiled on demand, and again when the name refers to another commit.
@@ -402,14 +402,14 @@ class Earlier:
             scope = self._options.scope
             scope = msgspec.structs.replace(scope, root=scope.root.on_disk())
             options = self._options._replace(paths=paths, scope=scope)
-            side = earlier(options, tuple(packages), report) if paths and self.name else None
+            side = read_baseline(options, tuple(packages), report) if paths and self.name else None
             why = next(
                 (problem.message for problem in report if problem.severity is Severity.ERROR), ""
             )
             self._side = side or Side({}, frozenset(), why)
         return self._side
 
-    def follow(self, older: Earlier | None) -> None:
+    def follow(self, older: Baseline | None) -> None:
         """Take over the commit that the name referred to before the folder was read again."""
         if older is not None and older.name == self.name:
             self.commit = older.commit

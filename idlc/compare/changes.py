@@ -5,8 +5,9 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+
+import msgspec
 
 from idlc.diagnostics.codes import Code
 from idlc.diagnostics.report import Diagnostic, Label
@@ -75,8 +76,7 @@ class Named(Protocol):
 T = TypeVar("T", bound=Named)
 
 
-@dataclass(frozen=True)
-class Pairing(Generic[T]):
+class Pairing(msgspec.Struct, Generic[T], frozen=True):
     """`kept` pairs have one name, `renamed` ones two; `moved` are names of kept elements."""
 
     kept: list[tuple[T, T]]
@@ -170,7 +170,7 @@ def _split(elements: Sequence[T], common: set[str], moved: frozenset[str]) -> It
     yield gap
 
 
-def described(field: ir.Field) -> object:
+def describe_type(field: ir.Field) -> object:
     """Return a field's type as it enters the type hash."""
     message = ir.Message(name=ir.TypeName("", "msg", ""), fields=(field,))
     return individual(message)["fields"][0]["type"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from idlc.check.compiler import Compiler, compile_package, library_for, stage
-from idlc.compare.packages import Comparison, combined, compare
+from idlc.compare.packages import Comparison, combine, compare
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source
@@ -39,16 +39,16 @@ def compare_with_distro(
         return None
     other = BY_NAME[name]
     library = library_for(packages, scope, report)
-    other_library = _Layered(packages, scope, other, other_first=True)
+    other_library = _LayeredLibrary(packages, scope, other, other_first=True)
     own = [package for package in packages if not catalog.is_standard(package.package)]
-    after = _models(own, _Layered(packages, scope, other), report)
+    after = _models(own, _LayeredLibrary(packages, scope, other), report)
     before = _models(own, other_library, Report())
     if report.had_errors:
         return None
     with stage("compare", against):
         used = _used(after).union(*(package.names for package in packages if package not in own))
         comparisons = [compare(old, new) for old, new in zip(before, after, strict=True)]
-        return combined(
+        return combine(
             [
                 *comparisons,
                 *_of_packages(used if packages else _all(library, other), library, other_library),
@@ -56,7 +56,7 @@ def compare_with_distro(
         )
 
 
-class _Layered(Library):
+class _LayeredLibrary(Library):
     """The local library with the standard interfaces of another distribution.
 
     With `other_first` they take precedence, otherwise they fill gaps. A message that one of the
@@ -127,7 +127,7 @@ def _all(library: Library, other: Distro) -> set[ir.TypeName]:
 
 
 def _of_packages(
-    names: Iterable[ir.TypeName], library: Library, other_library: _Layered
+    names: Iterable[ir.TypeName], library: Library, other_library: _LayeredLibrary
 ) -> Iterator[Comparison]:
     """Yield the differences in standard interfaces, package by package."""
     by_package: dict[str, list[ir.TypeName]] = {}

@@ -11,7 +11,7 @@ from idlc.compare.changes import (
     Level,
     Pairing,
     container,
-    described,
+    describe_type,
     native,
     pair,
     tighter,
@@ -204,7 +204,7 @@ def _type(sides: Sides, old: ir.Field, new: ir.Field) -> Change:
     before, after = sides.before.messages, sides.after.messages
     if not type_reads_alike(old.type, new.type, before, after, at_end=at_end):
         levels.add("wire")
-    if described(old) != described(new):
+    if describe_type(old) != describe_type(new):
         levels.add("hash")
     only_bounds = without_bounds(old.type) == without_bounds(new.type)
     if not only_bounds or container(old.type) != container(new.type):

@@ -49,7 +49,7 @@ class Comparison(NamedTuple):
         return self._replace(changes=tuple(changes))
 
 
-def combined(comparisons: Iterable[Comparison]) -> Comparison:
+def combine(comparisons: Iterable[Comparison]) -> Comparison:
     """Return the comparisons of several packages as one."""
     parts = list(comparisons)
     return Comparison(

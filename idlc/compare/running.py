@@ -75,7 +75,7 @@ class Answer(NamedTuple):
 
 
 @contextmanager
-def joined(report: Report) -> Iterator[Graph | None]:
+def join_graph(report: Report) -> Iterator[Graph | None]:
     """Yield the graph that this process can see; reports IDL640 where it cannot have a node.
 
     While it lasts, a hidden node of idlc's own is part of the graph.
@@ -304,7 +304,7 @@ def compare_with_graph(
     local_models = _local_models(options, report, has_paths=has_paths)
     if report.had_errors:
         return None
-    with joined(report) as graph:
+    with join_graph(report) as graph:
         endpoints = graph.endpoints(patience) if graph else ()
         if graph is None or not endpoints:
             report.extend([_empty(patience)] if graph else [])

@@ -145,7 +145,7 @@ def first_few(texts: Iterable[str], most: int) -> str:
     return f"{shown} and {len(listed) - most} more" if len(listed) > most else shown
 
 
-def merged(runs: Mapping[str, Report]) -> Report:
+def merge(runs: Mapping[str, Report]) -> Report:
     """Return the problems of runs for several distributions, each once.
 
     A problem that is not in every run names the distributions that have it.

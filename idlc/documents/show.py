@@ -25,7 +25,7 @@ from idlc.recordings.find import split_recordings
 if TYPE_CHECKING:
     from idlc.diagnostics.report import Diagnostic
     from idlc.project.library import Library
-    from idlc.recordings.definitions import Recorded
+    from idlc.recordings.definitions import RecordedDefinition
     from idlc.recordings.types import LocalTypes
 
 
@@ -169,7 +169,7 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     return sorted(facts, key=lambda row: (row.name, row.type_name))
 
 
-def _facts(recorded: Recorded, compiled: str | None, local: LocalTypes) -> TopicFacts:
+def _facts(recorded: RecordedDefinition, compiled: str | None, local: LocalTypes) -> TopicFacts:
     topic = recorded.topic
     hash_ = topic.hash or compiled
     local_hash = (

@@ -11,6 +11,7 @@ from idlc.diagnostics import codes, explain
 from idlc.diagnostics.report import Diagnostic, Severity
 from idlc.editor.documents import Document
 from idlc.editor.protocol import uris
+from idlc.editor.protocol.capabilities import requests_problems
 from idlc.editor.protocol.parts import Location, Part, Position, Range
 from idlc.editor.state import RELATIVE, ServerState
 from idlc.editor.workspace import Snapshot, Workspace
@@ -30,14 +31,14 @@ class Page(Part, frozen=True):
     href: str
 
 
-class Related(Part, frozen=True):
+class RelatedInformation(Part, frozen=True):
     """A second place that explains the first."""
 
     location: Location
     message: str
 
 
-class Shown(Part, frozen=True):
+class DocumentDiagnostic(Part, frozen=True):
     """A problem at its place in a document."""
 
     range: Range
@@ -47,14 +48,14 @@ class Shown(Part, frozen=True):
     source: str
     message: str
     tags: tuple[int, ...] = ()
-    related_information: tuple[Related, ...] = ()
+    related_information: tuple[RelatedInformation, ...] = ()
 
 
-def diagnostics(state: ServerState) -> dict[str, list[Shown]]:
+def diagnostics(state: ServerState) -> dict[str, list[DocumentDiagnostic]]:
     """Return the problems of all documents that have any, by URI."""
-    by_uri: dict[str, dict[Shown, None]] = {}
+    by_uri: dict[str, dict[DocumentDiagnostic, None]] = {}
     for path, problem, snapshot in problems(state):
-        by_uri.setdefault(state.uri(path), {})[shown(problem, snapshot, state)] = None
+        by_uri.setdefault(state.uri(path), {})[to_diagnostic(problem, snapshot, state)] = None
     for workspace in state.workspaces():
         if workspace.failure is not None:
             failed = state.uri(workspace.folder / workspace.failure.path)
@@ -82,18 +83,23 @@ def _path(problem: Diagnostic, snapshot: Snapshot) -> Path | None:
     return (snapshot.folder / problem.path) if problem.path else None
 
 
-def shown(problem: Diagnostic, snapshot: Snapshot, state: ServerState) -> Shown:
+def to_diagnostic(
+    problem: Diagnostic, snapshot: Snapshot, state: ServerState
+) -> DocumentDiagnostic:
     """Return a problem as a diagnostic; one with a whole file is shown at its top."""
     related = tuple(
-        Related(state.location(label.span, snapshot), label.text) for label in problem.labels
+        RelatedInformation(state.location(label.span, snapshot), label.text)
+        for label in problem.labels
     )
     return _shown(problem, state.range(problem.span) if problem.span else _TOP, related)
 
 
-def _shown(problem: Diagnostic, place: Range, related: tuple[Related, ...] = ()) -> Shown:
+def _shown(
+    problem: Diagnostic, place: Range, related: tuple[RelatedInformation, ...] = ()
+) -> DocumentDiagnostic:
     lines = [problem.message, problem.breaks, problem.holds_for, problem.detail]
     lines += [f"hint: {problem.hint}"] if problem.hint else []
-    return Shown(
+    return DocumentDiagnostic(
         range=place,
         severity=_SEVERITIES[problem.severity],
         code=problem.code,
@@ -127,9 +133,9 @@ def publish(state: ServerState) -> None:
     gone = state.published.keys() - new.keys()
     changed = {uri for uri, some in new.items() if state.published.get(uri) != some} | gone
     state.published = new
-    # a client that pulls problems would show pushed ones again
-    if state.supports("textDocument", "diagnostic"):
-        if changed and state.supports("workspace", "diagnostics", "refreshSupport"):
+    # a client that requests problems would show pushed ones again
+    if requests_problems(state.client):
+        if changed:
             state.ask("workspace/diagnostic/refresh", None)
         return
     for uri in sorted(changed):

@@ -13,18 +13,18 @@ from idlc.editor.documents import Document, Documents, file_of, inside, is_built
 from idlc.editor.protocol import capabilities, positions, uris
 from idlc.editor.protocol.framing import INVALID_REQUEST, RequestError
 from idlc.editor.protocol.parts import (
-    AskedFileRenames,
     DidChange,
     DidChangeFiles,
     DidChangeFolders,
     DidChangeSettings,
     DidOpen,
+    DocumentParams,
     Folder,
     Initialize,
     Location,
-    OfDocument,
     Position,
     Range,
+    RenameFilesParams,
 )
 from idlc.editor.workspace import OTHER_INPUTS, EditorOptions, Snapshot, Workspace, stray_folder
 from idlc.model import ir
@@ -105,10 +105,10 @@ class ServerState:
         self._notifications: dict[str, tuple[type, Callable[[Any], None]]] = {
             "textDocument/didOpen": (DidOpen, self._open),
             "textDocument/didChange": (DidChange, self._change),
-            "textDocument/didSave": (OfDocument, self._save),
-            "textDocument/didClose": (OfDocument, self._close),
+            "textDocument/didSave": (DocumentParams, self._save),
+            "textDocument/didClose": (DocumentParams, self._close),
             "workspace/didChangeWatchedFiles": (DidChangeFiles, self._change_files),
-            "workspace/didRenameFiles": (AskedFileRenames, self._rename_files),
+            "workspace/didRenameFiles": (RenameFilesParams, self._rename_files),
             "workspace/didChangeWorkspaceFolders": (DidChangeFolders, self._change_folders),
             "workspace/didChangeConfiguration": (DidChangeSettings, self._change_settings),
             "initialized": (dict, self._initialized),
@@ -133,13 +133,7 @@ class ServerState:
 
     def supports(self, *path: str) -> bool:
         """Return whether the client has a capability, or names it in a list."""
-        value: Any = self.client
-        for name in path:
-            if isinstance(value, list):
-                value = name in value
-            else:
-                value = value.get(name) if isinstance(value, dict) else None
-        return value not in (None, False)
+        return capabilities.supports(self.client, *path)
 
     def refresh(self, what: str) -> None:
         """Have the client request a feature again, such as `codeLens`, if it can."""
@@ -272,12 +266,12 @@ class ServerState:
         document.change(params.content_changes, self.encoding)
         self._follow(document, document.data)
 
-    def _close(self, params: OfDocument) -> None:
+    def _close(self, params: DocumentParams) -> None:
         document = self.documents.close(params.text_document.uri)
         if document is not None:
             self._follow(document, None)
 
-    def _save(self, _: OfDocument) -> None:
+    def _save(self, _: DocumentParams) -> None:
         self.forget()
 
     def _follow(self, document: Document, data: bytes | None) -> None:
@@ -294,7 +288,7 @@ class ServerState:
             self.refresh_moved_lenses()
         self._follow_disk(paths - of_git)
 
-    def _rename_files(self, params: AskedFileRenames) -> None:
+    def _rename_files(self, params: RenameFilesParams) -> None:
         moved = (uris.to_path(uri) for file in params.files for uri in (file.old_uri, file.new_uri))
         self._follow_disk(filter(None, moved))
 
@@ -332,7 +326,7 @@ class ServerState:
     def refresh_moved_lenses(self) -> None:
         """Have lenses requested again if the revision that they compare with has moved."""
         moved = [
-            workspace.earlier(self.settings.against).has_moved()
+            workspace.baseline(self.settings.against).has_moved()
             for workspace in self._known_workspaces()
             if workspace.folder in self.repositories and workspace.is_loaded
         ]

@@ -19,7 +19,7 @@ import msgspec
 
 from idlc.check import select
 from idlc.check.compiler import InternalError
-from idlc.check.run import checkers, judged
+from idlc.check.run import checkers, select_problems
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report, Severity
 from idlc.diagnostics.text import without_options
@@ -33,7 +33,7 @@ from idlc.project.settings import load_settings, scope
 
 if TYPE_CHECKING:
     from idlc.check.select import Selection
-    from idlc.compare.breaking import Earlier, Side
+    from idlc.compare.breaking import Baseline, Side
     from idlc.diagnostics.report import Diagnostic, Edit
     from idlc.diagnostics.source import Source, Span
     from idlc.model.link import Model
@@ -135,7 +135,7 @@ class Workspace:
         self._options = options
         self._texts = texts
         self._paths = paths
-        self._earlier: dict[str, Earlier] = {}
+        self._baselines: dict[str, Baseline] = {}
         self._snapshot: Snapshot | None = None
 
     def load(self) -> None:
@@ -143,7 +143,7 @@ class Workspace:
         if self.is_loaded:
             return
         self._fixed = report = Report()  # problems that do not depend on texts
-        self._older, self._earlier = self._earlier, {}
+        self._old_baselines, self._baselines = self._baselines, {}
         self._packages: tuple[inputs.Inputs, ...] = ()
         files = Listing((), (), (), {})
         begun = time.time_ns()
@@ -315,19 +315,19 @@ class Workspace:
         package_inputs = self._packages[self._places[path][0]]
         return next(iter(self._checkers.values())).package_facts(package_inputs)
 
-    def earlier(self, against: str = "") -> Earlier:
+    def baseline(self, against: str = "") -> Baseline:
         """Return the version to compare with: `against`, or the one of pyproject.toml."""
-        if against not in self._earlier:
-            from idlc.compare.breaking import Earlier
+        if against not in self._baselines:
+            from idlc.compare.breaking import Baseline
 
-            earlier = Earlier(self.folder, against, self._settings, self._scope)
-            earlier.follow(self._older.get(against))
-            self._earlier[against] = earlier
-        return self._earlier[against]
+            baseline = Baseline(self.folder, against, self._settings, self._scope)
+            baseline.follow(self._old_baselines.get(against))
+            self._baselines[against] = baseline
+        return self._baselines[against]
 
     def before(self, against: str = "") -> Side:
         """Return the packages as they were in the version to compare with."""
-        return self.earlier(against).side(self._packages)
+        return self.baseline(against).side(self._packages)
 
     @property
     def _library(self) -> Library:
@@ -342,7 +342,7 @@ class Workspace:
                 reports[distro] = Report()
                 models[distro] = checker.check(self._packages, self._selection, reports[distro])
             every = [model for some in models.values() for model in some]
-            problems = [*self._fixed, *judged(reports, every, self._selection)]
+            problems = [*self._fixed, *select_problems(reports, every, self._selection)]
         first = next(iter(self._checkers))
         return Snapshot(
             self.folder,

@@ -80,6 +80,7 @@ def package_of(
         target,
         plan,
         lock.Lock(
+            format=lock.FORMAT,
             idlc=__version__,
             package=model.package,
             runtime=target.runtime,

@@ -50,7 +50,7 @@ DEFAULT = BY_NAME["jazzy"]
 NEWEST = DISTROS[-1]
 
 
-def listed(text: str) -> list[str]:
+def split_names(text: str) -> list[str]:
     """Return the names in a list with commas."""
     return [name.strip() for name in text.split(",")]
 

@@ -97,7 +97,7 @@ class Entry(msgspec.Struct):
     linked: bool = False
 
 
-class Lowered(msgspec.Struct, frozen=True):
+class LoweredInterface(msgspec.Struct, frozen=True):
     """The interface of a text, its problems, and its fields that hold messages of other files."""
 
     interface: ir.Interface
@@ -108,7 +108,7 @@ class Lowered(msgspec.Struct, frozen=True):
 #: Interfaces with the names that they refer to; `None` for a name without an interface.
 Graph: TypeAlias = dict[ir.TypeName, tuple[ir.Interface | None, tuple[ir.TypeName, ...]]]
 #: Lowered interfaces by name, valid for the same `Source` and distribution.
-Memory: TypeAlias = dict[ir.TypeName, Lowered]
+Memory: TypeAlias = dict[ir.TypeName, LoweredInterface]
 
 
 class Pool:
@@ -135,7 +135,7 @@ class Pool:
             self._entries[interface.name] = entry
         return entry
 
-    def remembered(self, name: ir.TypeName, source: Source) -> Lowered | None:
+    def remembered(self, name: ir.TypeName, source: Source) -> LoweredInterface | None:
         """Add and return the remembered interface of a text; `None` if the text is new."""
         lowered = self._memory.get(name)
         if lowered is None or lowered.interface.source is not source:
@@ -143,14 +143,14 @@ class Pool:
         self._add(lowered)
         return lowered
 
-    def remember(self, interface: ir.Interface, problems: Report) -> Lowered:
+    def remember(self, interface: ir.Interface, problems: Report) -> LoweredInterface:
         """Add and remember the interface of a text."""
-        lowered = Lowered(interface, problems, tuple(_references(interface)))
+        lowered = LoweredInterface(interface, problems, tuple(_references(interface)))
         self._memory[interface.name] = lowered
         self._add(lowered)
         return lowered
 
-    def _add(self, lowered: Lowered) -> None:
+    def _add(self, lowered: LoweredInterface) -> None:
         errors = [
             diagnostic for diagnostic in lowered.problems if diagnostic.severity is Severity.ERROR
         ]

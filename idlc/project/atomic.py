@@ -110,7 +110,7 @@ if sys.platform != "win32":
     import fcntl
 
 #: Folders that this process has locked, so that it does not wait for itself.
-_held: set[Path] = set()
+_locked_folders: set[Path] = set()
 
 
 @contextlib.contextmanager
@@ -123,11 +123,11 @@ def exclusive(folder: Path) -> Iterator[None]:
     below it.
     """
     place = _nearest(folder)
-    if sys.platform == "win32" and not _held:
+    if sys.platform == "win32" and not _locked_folders:
         with only_writer_on_windows(), _holding(place):
             yield
         return
-    if sys.platform == "win32" or place in _held:
+    if sys.platform == "win32" or place in _locked_folders:
         yield
         return
     handle = _lock(place)
@@ -143,11 +143,11 @@ def exclusive(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _holding(place: Path) -> Iterator[None]:
-    _held.add(place)
+    _locked_folders.add(place)
     try:
         yield
     finally:
-        _held.discard(place)
+        _locked_folders.discard(place)
 
 
 def _nearest(folder: Path) -> Path:
@@ -157,7 +157,7 @@ def _nearest(folder: Path) -> Path:
 def _lock(place: Path) -> int | None:
     """Lock a folder, after runs that locked one above it because it did not exist yet."""
     for above in reversed(place.parents):
-        if above not in _held:
+        if above not in _locked_folders:
             _unlock(_opened(above, fcntl.LOCK_SH))
     return _opened(place, fcntl.LOCK_EX)
 
@@ -249,11 +249,11 @@ def rewrite(path: Path, name: str, old: str, new: str, report: Report) -> bool:
 
 
 def edit(
-    edits: Iterable[Edit], root: Root, report: Report, tidied: Callable[[str, str, str], str]
+    edits: Iterable[Edit], root: Root, report: Report, keep_layout: Callable[[str, str, str], str]
 ) -> int:
     """Apply edits to their files; return the number of applied edits.
 
-    `tidied` takes a file's name, its text and the text after the edits, and returns the new text.
+    `keep_layout` takes a file's name, its old text and its edited text, and returns the new text.
     """
     by_path: dict[str, list[Edit]] = {}
     for edit in edits:
@@ -262,6 +262,6 @@ def edit(
     for name, own in by_path.items():
         old = own[0].span.source.text
         text, number = apply(old, own)
-        if rewrite(Path(root.path(name)), name, old, tidied(name, old, text), report):
+        if rewrite(Path(root.path(name)), name, old, keep_layout(name, old, text), report):
             done += number
     return done

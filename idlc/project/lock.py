@@ -120,7 +120,7 @@ class _Header(msgspec.Struct):
 Runtime: TypeAlias = Literal["carried", "installed"]
 
 
-class Lock(msgspec.Struct, frozen=True, kw_only=True):
+class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The record of one generated package.
 
     `inputs` are the compiled files by name within the package, `dependencies` the other
@@ -130,7 +130,7 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True):
     `converts_values` is set where the classes convert values as in Lyrical.
     """
 
-    format: int = FORMAT
+    format: int
     idlc: str
     package: str
     runtime: Runtime = "carried"

@@ -20,7 +20,7 @@ from idlc.diagnostics.codes import BAD_CONFIG
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.source import Source, Span
 from idlc.diagnostics.text import did_you_mean
-from idlc.model.distros import BY_NAME, DEFAULT, Distro, listed, unknown_distro
+from idlc.model.distros import BY_NAME, DEFAULT, Distro, split_names, unknown_distro
 from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
 from idlc.project.lock import Runtime
@@ -246,7 +246,7 @@ def _checked(table: object, source: Source, folder: Path, root: Root, report: Re
 
 def _distros(value: str | tuple[str, ...], place: TableLocation, report: Report) -> tuple[str, ...]:
     """Return the names of distributions; report unknown ones."""
-    names = listed(value) if isinstance(value, str) else value
+    names = split_names(value) if isinstance(value, str) else value
     for name in names:
         if name and name not in BY_NAME:
             message = f"`distro` in {place.shown} has `{name}`, which is no distribution"
@@ -315,7 +315,7 @@ def scope(
         Exclusions(tuple(left_out)),
         settings.paths,
         settings.out,
-        _distros_named(listed(distro) if distro else settings.distro),
+        _distros_named(split_names(distro) if distro else settings.distro),
     )
 
 

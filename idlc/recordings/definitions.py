@@ -37,7 +37,7 @@ _DERIVED = re.compile(
 )
 
 
-class Recorded(NamedTuple):
+class RecordedDefinition(NamedTuple):
     """A topic, the interface that its messages are of, and all texts that came with it.
 
     `name` may be derived from the `interface`; both are `None` for types that are not of ROS 2.
@@ -60,20 +60,22 @@ TextCache: TypeAlias = dict[
 ]
 
 
-def recorded(topic: Topic, recording: str, cache: TextCache | None = None) -> Recorded:
+def read_definition(
+    topic: Topic, recording: str, cache: TextCache | None = None
+) -> RecordedDefinition:
     """Return the texts that a recording, by its name in reports, has for a topic.
 
     The `cache` has the texts of other topics of the recording, and is added to.
     """
     name = type_name(topic.type)
     if name is None:
-        return Recorded(recording, topic, None, None, {})
+        return RecordedDefinition(recording, topic, None, None, {})
     interface = interface_of(name)
     key = topic.schema, interface
     cache = {} if cache is None else cache
     if key not in cache:
         cache[key] = _texts(topic, interface, recording)
-    return Recorded(recording, topic, name, interface, *cache[key])
+    return RecordedDefinition(recording, topic, name, interface, *cache[key])
 
 
 def _texts(

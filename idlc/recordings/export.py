@@ -299,7 +299,7 @@ class ColumnsOptions(NamedTuple):
     include: tuple[str, ...] = ()
 
 
-class Written(NamedTuple):
+class WrittenFile(NamedTuple):
     """A file that was written, with the messages of a topic."""
 
     topic: str
@@ -315,12 +315,12 @@ class Job(NamedTuple):
     style: str
 
 
-def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list[Written]:
+def columns(options: ColumnsOptions, report: Report, progress: Progress) -> list[WrittenFile]:
     """Write the columns of topics, each file whole or not at all; return what was written.
 
     A topic that cannot be read does not keep others from being written.
     """
-    done: list[Written] = []
+    done: list[WrittenFile] = []
     paths, check, include = options.recordings, options.check, options.include
     with (
         _problems(options, report),
@@ -431,7 +431,7 @@ def _problem(jobs: Sequence[Job], options: ColumnsOptions) -> tuple[str, str] | 
     return None
 
 
-def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
+def _written(job: Job, options: ColumnsOptions, progress: Progress) -> WrittenFile:
     """Write the columns of one topic."""
     name = job.topic.topic.name
     flat = job.style == "csv" or not options.nested
@@ -440,16 +440,16 @@ def _written(job: Job, options: ColumnsOptions, progress: Progress) -> Written:
         reader = job.topic.to_reader(**reading)
     except ValueError as error:
         raise UnknownFieldError(str(error), name) from None
-    counted = _Counted(reader, name, job.topic.topic.count, progress)
+    counted = _RowCounter(reader, name, job.topic.topic.count, progress)
     if job.path == STDOUT:
         write(counted.batches(), reader.schema, sys.stdout.buffer, job.style)
     else:
         with whole_file(job.path) as file:
             write(counted.batches(), reader.schema, file, job.style)
-    return Written(name, job.path, counted.rows)
+    return WrittenFile(name, job.path, counted.rows)
 
 
-class _Counted:
+class _RowCounter:
     """Counts rows while they pass, and reports progress."""
 
     def __init__(self, reader: Any, topic: str, total: int, progress: Progress) -> None:

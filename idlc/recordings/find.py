@@ -61,7 +61,7 @@ def files(words: Iterable[str], root: Root) -> list[Path]:
     return [file for path in paths for file in (path.iterdir() if is_folder(path) else [path])]
 
 
-def expanded(word: str) -> list[str]:
+def expand(word: str) -> list[str]:
     """Return the paths that a word means, which may be a pattern such as `bags/*.mcap`."""
     if has_magic(word) and not is_there(word):
         return sorted(glob(word, recursive=True))  # noqa: PTH207 - keeps what was typed
@@ -75,7 +75,7 @@ def recordings_of(
 
     A shell that expands the pattern itself leaves all but the first among the paths.
     """
-    matches = expanded(against)
+    matches = expand(against)
     if not split_recordings(matches, root)[0]:
         return (), paths
     more, others = split_recordings(paths, root)

@@ -25,11 +25,11 @@ from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, scope
 from idlc.project.templates import RenderedFile
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definitions import recorded
+from idlc.recordings.definitions import read_definition
 from idlc.recordings.find import is_recording
 from idlc.recordings.types import LocalTypes, RecordedTypes, read_topics, recorded_types, versions
 from idlc.runtime.objects import owner_of
-from idlc.runtime.on_demand.typeinfo import structure_of
+from idlc.runtime.typeinfo import structure_of
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def newest() -> int:
 Models = dict[str, "Model"]
 
 
-def asked_models(
+def requested_models(
     what: str, include: tuple[str, ...], distro: str | None, report: Report
 ) -> tuple[Models, list[ir.TypeName]]:
     """Return the models of packages, and the requested interfaces in them."""
@@ -159,7 +159,7 @@ def recorded_hash(topic: Topic, include: tuple[str, ...]) -> str | None:
 
 def _types(topic: Topic, include: tuple[str, ...]) -> tuple[RecordedTypes, Report]:
     where, report = Scope(Root.here(), include=include), Report()
-    (version,) = versions([recorded(topic, topic.name)])
+    (version,) = versions([read_definition(topic, topic.name)])
     types = recorded_types(version, LocalTypes(where, report), where, report)
     return types, report
 
@@ -186,7 +186,7 @@ class CompileError(ValueError):
     """Interfaces that cannot be loaded: they have errors, or do not exist."""
 
 
-class Loaded(ModuleType):
+class LoadedPackages(ModuleType):
     """Packages that were compiled together; requested interfaces also by their own names."""
 
     def __init__(
@@ -219,7 +219,7 @@ class Loaded(ModuleType):
         return f"<loaded: {', '.join(dir(self))}>"
 
 
-def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> Loaded:
+def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -> LoadedPackages:
     """Compile interfaces, and return their classes.
 
     `what` is a recording, a .msg, .srv or .action file, a folder of them, or the name of a type or
@@ -228,10 +228,10 @@ def load(what: str, *, include: Iterable[str] = (), distro: str | None = None) -
     programs are better off with `idlc gen`.
     """
     report = Report()
-    models, asked = asked_models(str(what), tuple(include), distro, report)
+    models, asked = requested_models(str(what), tuple(include), distro, report)
     _raise_for(report)
     name = _stored(models)
-    return Loaded(f"{LOADED}.{name}", models, asked)
+    return LoadedPackages(f"{LOADED}.{name}", models, asked)
 
 
 def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
@@ -273,7 +273,7 @@ class MissingDefinitionWarning(UserWarning):
         return f"`{self.topic}`: {self.message}"
 
 
-def accepted(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
+def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return the class of a program; raise RecordingError if messages are of another type."""
     try:
         class_type = _type_of(kind)

@@ -22,8 +22,8 @@ from idlc.recordings.containers.container import (
 )
 from idlc.recordings.containers.db3 import Rows
 from idlc.recordings.containers.mcap import Chunk
-from idlc.recordings.containers.messages import ALWAYS, Messages, Raw, Window, joined
-from idlc.recordings.containers.source import CDR, START, RecordingError, unread
+from idlc.recordings.containers.messages import ALWAYS, Messages, Raw, Window, join_messages
+from idlc.recordings.containers.source import CDR, START, RecordingError, unread_reason
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -187,9 +187,9 @@ class Selection:
             raise RecordingError(f"{what}, not as ROS 2 writes them, `{CDR}`")
         if kind is None:
             return self.kind
-        from idlc.recordings.load import accepted
+        from idlc.recordings.load import check_class
 
-        return accepted(kind, self.topic, self.include)
+        return check_class(kind, self.topic, self.include)
 
     def __iter__(self) -> Iterator[Stamped[Any]]:
         return self.messages()
@@ -219,7 +219,7 @@ class Selection:
         datetime64, log_time and publish_time included, which are nanoseconds otherwise.
         """
         kind = self._kind(kind)
-        batch = joined(list(self.batches()))
+        batch = join_messages(list(self.batches()))
         with _at(self.topic, batch.views):
             table = kind.to_columns(batch, fields=fields, ragged=True, datetimes=datetimes)
         times = zip(_names(table.keys()), (batch.log_times, batch.publish_times), strict=True)
@@ -264,7 +264,7 @@ def _names(taken: Iterable[str]) -> list[str]:
 
 def _empty(kind: Any, options: Any) -> pa.Table:
     """Return the table of no messages."""
-    return _with_times(kind.to_arrow([], **options), joined([]))
+    return _with_times(kind.to_arrow([], **options), join_messages([]))
 
 
 def _with_times(table: pa.Table, batch: Messages) -> pa.Table:
@@ -301,7 +301,7 @@ def _at(topic: Topic, views: Callable[[], list[Raw]], done: int = 0) -> Iterator
             raise
         match = _INDEXED.match(error.path)
         number, path = (int(match[1]), match[2]) if match else (0, error.path)
-        why = unread(topic.name, bytes(views()[number][:START]))
+        why = unread_reason(topic.name, bytes(views()[number][:START]))
         if why:
             raise RecordingError(*why) from error
         where = f"{path}: " if path else ""

@@ -24,8 +24,8 @@ from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.source import RecordingError, Unread
-from idlc.recordings.definitions import ENCODINGS, Recorded, TextCache, recorded
+from idlc.recordings.containers.source import RecordingError, UnreadTopic
+from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import ContentSizes, oversized
 
@@ -41,14 +41,14 @@ class RecordingTopics(NamedTuple):
     """The topics of a recording; `path` is its name in reports."""
 
     path: str
-    topics: tuple[Recorded, ...]
-    unread: tuple[Unread, ...] = ()
+    topics: tuple[RecordedDefinition, ...]
+    unread: tuple[UnreadTopic, ...] = ()
 
 
 class Version(msgspec.Struct):
     """Topics whose definitions do not contradict each other, and these definitions."""
 
-    topics: list[Recorded]
+    topics: list[RecordedDefinition]
     texts: dict[ir.TypeName, Source]
 
 
@@ -64,7 +64,7 @@ def read_topics(path: str, report: Report, *, check: bool = False) -> RecordingT
         with open_recording(path) as container:
             report.notes += container.notes
             cache: TextCache = {}
-            topics = tuple(recorded(topic, path, cache) for topic in container.topics)
+            topics = tuple(read_definition(topic, path, cache) for topic in container.topics)
             return RecordingTopics(path, topics, tuple(container.unread()) if check else ())
     except RecordingError as error:
         report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
@@ -73,7 +73,7 @@ def read_topics(path: str, report: Report, *, check: bool = False) -> RecordingT
 
 def topics_of(
     paths: Sequence[str], selected: Sequence[str], report: Report
-) -> list[Recorded] | None:
+) -> list[RecordedDefinition] | None:
     """Return the topics of recordings, or the selected ones; `None` after an error.
 
     Reports IDL655 for a topic that is in none of them.
@@ -94,7 +94,7 @@ def topics_of(
     return [topic for topic in topics if not selected or topic.topic.name in selected]
 
 
-def versions(topics: Iterable[Recorded]) -> list[Version]:
+def versions(topics: Iterable[RecordedDefinition]) -> list[Version]:
     """Return topics in as few groups as they have different definitions of one name.
 
     Definitions that differ in comments only are equal.
@@ -168,10 +168,10 @@ ABSENT, UNREADABLE = "there is no definition of", "there are errors in the defin
 WRONG = "the recorded hash is not that of the definition of"
 
 
-class Typed(NamedTuple):
+class DefinedTopic(NamedTuple):
     """A topic of a type that is defined, in the recording or locally."""
 
-    recorded: Recorded
+    recorded: RecordedDefinition
     name: ir.TypeName
     interface: ir.TypeName
 
@@ -302,7 +302,7 @@ class RecordedTypes:
                 hint=None if sure else BORROWED,
             )
 
-    def names_of(self, topic: Typed) -> set[ir.TypeName]:
+    def names_of(self, topic: DefinedTopic) -> set[ir.TypeName]:
         """Return the interfaces that a topic's type is made of."""
         name = topic.interface
         if name not in self._names:
@@ -378,7 +378,9 @@ class RecordedTypes:
                 names -= self.names_of(topic)
         return names
 
-    def fit_locally(self, topics: Iterable[Recorded], broken: AbstractSet[ir.TypeName]) -> bool:
+    def fit_locally(
+        self, topics: Iterable[RecordedDefinition], broken: AbstractSet[ir.TypeName]
+    ) -> bool:
         """Return whether no recorded hash contradicts the local `broken` definitions."""
         typed = {id(typed.recorded): typed for typed in self.topics}
         for wanted in topics:
@@ -395,14 +397,14 @@ class RecordedTypes:
                 return False
         return True
 
-    def hash(self, topic: Typed) -> str | None:
+    def hash(self, topic: DefinedTopic) -> str | None:
         """Return the hash of the type that definitions make; `None` if these have errors."""
         model = self.models[topic.name.package]
         return model.describer.hash(str(topic.name)) if defines(model, topic.name) else None
 
 
 def _empty_ones(
-    topics: Iterable[Recorded], texts: Mapping[ir.TypeName, Source], local: LocalTypes
+    topics: Iterable[RecordedDefinition], texts: Mapping[ir.TypeName, Source], local: LocalTypes
 ) -> Iterator[tuple[ir.TypeName, Source]]:
     """Yield the messages whose definitions are empty because they have no fields.
 
@@ -420,11 +422,11 @@ def _empty_ones(
 
 
 def _typed(
-    topics: Iterable[Recorded],
+    topics: Iterable[RecordedDefinition],
     texts: Mapping[ir.TypeName, Source],
     local: LocalTypes,
     report: Report,
-) -> Iterator[Typed]:
+) -> Iterator[DefinedTopic]:
     """Yield the topics whose types are known; report the others."""
     missing: dict[tuple[str, str], list[str]] = {}
     for topic in topics:
@@ -433,7 +435,7 @@ def _typed(
         else:
             why = "" if topic.interface in texts else _why_not_local(topic, local)
             if not why:
-                yield Typed(topic, topic.name, topic.interface)
+                yield DefinedTopic(topic, topic.name, topic.interface)
         if why:
             missing.setdefault((topic.recording, why), []).append(topic.topic.name)
     for (recording, why), names in missing.items():
@@ -444,7 +446,7 @@ def _typed(
         )
 
 
-def _foreign(topic: Recorded) -> str:
+def _foreign(topic: RecordedDefinition) -> str:
     schema = topic.topic.schema
     if not topic.topic.type:
         return "it has no type of ROS 2"
@@ -452,7 +454,7 @@ def _foreign(topic: Recorded) -> str:
     return f"`{topic.topic.type}` is no type of ROS 2{what}"
 
 
-def _why_not_local(topic: Recorded, local: LocalTypes) -> str:
+def _why_not_local(topic: RecordedDefinition, local: LocalTypes) -> str:
     """Return why a local definition does not replace a missing one; empty if it does."""
     assert topic.name is not None
     assert topic.interface is not None

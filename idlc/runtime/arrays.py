@@ -42,7 +42,7 @@ def to_ndarray(dtype: Any, size: int, values: Any, name: str) -> Any:
         return converted(dtype, size, values)
     except (TypeError, ValueError, OverflowError) as error:
         failure = error
-    from .on_demand.typeinfo import refused
+    from .typeinfo import refused
 
     raise refused(name, dtype.name, size, values, failure) from None
 
@@ -99,7 +99,7 @@ class NumberArray(Generic[Element]):
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes an array."""
-        from .on_demand.conversions import numbers_schema
+        from .conversions import numbers_schema
 
         kind = float if cls.dtype.kind == "f" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from idlc.check.compiler import stage
 from idlc.check.package.facts import home_of
-from idlc.check.package.setup_edits import wrapped
+from idlc.check.package.setup_edits import wrap_lines
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import did_you_mean
@@ -242,7 +242,7 @@ def accepted(
         if isinstance(outcome, Edited):
             edited[path] = outcome.text
             if path == "setup.py":
-                edited[path] = wrapped(project.text(path) or "", outcome.text)
+                edited[path] = wrap_lines(project.text(path) or "", outcome.text)
             continue
         shown_path = project.shown(path)
         report.add(

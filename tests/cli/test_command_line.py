@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -367,7 +368,7 @@ def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch,
     make("demo/msg/A.msg")
     real = render.render_package
 
-    def broken(model):
+    def broken(model, **_):
         return tuple(
             type(file)(file.path, "def (: \\\n") if file.path == "msg/_a.py" else file
             for file in real(model)
@@ -421,6 +422,22 @@ def test_a_working_folder_that_is_gone():
     )
     assert done.returncode == 2
     assert "the working folder is gone" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a working folder is a short path there")
+def test_a_working_folder_whose_path_is_too_long_to_be_opened(here, monkeypatch):
+    """A package.xml above it could not be read, which would change the verdict silently."""
+    make("A.msg")
+    for _ in range(200):
+        Path("d" * 40).mkdir()
+        monkeypatch.chdir("d" * 40)
+    make("A.msg")
+    done = idlc("check", "A.msg", cwd=".")
+    monkeypatch.chdir(here)
+    shutil.rmtree("d" * 40)  # other tests may search the folders of all tests
+    assert done.returncode == 2
+    assert done.stderr == "Error: the working folder cannot be opened: file name too long\n"
+    assert idlc("check", "A.msg").returncode == 0
 
 
 def wait_for(condition) -> None:

@@ -85,6 +85,35 @@ def test_a_file_that_is_not_saved_yet_is_one_of_the_package(opened):
     assert codes(one.pull(new)) == ["IDL201"]
 
 
+@pytest.mark.parametrize("can_refresh", [False, True])
+def test_an_error_of_a_missing_file_ends_when_it_is_there(editor, package, can_refresh):
+    """Clients that request problems request them for changed documents only, unless asked to."""
+    folder = package({"msg/Wheel.msg": "Late late\n"})
+    client = lsp.ClientCapabilities(
+        text_document=PULLS.text_document,
+        workspace=lsp.WorkspaceClientCapabilities(
+            diagnostics=lsp.DiagnosticWorkspaceClientCapabilities(refresh_support=can_refresh)
+        ),
+    )
+    one = editor(folder, capabilities=client)
+    asked = one.answer_all()
+    assert (one.answer.capabilities.diagnostic_provider is not None) == can_refresh
+    uri = one.open(folder / "msg/Wheel.msg")
+    assert codes(one.pull(uri) if can_refresh else one.wait(uri)) == ["IDL201"]
+    asked.clear()
+    one.problems.clear()
+    (folder / "msg/Late.msg").write_text("int8 x\n")
+    document = lsp.TextDocumentIdentifier(uri=uri)
+    one.tell(lsp.TEXT_DOCUMENT_DID_SAVE, lsp.DidSaveTextDocumentParams(text_document=document))
+    if can_refresh:
+        assert one.pull(uri) == []
+        one.ask(lsp.TEXT_DOCUMENT_DIAGNOSTIC, lsp.DocumentDiagnosticParams(document))
+        assert (lsp.WORKSPACE_DIAGNOSTIC_REFRESH, None) in asked
+        assert one.problems == {}
+    else:
+        assert one.wait(uri) == []
+
+
 def test_a_draft_without_a_file_is_checked_by_what_it_looks_like(editor, package, monkeypatch):
     folder = package({"msg/Drive.msg": "int8 x\n"})
     monkeypatch.chdir(folder)

@@ -8,7 +8,7 @@ from lsprotocol import types as lsp
 
 from idlc.editor.features import lenses as features
 from idlc.editor.protocol.capabilities import TYPES
-from idlc.editor.protocol.parts import DocumentId, OfDocument
+from idlc.editor.protocol.parts import DocumentId, DocumentParams
 from idlc.editor.publish import idle
 from idlc.editor.state import ServerState
 from tests.support.editor import at, between
@@ -268,7 +268,7 @@ def test_without_watches_it_looks_while_nothing_is_said(package):
     client = {"workspace": {"codeLens": {"refreshSupport": True}}}
     said = {"capabilities": client, "workspaceFolders": [{"uri": folder.as_uri(), "name": ""}]}
     state = ServerState(said, lambda *_: None, lambda method, *_: asked.append(method))
-    document = OfDocument(DocumentId((folder / "msg/New.msg").as_uri()))
+    document = DocumentParams(DocumentId((folder / "msg/New.msg").as_uri()))
     idle(state)
     for lens in features.lenses(state, document):
         features.resolve(state, lens)

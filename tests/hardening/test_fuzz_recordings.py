@@ -25,7 +25,7 @@ from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic, open_recording
 from idlc.recordings.containers.messages import ALWAYS, Ranges
 from idlc.recordings.containers.source import RecordingError
-from idlc.recordings.definitions import recorded
+from idlc.recordings.definitions import read_definition
 from idlc.recordings.types import LocalTypes, recorded_types, versions
 from tests.support import db3_mutations, definition_mutations, mcap_mutations
 from tests.support import recordings as made
@@ -126,7 +126,7 @@ def walk(path, kinds, **options):
         for topic in recording.topics:
             container = recording._container
             outcome(partial(exhausted, container, topic))
-            recorded(topic, "demo")
+            read_definition(topic, "demo")
         kinds.decode(recording)
 
 
@@ -221,7 +221,7 @@ def definitions(style):
 def typed(around, name, encoding, text, hash_=None):
     """Return what a recording's topic of a type means."""
     topic = Topic("/x", name, 1, hash_, "cdr", Schema(name, encoding, text))
-    (version,) = versions([recorded(topic, "demo")])
+    (version,) = versions([read_definition(topic, "demo")])
     return recorded_types(version, around, Scope(Root.here()), Report())
 
 

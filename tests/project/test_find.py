@@ -1,6 +1,7 @@
 """Which files paths mean, which package they belong to, and where other packages are found."""
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -74,11 +75,17 @@ def test_links_to_folders_are_followed_and_circles_end():
     assert found("pkg") == ["pkg/msg/A.msg"]
 
 
-def test_a_very_deep_folder_is_no_problem(monkeypatch):
+def test_a_folder_that_is_too_deep_to_be_opened_is_reported(here, monkeypatch):
     for _ in range(200):  # longer than a path may be
         Path("d" * 40).mkdir()
         monkeypatch.chdir("d" * 40)
-    assert find(["."], Root.here(), Report()) == ()
+    monkeypatch.chdir(here)
+    make("msg/A.msg")
+    report = Report()
+    files = find(["."], Root.here(), report)
+    shutil.rmtree("d" * 40)  # other tests may search the folders of all tests
+    assert [file.shown for file in files] == ["msg/A.msg"]
+    assert [problem.code for problem in report] == ["IDL601"]
 
 
 def one(paths: list[str], package: str | None = None, out: str = "out") -> tuple[str, list[str]]:

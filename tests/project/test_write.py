@@ -37,6 +37,7 @@ def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False
     if planned is None:
         return False
     record = lock.Lock(
+        format=lock.FORMAT,
         idlc="0", package="p", inputs={}, dependencies={}, types={}, outputs=planned.outputs
     )
     return write.apply(planned, lock.encode(record), "out", report)

@@ -18,7 +18,7 @@ from idlc.model.lower import lower
 from idlc.project.root import Root
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import Schema, Topic
-from idlc.recordings.definitions import recorded, type_name
+from idlc.recordings.definitions import read_definition, type_name
 from idlc.recordings.types import LocalTypes, contradictions, recorded_types, versions
 from tests.support import idl_view, recorded_text
 from tests.support.recordings import IMU, STORE, definition
@@ -29,7 +29,7 @@ SHARE = Path(sys.prefix) / "share"
 
 def topic(type_, text, encoding="ros2msg", hash_=None):
     schema = Schema(type_, encoding, text) if text else None
-    return recorded(Topic("/x", type_, 1, hash_, "cdr", schema), "rec")
+    return read_definition(Topic("/x", type_, 1, hash_, "cdr", schema), "rec")
 
 
 def texts(*words):
@@ -224,7 +224,7 @@ def test_a_message_without_fields_has_an_empty_definition():
     assert types.hash(types.topics[0]) == own
     assert list(report) == []
     blank = Schema("a/msg/B", "ros2msg", "\n")
-    types, report = types_of(recorded(Topic("/x", "a/msg/B", 1, None, "cdr", blank), "rec"))
+    types, report = types_of(read_definition(Topic("/x", "a/msg/B", 1, None, "cdr", blank), "rec"))
     assert (types.topics, [one.code for one in report]) == ((), ["IDL652"])
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from idlc.recordings.containers import mcap
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.messages import Window, joined
+from idlc.recordings.containers.messages import Window, join_messages
 from idlc.recordings.containers.source import RecordingError
 from tests.recordings.test_containers import LEAVES_OUT, MESSAGES
 from tests.support import mcap_mutations
@@ -24,7 +24,7 @@ def read(path, topic, window=None, **options):
     with open_recording(path, **options) as container:
         (found,) = (one for one in container.topics if one.name == topic)
         parts = list(container.messages(found, Window(*(window or ()))))
-        whole = joined(parts)
+        whole = join_messages(parts)
         assert len(whole) == sum(map(len, parts))
         views = whole.views()
         assert [view for part in parts for view in part.views()] == views

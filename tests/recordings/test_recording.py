@@ -425,7 +425,7 @@ def test_help_and_type_checkers_see_what_is_there(tmp_path):
     said = said.replace("builtins.", "")  # as older versions of mypy say
     module = "idlc.recordings"
     assert f"[{module}.recording.RecordedTopic, int, bytes, bytes]" in said
-    assert f'"{module}.load.Loaded"' in said
+    assert f'"{module}.load.LoadedPackages"' in said
 
 
 def test_idlc_itself_stays_cheap_to_import():

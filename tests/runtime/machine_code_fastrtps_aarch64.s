@@ -1,4 +1,4 @@
-// The machine code of typesupport/fastrtps.py for aarch64 (AAPCS64 calling convention).
+// The machine code of fastrtps.py for aarch64 (AAPCS64 calling convention).
 
 serialize:  // (memory, cdr) -> bool
   hint #34

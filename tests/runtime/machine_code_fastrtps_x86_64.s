@@ -1,4 +1,4 @@
-# The machine code of typesupport/fastrtps.py for x86-64 (System V calling convention).
+# The machine code of fastrtps.py for x86-64 (System V calling convention).
 
 .intel_syntax noprefix
 serialize:  # (memory, cdr) -> bool

@@ -1,4 +1,4 @@
-// The machine code of typesupport/introspection.py for aarch64 (AAPCS64 calling convention).
+// The machine code of introspection.py for aarch64 (AAPCS64 calling convention).
 
 empty:  // (memory, plan): free what the plan says, and leave it empty
   stp x29, x30, [sp, #-64]!

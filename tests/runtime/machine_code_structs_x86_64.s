@@ -1,4 +1,4 @@
-# The machine code of typesupport/introspection.py for x86-64 (System V calling convention).
+# The machine code of introspection.py for x86-64 (System V calling convention).
 
 .intel_syntax noprefix
 empty:  # (memory, plan): free what the plan says, and leave it empty

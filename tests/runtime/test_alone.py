@@ -86,7 +86,7 @@ def test_importing_one_message_imports_little(folder):
     assert not loaded & {"dataclasses", "inspect", "ctypes", "plain_msgs.srv", "numpy"}
     assert "plain_msgs.msg._fixed" not in loaded
     assert "plain_msgs._idlc.typesupport" not in loaded
-    assert "plain_msgs._idlc.on_demand.typeinfo" not in loaded
+    assert "plain_msgs._idlc.typeinfo" not in loaded
 
 
 def test_the_support_package_imports_nothing_of_idlc():

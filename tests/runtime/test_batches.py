@@ -7,6 +7,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
+from idlc import delimited, split_delimited, split_mcap_chunk
 from tests.support import generated, values
 
 FILES = {
@@ -38,13 +39,6 @@ def runtime(msg):
     import batch_msgs._idlc
 
     return batch_msgs._idlc
-
-
-@pytest.fixture(scope="module")
-def batches(msg):
-    from batch_msgs._idlc.on_demand import batches
-
-    return batches
 
 
 def many(cls, count=20, seed=1):
@@ -94,19 +88,17 @@ def test_a_batch_of_a_users_subclass(msg):
     assert {type(message) for message in found} == {Mine}
 
 
-def test_a_stream_of_sizes_and_messages(msg, runtime, batches):
+def test_a_stream_of_sizes_and_messages(msg):
     messages = many(msg.Joints)
-    stream = runtime.on_demand.batches.delimited(msg.Joints.serialize_many(messages))
-    assert (
-        msg.Joints.deserialize_many(runtime.on_demand.batches.split_delimited(stream)) == messages
-    )
-    assert list(runtime.on_demand.batches.split_delimited(b"")) == []
+    stream = delimited(msg.Joints.serialize_many(messages))
+    assert msg.Joints.deserialize_many(split_delimited(stream)) == messages
+    assert list(split_delimited(b"")) == []
     for size in (1, 3, 4, 10, len(stream) - 1):
-        with pytest.raises(runtime.DecodeError, match="ends within a message"):
-            list(runtime.on_demand.batches.split_delimited(stream[:size]))
+        with pytest.raises(ValueError, match="ends within a message"):
+            list(split_delimited(stream[:size]))
 
 
-def test_the_chunks_of_an_mcap_file(msg, runtime, batches, tmp_path):
+def test_the_chunks_of_an_mcap_file(msg, tmp_path):
     """The file is written by the mcap project's own library."""
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader
@@ -132,14 +124,12 @@ def test_the_chunks_of_an_mcap_file(msg, runtime, batches, tmp_path):
     assert len(chunks) > 3
     for cls, messages in ((msg.Point, points), (msg.Odd, odds)):
         number = channels[cls.__name__]
-        split = [
-            part for c in chunks for part in runtime.on_demand.batches.split_mcap_chunk(c, number)
-        ]
+        split = [part for c in chunks for part in split_mcap_chunk(c, number)]
         assert cls.deserialize_many(split) == messages
         assert len(cls.to_columns(split)) == len(messages)
     for size in (1, 8, 9, 20, len(chunks[0]) - 1):
-        with pytest.raises(runtime.DecodeError, match="ends within a record"):
-            list(runtime.on_demand.batches.split_mcap_chunk(chunks[0][:size], channels["Point"]))
+        with pytest.raises(ValueError, match="ends within a record"):
+            list(split_mcap_chunk(chunks[0][:size], channels["Point"]))
 
 
 # views

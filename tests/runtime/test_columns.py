@@ -191,7 +191,7 @@ def test_many_messages_of_a_few_layouts(folder, error, name):
     for wrong in (0, 150):
         broken = [*raws[:wrong], raws[wrong][:9], *raws[wrong + 1 :]]
         with pytest.raises(error, match=rf"^\[{wrong}\]"):
-            cls.to_columns(batch_of(cls, broken, rng))
+            cls.to_columns(batch_of(broken, rng))
 
 
 def test_one_long_sequence_among_short_ones(msg):
@@ -297,7 +297,7 @@ def test_a_file_in_memory_is_read_in_place(msg, tmp_path):
     rng = random.Random(5)
     messages = messages_of(msg.Image, rng, 40, 6)
     buffers = buffers_of(messages, rng)
-    batch = batch_of(msg.Image, buffers, rng)
+    batch = batch_of(buffers, rng)
     path = tmp_path / "recording"
     path.write_bytes(batch.buffer)
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as memory:
@@ -314,7 +314,7 @@ def test_a_file_in_memory_is_read_in_place(msg, tmp_path):
 def test_columns_share_nothing_with_the_buffers(msg, count):
     for cls in (msg.Point, msg.Image, msg.Deep):
         raws = cls.serialize_many(messages_of(cls, random.Random(1), count, 9)) * 2
-        batch = batch_of(cls, raws, random.Random(1))
+        batch = batch_of(raws, random.Random(1))
         memory = batch.buffer
         for ragged in (True, None):
             columns = cls.to_columns(batch, ragged=ragged)
@@ -327,7 +327,7 @@ def test_columns_share_nothing_with_the_buffers(msg, count):
 
 def test_columns_of_messages_within_each_other_share_nothing_either(msg):
     memory = bytearray(40)
-    kind = type(batch_of(msg.Byte, [bytes(5)], random.Random(1)))
+    kind = type(batch_of([bytes(5)], random.Random(1)))
     columns = msg.Byte.to_columns(kind(memory, np.arange(30), np.arange(5, 35)), ragged=True)
     memory[:] = b"\1" * 40
     assert columns["a"].tolist() == [0] * 30
@@ -335,7 +335,7 @@ def test_columns_of_messages_within_each_other_share_nothing_either(msg):
 
 def test_a_batch_that_is_none(msg):
     raw = msg.Point().serialize()
-    kind = type(batch_of(msg.Point, [raw], random.Random(1)))
+    kind = type(batch_of([raw], random.Random(1)))
     for starts, stops in (([0], [29]), ([-1], [4]), ([5], [4]), ([30], [30])):
         with pytest.raises(ValueError, match="not within its buffer"):
             msg.Point.to_columns(kind(raw, starts, stops))
@@ -380,7 +380,7 @@ def test_the_verdict_is_that_of_deserialize(folder, error, name):
             wanted = (where, caught.problem, caught.offset)
             for read in (cls.to_columns, cls.to_arrow):
                 with pytest.raises(error) as found:
-                    read(batch_of(cls, raws, rng))
+                    read(batch_of(raws, rng))
                 assert (found.value.path, found.value.problem, found.value.offset) == wanted
         else:
             check(cls, raws, rng)

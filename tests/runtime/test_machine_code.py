@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from idlc.runtime.typesupport.callbacks import linked
+from idlc.runtime.c import linked
 from tests.support.tools import MACHINES, assemble, emulator, is_foreign, run, tool
 
 HERE = Path(__file__).parent

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from idlc.check.package.setup_edits import wrapped
+from idlc.check.package.setup_edits import wrap_lines
 from idlc.cli.main import main
 
 LONG = ", ".join(f"'name_{n} = demo.module_{n}:main'" for n in range(6))
@@ -24,7 +24,7 @@ LINES = {
 @pytest.mark.parametrize("name", LINES)
 def test_long_lists_are_wrapped(name):
     text = LINES[name]
-    new = wrapped("", text)
+    new = wrap_lines("", text)
     bare = [one.removeprefix("\ufeff") for one in (text, new)]
     assert ast.dump(ast.parse(bare[0])) == ast.dump(ast.parse(bare[1]))
     assert new.count("#") == text.count("#")
@@ -32,14 +32,14 @@ def test_long_lists_are_wrapped(name):
     assert new.replace("\r\n", "\n").count("\r") == 0
     if name != "parentheses":
         assert all(len(line) <= 99 for line in new.splitlines())
-    assert wrapped("", new) == new
+    assert wrap_lines("", new) == new
 
 
 @pytest.mark.parametrize(
     "text", [f"x = f(y for y in [{'1' * 99}])\n", f"x = '{'1' * 99}'\n", f"x = [{LONG}\n", "", "\f"]
 )
 def test_what_cannot_be_wrapped_stays(text):
-    new = wrapped("", text)
+    new = wrap_lines("", text)
     assert new == text or ast.dump(ast.parse(new)) == ast.dump(ast.parse(text))
 
 
@@ -47,13 +47,13 @@ def test_what_cannot_be_wrapped_stays(text):
 def test_deep_code_stays_or_is_wrapped(depth):
     """Python compares as deep as its recursion limit allows, which libraries may have raised."""
     text = f"x = [{'1+' * depth}1]\n"
-    new = wrapped("", text)
+    new = wrap_lines("", text)
     assert new in (text, f"x = [\n    {'1+' * depth}1,\n]\n")
 
 
 @pytest.mark.parametrize("text", LINES.values())
 def test_lines_of_the_user_stay(text):
-    assert wrapped(text, f"import os\n{text}") == f"import os\n{text}"
+    assert wrap_lines(text, f"import os\n{text}") == f"import os\n{text}"
 
 
 @pytest.mark.parametrize("command", ["check", "node"])

@@ -4,6 +4,7 @@ from copy import deepcopy
 
 import numpy as np
 
+from idlc import Batch
 from idlc.runtime.names import public_name
 from tests.support import values
 
@@ -33,17 +34,15 @@ def make_even(plain, messages):
             make_even(plain[name], [getattr(message, public_name(name)) for message in messages])
 
 
-def batch_of(cls, buffers, rng):
+def batch_of(buffers, rng):
     """Return a Batch of buffers that lie anywhere, in any order and with anything between."""
-    package = cls.__module__.partition(".")[0]
-    kind = __import__(f"{package}._idlc.on_demand.columns")._idlc.on_demand.columns.Batch
     memory, places = bytearray(), {}
     for index in rng.sample(range(len(buffers)), len(buffers)):
         memory += rng.randbytes(rng.randrange(9))
         places[index] = (len(memory), len(memory) + len(buffers[index]))
         memory += buffers[index]
     starts, stops = zip(*(places[index] for index in range(len(buffers))), strict=True)
-    return kind(memory, np.array(starts), stops)
+    return Batch(memory, np.array(starts), stops)
 
 
 def plain_row(row):
@@ -80,7 +79,7 @@ def check(cls, buffers, rng):
     assert len(columns) == len(buffers)
     assert repr(columns.to_list()) == repr(wanted)
     if buffers:
-        columns = cls.to_columns(batch_of(cls, buffers, rng), ragged=True)
+        columns = cls.to_columns(batch_of(buffers, rng), ragged=True)
         assert repr(columns.to_list()) == repr(wanted)
     rows = cls.to_columns(buffers)
     if isinstance(rows, np.ndarray) and "\ufffd" not in repr(wanted):  # there texts are bytes

@@ -134,6 +134,7 @@ class Editor:
 
         note(lsp.CLIENT_REGISTER_CAPABILITY)
         note(lsp.WORKSPACE_CODE_LENS_REFRESH)
+        note(lsp.WORKSPACE_DIAGNOSTIC_REFRESH)
         return asked
 
     def close(self, uri: str) -> None:

@@ -67,7 +67,7 @@ def take_the_place(monkeypatch, graph):
     if graph is None:
         monkeypatch.setattr("idlc.compare.running.import_module", _missing)
     else:
-        monkeypatch.setattr("idlc.compare.running.joined", joined)
+        monkeypatch.setattr("idlc.compare.running.join_graph", joined)
 
 
 def _missing(name):

@@ -4,7 +4,7 @@ import random
 import struct
 
 from idlc.runtime.names import public_name
-from idlc.runtime.on_demand.typeinfo import structure_of
+from idlc.runtime.typeinfo import structure_of
 
 INTEGERS = {
     f"{sign}int{bits}": (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)

@@ -45,7 +45,7 @@ def _built_by_setup(facts: Facts) -> Setup | None:
     return _read(facts.setup_py) if facts.setup_py is not None and is_python else None
 
 
-def wiring(
+def check_setup(
     setup: Source,
     package: str,
     keys: Mapping[str, str],
@@ -88,7 +88,8 @@ def installed(facts: Facts, model: Model, report: Report) -> None:
         )
         keys = {name: facts.files.get(name, name) for name in names}
         others = (facts.setup_cfg, facts.pyproject)
-        report.extend(wiring(setup.source, facts.name, keys, facts.folders, others, facts.runtime))
+        problems = check_setup(setup.source, facts.name, keys, facts.folders, others, facts.runtime)
+        report.extend(problems)
     elif setup is not None and (view := _layout(facts, setup)):
         report.extend(_absent_folders(setup, view, facts.name, (), facts.folders))
 
@@ -151,14 +152,14 @@ def _with_data_files(
     problem: Diagnostic, setup: Setup, lines: Sequence[str], *, uses_glob: bool = False
 ) -> Diagnostic:
     """Return a problem with the hint and the edits that add entries to `data_files`."""
-    from idlc.check.package.setup_edits import appended, argument, imported
+    from idlc.check.package.setup_edits import append_elements, argument, imported
 
     glob, imports = imported(setup, "glob", "glob") if uses_glob else ("glob", ())
     new = [line.replace("glob(", f"{glob}(") for line in lines]
     listed = setup.list_of("data_files")
     edits: tuple[Edit, ...] = ()
     if listed is not None:
-        edits = appended(setup.source, listed, new)
+        edits = append_elements(setup.source, listed, new)
     elif "data_files" not in setup.arguments and uses_glob:  # one problem adds the argument
         edits = argument(setup, f"data_files=[{', '.join(new)}]")
     text = enumerated([f"`{line}`" for line in new])
@@ -228,7 +229,7 @@ def _with_packages(
     problem: Diagnostic, setup: Setup, view: Layout, package: str, folders: Mapping[str, bool]
 ) -> Diagnostic:
     """Return a problem with the edits that let setuptools find the `packages`."""
-    from idlc.check.package.setup_edits import appended, argument, imported, quote_of
+    from idlc.check.package.setup_edits import append_elements, argument, imported, quote_of
     from idlc.check.package.setup_py import range_of
 
     root = view.roots.get("", "")
@@ -257,7 +258,7 @@ def _with_packages(
             edits = (Edit(Span(setup.source, start, end), text),)
         elif listed is not None:
             own = f"*{find}({where}include=['{package}', '{package}.*'])"
-            edits = appended(setup.source, listed, [own])
+            edits = append_elements(setup.source, listed, [own])
             hint = f"add `{own}` to `packages`"
     also = ", with `from setuptools import find_packages`" if imports else ""
     return msgspec.structs.replace(

@@ -15,7 +15,7 @@ from typing import TypeGuard
 
 import msgspec
 
-from idlc.check.package.setup_py import Setup, name_of_call, parsed, range_of, span_of, start_of
+from idlc.check.package.setup_py import Setup, name_of_call, parse, range_of, span_of, start_of
 from idlc.diagnostics import codes
 from idlc.diagnostics.report import Diagnostic, Edit
 from idlc.diagnostics.source import Source, Span
@@ -50,7 +50,7 @@ def quote_of(source: Source, node: ast.AST) -> str:
     return match[0] if match else "'"
 
 
-def appended(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[Edit, ...]:
+def append_elements(source: Source, node: ast.List, elements: Sequence[str]) -> tuple[Edit, ...]:
     """Return the edits that give a list more elements, written with single quotes."""
     begin, end = range_of(source, node)
     quote = quote_of(source, node)
@@ -138,7 +138,7 @@ _TRIES = 40
 _LINE_END = re.compile(r"\r\n?|\n")
 
 
-def wrapped(old: str, new: str) -> str:
+def wrap_lines(old: str, new: str) -> str:
     """Return an edited file whose lines are not too wide, as far as lists can be wrapped.
 
     Lines that `old` has stay as they are.
@@ -148,7 +148,7 @@ def wrapped(old: str, new: str) -> str:
     for _ in range(_TRIES):
         lines = enumerate(_LINE_END.split(new), 1)
         wide = {at for at, line in lines if len(line) > WIDTH and line not in before}
-        tree = parsed(new) if wide else None
+        tree = parse(new) if wide else None
         nodes = ast.walk(tree) if tree else ()
         text = next(
             (spread for node in nodes if (spread := _spread(new, node, wide, refused))), None
@@ -156,7 +156,7 @@ def wrapped(old: str, new: str) -> str:
         if tree is None or text is None:
             break
         # the tree has neither parentheses around items nor text that may follow a generator
-        if _same(tree, parsed(text)):
+        if _same(tree, parse(text)):
             new = text
         else:
             refused.add(text)

@@ -18,7 +18,7 @@ BOM = "\ufeff"
 
 
 @lru_cache(maxsize=256)
-def parsed(text: str) -> ast.Module | None:
+def parse(text: str) -> ast.Module | None:
     """Return the syntax of a file; `None` if it is not Python."""
     try:
         return ast.parse(text.removeprefix(BOM))
@@ -68,7 +68,7 @@ def span_of(source: Source, node: ast.AST) -> Span:
 
 def imported_modules(source: Source) -> Iterator[tuple[str, ast.AST]]:
     """Yield the module of each absolute import, with its node."""
-    tree = parsed(source.text)
+    tree = parse(source.text)
     for node in ast.walk(tree) if tree else ():
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -79,7 +79,7 @@ def imported_modules(source: Source) -> Iterator[tuple[str, ast.AST]]:
 
 def defines(source: Source, name: str) -> bool:
     """Return whether a file may define a name at its top level."""
-    tree = parsed(source.text)
+    tree = parse(source.text)
     if tree is None:
         return True
     for node in tree.body:
@@ -129,7 +129,7 @@ class Setup:
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self.tree = parsed(source.text) or ast.Module([], [])
+        self.tree = parse(source.text) or ast.Module([], [])
         self.nodes = list(ast.walk(self.tree))
         calls = [node for node in self.nodes if isinstance(node, ast.Call) and _is_setup(node)]
         self.call = calls[0] if len(calls) == 1 else None

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from idlc.check.run import tidied
+from idlc.check.run import keep_layout
 from idlc.check.select import REMARK
 from idlc.diagnostics.report import Diagnostic, Edit, Severity, apply
 from idlc.diagnostics.source import Span
@@ -16,8 +16,8 @@ from idlc.editor.elements import differences, of_documents, workspace_edit
 from idlc.editor.features import commands
 from idlc.editor.features.rename import can_move_files
 from idlc.editor.protocol.capabilities import RENAME_FILE, UPDATE_KIND
-from idlc.editor.protocol.parts import AskedActions, Part, Range
-from idlc.editor.publish import Shown, problems, shown
+from idlc.editor.protocol.parts import CodeActionParams, Part, Range
+from idlc.editor.publish import DocumentDiagnostic, problems, to_diagnostic
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Snapshot
 
@@ -36,7 +36,7 @@ class CodeAction(Part, frozen=True):
     title: str
     kind: str
     edit: dict[str, object] | None = None
-    diagnostics: tuple[Shown, ...] = ()
+    diagnostics: tuple[DocumentDiagnostic, ...] = ()
     is_preferred: bool = False
     command: dict[str, object] | None = None
 
@@ -50,9 +50,9 @@ class ProblemInContext(NamedTuple):
     state: ServerState
 
     @property
-    def shown(self) -> Shown:
+    def shown(self) -> DocumentDiagnostic:
         """The problem as the client has it."""
-        return shown(self.diagnostic, self.snapshot, self.state)
+        return to_diagnostic(self.diagnostic, self.snapshot, self.state)
 
     def action(self, title: str, edits: Iterable[Edit], *, best: bool = False) -> CodeAction:
         """Return an action on this problem."""
@@ -60,7 +60,7 @@ class ProblemInContext(NamedTuple):
         return CodeAction(title, _FIX, change, (self.shown,), best)
 
 
-def actions(state: ServerState, params: AskedActions) -> list[CodeAction]:
+def actions(state: ServerState, params: CodeActionParams) -> list[CodeAction]:
     """Return actions on the problems in a range, and on all of a document."""
     state.notice_changes()  # or edits may be of older files
     path = state.path(params.text_document.uri)
@@ -207,7 +207,7 @@ def _everything(all_: list[ProblemInContext], uri: str, state: ServerState) -> I
     if not edits:
         return
     old = edits[0].span.source
-    new = tidied(old.path, old.text, apply(old.text, edits)[0])
+    new = keep_layout(old.path, old.text, apply(old.text, edits)[0])
     change = of_documents({uri: differences(old.text, new, state.encoding)}, state)
     title = "Fix all that can be fixed without harm"
     yield CodeAction(title, _FIX_ALL, change, tuple(problem.shown for problem in fixed))

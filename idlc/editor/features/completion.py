@@ -18,7 +18,7 @@ from idlc.diagnostics.terminal import counted
 from idlc.editor.documents import Document
 from idlc.editor.features.hover import code, shortened
 from idlc.editor.protocol.capabilities import ADD_DEPENDENCY
-from idlc.editor.protocol.parts import AtPosition, Markup, Part, Position, Range, TextEdit
+from idlc.editor.protocol.parts import Markup, Part, Position, PositionParams, Range, TextEdit
 from idlc.editor.protocol.positions import in_lines, lines_of, units
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Workspace
@@ -117,7 +117,7 @@ class Items(Part, frozen=True, omit_defaults=False):
     items: tuple[Item, ...]
 
 
-class Typed(NamedTuple):
+class TypedLine(NamedTuple):
     """The beginning of a line, and its place.
 
     `undeclared` is whether package.xml lacks each of the packages that were looked up so far.
@@ -152,7 +152,7 @@ class Typed(NamedTuple):
         return TextEdit(Range(Position(self.line, start), Position(self.line, end)), text)
 
 
-def complete(state: ServerState, params: AtPosition) -> Items:
+def complete(state: ServerState, params: PositionParams) -> Items:
     """Return the completions at a position."""
     document = state.documents.get(params.text_document.uri)
     path = document.path if document else None
@@ -161,7 +161,7 @@ def complete(state: ServerState, params: AtPosition) -> Items:
         return Items(False, ())
     lines = lines_of(document.text)
     line, at = in_lines(lines, params.position, state.encoding)
-    typed = Typed(document, path, workspace, line, lines[line][:at], state.encoding, {})
+    typed = TypedLine(document, path, workspace, line, lines[line][:at], state.encoding, {})
     items = tuple(_items(typed, state))
     starts = {item.text_edit.range.start.character for item in items}
     words = {start: typed.after(start).lower() for start in starts}
@@ -188,7 +188,7 @@ def _fits(item: Item, words: Mapping[int, str]) -> bool:
     return all(letter in letters for letter in words[item.text_edit.range.start.character])
 
 
-def _items(typed: Typed, state: ServerState) -> Iterator[Item]:
+def _items(typed: TypedLine, state: ServerState) -> Iterator[Item]:
     code, sign, comment = typed.before.partition("#")
     words = code.removeprefix("@optional").lstrip().split(maxsplit=2)
     if sign:
@@ -205,7 +205,7 @@ def _items(typed: Typed, state: ServerState) -> Iterator[Item]:
         yield from _values(typed, words[0], words[2] if len(words) == 3 else "", words[1])
 
 
-def _types(typed: Typed, word: str, state: ServerState) -> Iterator[Item]:
+def _types(typed: TypedLine, word: str, state: ServerState) -> Iterator[Item]:
     """Yield completions of the first word of a line."""
     if bound := re.fullmatch(r"\S*(?:<=|\[)(\d*)", word):
         for size in BOUNDS:
@@ -236,7 +236,7 @@ def _types(typed: Typed, word: str, state: ServerState) -> Iterator[Item]:
         yield Item("---", _SNIPPET, typed.replacing(len(word), "---\n"), "the next section", "4")
 
 
-def _elsewhere(typed: Typed, word: str, own: str, state: ServerState) -> Iterator[Item]:
+def _elsewhere(typed: TypedLine, word: str, own: str, state: ServerState) -> Iterator[Item]:
     """Yield messages of other packages by their names alone."""
     count = 0
     for package in typed.workspace.packages():
@@ -249,7 +249,7 @@ def _elsewhere(typed: Typed, word: str, own: str, state: ServerState) -> Iterato
 
 
 def _type(
-    typed: Typed,
+    typed: TypedLine,
     word: str,
     text: str,
     package: str,
@@ -271,14 +271,14 @@ def _type(
     )
 
 
-def _names(typed: Typed, type_: str, word: str) -> Iterator[Item]:
+def _names(typed: TypedLine, type_: str, word: str) -> Iterator[Item]:
     """Yield usual names for a field of a type."""
     if "/" in type_ or type_[:1].isupper():
         name = suggested_field_name(type_)
         yield Item(name, _FIELD, typed.replacing(len(word), name))
 
 
-def _values(typed: Typed, type_: str, word: str, name: str) -> Iterator[Item]:
+def _values(typed: TypedLine, type_: str, word: str, name: str) -> Iterator[Item]:
     """Yield values that fit a type, the constants of the section for a field first."""
     lines = lines_of(typed.document.text)
     constants = suggested_constants(lines, typed.line, type_) if name else ()
@@ -289,7 +289,7 @@ def _values(typed: Typed, type_: str, word: str, name: str) -> Iterator[Item]:
         yield Item(value, _VALUE, typed.replacing(len(word), value), sort_text=f"1{number}")
 
 
-def _in_comment(typed: Typed, comment: str, words: list[str]) -> Iterator[Item]:
+def _in_comment(typed: TypedLine, comment: str, words: list[str]) -> Iterator[Item]:
     if ignored := re.search(r"idlc:\s*ignore[\[(]\s*([\w, ]*)$", comment):
         word = ignored[1].rpartition(",")[2].strip()
         for code in CODES.values():

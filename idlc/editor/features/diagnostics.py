@@ -6,12 +6,12 @@ from zlib import crc32
 
 import msgspec
 
-from idlc.editor.protocol.parts import AskedWorkspace, OfDocument
-from idlc.editor.publish import Shown, diagnostics
+from idlc.editor.protocol.parts import DocumentParams, WorkspaceDiagnosticParams
+from idlc.editor.publish import DocumentDiagnostic, diagnostics
 from idlc.editor.state import ServerState
 
 
-def document(state: ServerState, params: OfDocument) -> dict[str, object]:
+def document(state: ServerState, params: DocumentParams) -> dict[str, object]:
     """Return the problems of a document.
 
     All of them each time: Neovim forgets them with a document that it reads again, but not their
@@ -20,7 +20,7 @@ def document(state: ServerState, params: OfDocument) -> dict[str, object]:
     return _report(diagnostics(state).get(params.text_document.uri, []), None)
 
 
-def workspace(state: ServerState, params: AskedWorkspace) -> dict[str, object]:
+def workspace(state: ServerState, params: WorkspaceDiagnosticParams) -> dict[str, object]:
     """Return the problems of every document that has any, or had some in the last answer."""
     by_uri = diagnostics(state)
     before = {previous.uri: previous.value for previous in params.previous_result_ids}
@@ -32,7 +32,7 @@ def workspace(state: ServerState, params: AskedWorkspace) -> dict[str, object]:
     return {"items": items}
 
 
-def _report(problems: list[Shown], before: str | None) -> dict[str, object]:
+def _report(problems: list[DocumentDiagnostic], before: str | None) -> dict[str, object]:
     now = f"{crc32(msgspec.json.encode(problems)):08x}-{len(problems)}"
     if now == before:
         return {"kind": "unchanged", "resultId": now}

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from idlc.documents.show import outline
 from idlc.editor.documents import is_built_in
 from idlc.editor.elements import Element, section_names, spot_at
-from idlc.editor.protocol.parts import AtPosition, Markup, Part, Range
+from idlc.editor.protocol.parts import Markup, Part, PositionParams, Range
 from idlc.editor.state import ServerState
 from idlc.editor.workspace import Snapshot
 from idlc.model import derive, ir
@@ -27,7 +27,7 @@ class Hover(Part, frozen=True):
     range: Range | None = None
 
 
-def hover(state: ServerState, params: AtPosition) -> Hover | None:
+def hover(state: ServerState, params: PositionParams) -> Hover | None:
     """Return the description of the element at a position; between definitions, of the file."""
     context = state.context(params.text_document.uri)
     if context is None:

@@ -10,14 +10,22 @@ from idlc.compare.packages import compare
 from idlc.diagnostics.report import first_few
 from idlc.diagnostics.terminal import counted
 from idlc.editor.elements import elements, users
-from idlc.editor.protocol.parts import Action, Lens, OfDocument, OfRange, Part, Position, Range
+from idlc.editor.protocol.parts import (
+    Action,
+    DocumentParams,
+    Lens,
+    Part,
+    Position,
+    Range,
+    RangeParams,
+)
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.model import derive, ir
 from idlc.model.ir import spell_value
 from idlc.wire.layout import layout
 
 if TYPE_CHECKING:
-    from idlc.compare.breaking import Earlier
+    from idlc.compare.breaking import Baseline
 
 
 class Hint(Part, frozen=True):
@@ -29,7 +37,7 @@ class Hint(Part, frozen=True):
     padding_left: bool
 
 
-def hints(state: ServerState, params: OfRange) -> list[Hint]:
+def hints(state: ServerState, params: RangeParams) -> list[Hint]:
     """Return the hints in a range; none where the file has errors."""
     context = state.context(params.text_document.uri) if state.settings.inlay_hints else None
     model = context.snapshot.model_of(context.interface) if context else None
@@ -63,14 +71,14 @@ MOST_DEFAULTS = 5
 MOST_LETTERS = 40
 
 
-def lenses(state: ServerState, params: OfDocument) -> list[Lens]:
+def lenses(state: ServerState, params: DocumentParams) -> list[Lens]:
     """Return the lenses of a file; `resolve` computes their texts when they are shown."""
     context = state.context(params.text_document.uri) if state.settings.code_lens else None
     if context is None:
         return []
     kinds = [_HASH] if context.snapshot.library.distro.has_hashes else []
     kinds += [_USERS] if context.interface.name.kind == "msg" else []
-    kinds += [_BREAKS] if _earlier(context, state) else []
+    kinds += [_BREAKS] if _baseline(context, state) else []
     of_file = [Lens(_TOP, data=[params.text_document.uri, kind]) for kind in kinds]
     return [*of_file, *(_defaults(context, state) if state.settings.default_lens else ())]
 
@@ -123,36 +131,36 @@ def _text(state: ServerState, uri: str, kind: str) -> str:
     return model.describer.hash(str(name)) if model else "no type hash: there are errors"
 
 
-def _earlier(context: InterfaceContext, state: ServerState) -> Earlier | None:
+def _baseline(context: InterfaceContext, state: ServerState) -> Baseline | None:
     """Return the version that a file's folder is compared with, if settings name one."""
     workspace = state.workspace_of(context.snapshot.path_of(context.source))
-    earlier = workspace.earlier(state.settings.against) if workspace else None
-    return earlier if earlier and earlier.name else None
+    baseline = workspace.baseline(state.settings.against) if workspace else None
+    return baseline if baseline and baseline.name else None
 
 
 def _what_breaks(context: InterfaceContext, state: ServerState) -> str:
     """Return a sentence on what a file's changes break against the version of the settings."""
-    interface, earlier = context.interface, _earlier(context, state)
+    interface, baseline = context.interface, _baseline(context, state)
     workspace = state.workspace_of(context.snapshot.path_of(context.source))
-    if earlier is None or workspace is None:
+    if baseline is None or workspace is None:
         return ""
-    state.follow_git(workspace.folder, earlier.repository)
+    state.follow_git(workspace.folder, baseline.repository)
     side = workspace.before(state.settings.against)
     before = side.models.get(interface.name.package)
     after = context.snapshot.model_of(interface)
     if after is None:
         return ""
     if interface.name in side.broken:
-        return f"not compared: there are errors in {earlier.name}"
+        return f"not compared: there are errors in {baseline.name}"
     if side.error and not side.models:
         return f"not compared: {side.error}"
     if before is None or interface.name not in {own.name for own in before.own}:
-        return f"nothing to compare with in {earlier.name}"
+        return f"nothing to compare with in {baseline.name}"
     name = {interface.name}
     changes = compare(before.only(name), after.only(name)).changes
-    broken = {level for change in earlier.not_allowed(changes) for level in change.levels}
+    broken = {level for change in baseline.not_allowed(changes) for level in change.levels}
     if not broken:
-        return f"breaks nothing against {earlier.name}"
+        return f"breaks nothing against {baseline.name}"
     count = len(
         {
             snapshot.path_of(span.source)
@@ -160,4 +168,4 @@ def _what_breaks(context: InterfaceContext, state: ServerState) -> str:
         }
     )
     levels = ", ".join(level for level in LEVELS if level in broken)
-    return f"breaks: {levels} for {counted(count, 'user')} against {earlier.name}"
+    return f"breaks: {levels} for {counted(count, 'user')} against {baseline.name}"

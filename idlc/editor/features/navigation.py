@@ -12,13 +12,13 @@ from idlc.diagnostics.source import Source, Span
 from idlc.editor.elements import Element, elements, snapshots, spot_at, text_of, users, uses
 from idlc.editor.protocol.framing import INVALID_PARAMS, RequestError
 from idlc.editor.protocol.parts import (
-    AskedContent,
-    AskedReferences,
-    AtPosition,
     Location,
     Part,
     Position,
+    PositionParams,
     Range,
+    ReferenceParams,
+    TextDocumentContentParams,
 )
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.editor.workspace import Snapshot
@@ -32,7 +32,7 @@ from idlc.project.root import MANIFEST, Root
 _TOP = Range(Position(0, 0), Position(0, 0))
 
 
-def named_package(state: ServerState, params: AtPosition) -> str | None:
+def named_package(state: ServerState, params: PositionParams) -> str | None:
     """Return the package that is named at a position of a package.xml."""
     path = state.path(params.text_document.uri)
     source = _source(path, state) if path and path.name == MANIFEST else None
@@ -55,7 +55,7 @@ def manifest_definition(package: str, state: ServerState) -> Location | None:
 
 
 def manifest_references(
-    package: str, params: AskedReferences, state: ServerState
+    package: str, params: ReferenceParams, state: ServerState
 ) -> list[Location]:
     """Return the uses of a package's messages, and the declarations in other packages."""
     locations = [
@@ -121,7 +121,7 @@ class Subject(NamedTuple):
     element: Element | None
 
 
-def subject_at(state: ServerState, params: AtPosition) -> Subject | None:
+def subject_at(state: ServerState, params: PositionParams) -> Subject | None:
     """Return the subject of a position; between definitions, the file's interface."""
     context = state.context(params.text_document.uri)
     if context is None:
@@ -135,7 +135,7 @@ def subject_at(state: ServerState, params: AtPosition) -> Subject | None:
     return Subject(context, context.interface.name, spot.element)
 
 
-def definition(state: ServerState, params: AtPosition) -> Location | None:
+def definition(state: ServerState, params: PositionParams) -> Location | None:
     """Return the definition of the subject at a position."""
     if package := named_package(state, params):
         return manifest_definition(package, state)
@@ -147,7 +147,7 @@ def definition(state: ServerState, params: AtPosition) -> Location | None:
     return top(subject.name, subject.context.snapshot, state)
 
 
-def type_definition(state: ServerState, params: AtPosition) -> Location | None:
+def type_definition(state: ServerState, params: PositionParams) -> Location | None:
     """Return the definition of the type of the field at a position."""
     subject = subject_at(state, params)
     if subject is None:
@@ -162,7 +162,7 @@ def top(name: ir.TypeName, snapshot: Snapshot, state: ServerState) -> Location |
     return state.location(Span(source, 0, 0), snapshot) if source else None
 
 
-def references(state: ServerState, params: AskedReferences) -> list[Location]:
+def references(state: ServerState, params: ReferenceParams) -> list[Location]:
     """Return the uses of the subject at a position in all folders, and its definition."""
     if package := named_package(state, params):
         return manifest_references(package, params, state)
@@ -214,7 +214,7 @@ def comments(context: InterfaceContext) -> Iterator[Span]:
                 yield Span(context.source, start, start + len(line.comment))
 
 
-def highlights(state: ServerState, params: AtPosition) -> list[Highlight]:
+def highlights(state: ServerState, params: PositionParams) -> list[Highlight]:
     """Return the ranges of the document that have the same subject as a position."""
     subject = subject_at(state, params)
     if subject is None:
@@ -230,7 +230,7 @@ def highlights(state: ServerState, params: AtPosition) -> list[Highlight]:
     ]
 
 
-def built_in_text(_state: ServerState, params: AskedContent) -> dict[str, str]:
+def built_in_text(_state: ServerState, params: TextDocumentContentParams) -> dict[str, str]:
     """Return the text of `idlc:/jazzy/std_msgs/msg/Header.msg`."""
     scheme, _, path = params.uri.partition(":")
     distro, _, name = path.strip("/").partition("/")

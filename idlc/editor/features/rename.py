@@ -28,11 +28,11 @@ from idlc.editor.features.navigation import mentions
 from idlc.editor.protocol import uris
 from idlc.editor.protocol.framing import REQUEST_FAILED, RequestError
 from idlc.editor.protocol.parts import (
-    AskedFileRenames,
-    AskedRename,
-    AtPosition,
     Part,
+    PositionParams,
     Range,
+    RenameFilesParams,
+    RenameParams,
     TextEdit,
 )
 from idlc.editor.state import InterfaceContext, Renaming, ServerState
@@ -53,14 +53,14 @@ _CANNOT_MOVE = (
 )
 
 
-class Renamed(Part, frozen=True):
+class PrepareRenameResult(Part, frozen=True):
     """The range and the name that would be renamed."""
 
     range: Range
     placeholder: str
 
 
-class Annotated(TextEdit, frozen=True):
+class AnnotatedTextEdit(TextEdit, frozen=True):
     """An edit that the user confirms."""
 
     annotation_id: str
@@ -74,7 +74,7 @@ class Move(Part, frozen=True, tag="rename", tag_field="kind"):
     annotation_id: str | None = None
 
 
-def prepare(state: ServerState, params: AtPosition) -> Renamed | None:
+def prepare(state: ServerState, params: PositionParams) -> PrepareRenameResult | None:
     """Return the name at a position, `None` if it is none of this workspace's."""
     state.notice_changes()  # which a client may not have reported yet
     context = state.context(params.text_document.uri)
@@ -82,11 +82,11 @@ def prepare(state: ServerState, params: AtPosition) -> Renamed | None:
     if context is None or spot is None:
         return None
     if spot.part == "name" and spot.element.meaning is not None:
-        return Renamed(state.range(spot.span), spot.span.text)
+        return PrepareRenameResult(state.range(spot.span), spot.span.text)
     target = spot.element.target
     if spot.part == "type" and target is not None and _home(target, context, state):
         span = _last(spot.element.type)
-        return Renamed(state.range(span), span.text)
+        return PrepareRenameResult(state.range(span), span.text)
     return None
 
 
@@ -114,7 +114,7 @@ def _home(
     return None
 
 
-def rename(state: ServerState, params: AskedRename) -> dict[str, object] | None:
+def rename(state: ServerState, params: RenameParams) -> dict[str, object] | None:
     """Return the edits that rename the element at a position, annotated with what they break."""
     state.forget()
     context = state.context(params.text_document.uri)
@@ -200,7 +200,7 @@ def rename_interface(
     return _answer(edits, move, f"Rename {old.name} to {new}", changes, home, state)
 
 
-def files(state: ServerState, params: AskedFileRenames) -> dict[str, object] | None:
+def files(state: ServerState, params: RenameFilesParams) -> dict[str, object] | None:
     """Return the edits that follow from interface files getting other names.
 
     Some clients also request this for a file that an answer of `rename` has them move. Open
@@ -294,7 +294,9 @@ def _answer(
             return of_documents(edits, state)
         return {"documentChanges": [*(document_edit(*item, state) for item in edits.items()), move]}
     marked = (
-        document_edit(uri, (Annotated(e.range, e.new_text, _ANNOTATION) for e in some), state)
+        document_edit(
+            uri, (AnnotatedTextEdit(e.range, e.new_text, _ANNOTATION) for e in some), state
+        )
         for uri, some in edits.items()
     )
     moves = [msgspec.structs.replace(move, annotation_id=_ANNOTATION)] if move else []

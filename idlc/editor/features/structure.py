@@ -7,7 +7,14 @@ from collections.abc import Iterator
 from idlc.diagnostics.source import Span
 from idlc.editor.documents import is_built_in
 from idlc.editor.elements import Element, elements, section_names, snapshots, text_of
-from idlc.editor.protocol.parts import AskedSymbols, AtPositions, Location, OfDocument, Part, Range
+from idlc.editor.protocol.parts import (
+    DocumentParams,
+    Location,
+    Part,
+    PositionsParams,
+    Range,
+    WorkspaceSymbolParams,
+)
 from idlc.editor.state import CONTENT, InterfaceContext, ServerState
 from idlc.language.parse import parse
 from idlc.model import ir
@@ -39,7 +46,7 @@ class InterfaceSymbol(Part, frozen=True):
     container_name: str
 
 
-def document(state: ServerState, params: OfDocument) -> list[Symbol]:
+def document(state: ServerState, params: DocumentParams) -> list[Symbol]:
     """Return the definitions of a file, by section where it has several."""
     context = state.context(params.text_document.uri)
     if context is None:
@@ -82,7 +89,7 @@ def _symbol(element: Element, state: ServerState) -> Symbol:
     return Symbol(name, type_, kind, state.range(element.whole), state.range(element.name))
 
 
-def workspace(state: ServerState, params: AskedSymbols) -> list[InterfaceSymbol]:
+def workspace(state: ServerState, params: WorkspaceSymbolParams) -> list[InterfaceSymbol]:
     """Return the interfaces in whose full names the letters of a word occur in this order."""
     symbols: dict[InterfaceSymbol, None] = {}
     for snapshot in snapshots(state):
@@ -124,7 +131,7 @@ class Link(Part, frozen=True):
     tooltip: str
 
 
-def folds(state: ServerState, params: OfDocument) -> list[Fold]:
+def folds(state: ServerState, params: DocumentParams) -> list[Fold]:
     """Return the sections of a service or action, and comments of several lines."""
     context = state.context(params.text_document.uri)
     if context is None:
@@ -154,7 +161,7 @@ def _comments(context: InterfaceContext, state: ServerState) -> Iterator[tuple[i
             yield first, last
 
 
-def selections(state: ServerState, params: AtPositions) -> list[Selection]:
+def selections(state: ServerState, params: PositionsParams) -> list[Selection]:
     """Return for each position the ranges around it: a part, its line, its section, the file."""
     context = state.context(params.text_document.uri)
     if context is None:
@@ -188,7 +195,7 @@ def selections(state: ServerState, params: AtPositions) -> list[Selection]:
     return answers
 
 
-def links(state: ServerState, params: OfDocument) -> list[Link]:
+def links(state: ServerState, params: DocumentParams) -> list[Link]:
     """Return the types of a file that lead to other files."""
     context = state.context(params.text_document.uri)
     shows_texts = state.supports("workspace", CONTENT)

@@ -17,7 +17,7 @@ from idlc.editor.features.lenses import hints, lenses
 from idlc.editor.features.navigation import comments
 from idlc.editor.features.structure import sections
 from idlc.editor.protocol.capabilities import MODIFIERS, TYPES
-from idlc.editor.protocol.parts import DocumentId, OfDocument, OfRange, Position, Range
+from idlc.editor.protocol.parts import DocumentId, DocumentParams, Position, Range, RangeParams
 from idlc.editor.state import InterfaceContext, ServerState
 from idlc.language import tree
 from idlc.model import ir
@@ -32,13 +32,13 @@ class Token(NamedTuple):
     modifiers: tuple[str, ...] = ()
 
 
-def document(state: ServerState, params: OfDocument) -> dict[str, list[int]]:
+def document(state: ServerState, params: DocumentParams) -> dict[str, list[int]]:
     """Return the tokens of a document."""
     context = state.context(params.text_document.uri)
     return {"data": _encoded(_tokens(context), state) if context else []}
 
 
-def part(state: ServerState, params: OfRange) -> dict[str, list[int]]:
+def part(state: ServerState, params: RangeParams) -> dict[str, list[int]]:
     """Return the tokens that touch a range."""
     context = state.context(params.text_document.uri)
     if context is None:
@@ -112,9 +112,9 @@ def fingerprints(
     for opened in documents:
         document_id = DocumentId(opened.uri)
         shown: list[object] = [
-            hints(state, OfRange(document_id, _WHOLE)),
-            document(state, OfDocument(document_id)),
-            lenses(state, OfDocument(document_id)),
+            hints(state, RangeParams(document_id, _WHOLE)),
+            document(state, DocumentParams(document_id)),
+            lenses(state, DocumentParams(document_id)),
         ]
         if context := state.context(opened.uri):
             model = context.snapshot.model_of(context.interface)

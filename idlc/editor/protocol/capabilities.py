@@ -14,6 +14,7 @@ MODIFIERS = ["declaration", "readonly", "defaultLibrary"]
 #: The encodings in which positions can be counted, and the default of the protocol.
 ENCODINGS = ("utf-8", "utf-16", "utf-32")
 DEFAULT_ENCODING = "utf-16"
+_REQUESTS = ("textDocument", "diagnostic")
 #: The command that declares a package in package.xml, for what is completed.
 ADD_DEPENDENCY = "idlc.addDependency"
 #: The command that gives a document's file, and its interface, another name.
@@ -31,12 +32,34 @@ def encoding(client: dict[str, Any]) -> str:
     return supported[0] if supported else DEFAULT_ENCODING
 
 
+def supports(client: object, *path: str) -> bool:
+    """Return whether a client has a capability, or names it in a list."""
+    value: Any = client
+    for name in path:
+        if isinstance(value, list):
+            value = name in value
+        else:
+            value = value.get(name) if isinstance(value, dict) else None
+    return value not in (None, False)
+
+
+def requests_problems(client: object) -> bool:
+    """Return whether a client requests problems, and does so again when the server asks for it.
+
+    Others request those of a document when it changes. They would keep showing an error that a
+    change elsewhere removed, so they get all problems pushed.
+    """
+    return supports(client, *_REQUESTS) and supports(
+        client, "workspace", "diagnostics", "refreshSupport"
+    )
+
+
 def answer(client: dict[str, Any]) -> dict[str, object]:
     """Return the answer to `initialize` for what a client can do."""
-    return {
-        "capabilities": {"positionEncoding": encoding(client), **CAPABILITIES},
-        "serverInfo": {"name": "idlc", "version": __version__},
-    }
+    own = {"positionEncoding": encoding(client), **CAPABILITIES}
+    if supports(client, *_REQUESTS) and not requests_problems(client):
+        del own["diagnosticProvider"]  # or the client shows what it requested beside what is pushed
+    return {"capabilities": own, "serverInfo": {"name": "idlc", "version": __version__}}
 
 
 _INTERFACE_FILES = {"filters": [{"pattern": {"glob": "**/*.{msg,srv,action}"}}]}

@@ -81,7 +81,7 @@ class DidChange(Part, frozen=True):
     content_changes: tuple[Change, ...]
 
 
-class OfDocument(Part, frozen=True):
+class DocumentParams(Part, frozen=True):
     """The parameters of a request about a whole document."""
 
     text_document: DocumentId
@@ -94,20 +94,20 @@ class PreviousResult(Part, frozen=True):
     value: str
 
 
-class AskedWorkspace(Part, frozen=True):
+class WorkspaceDiagnosticParams(Part, frozen=True):
     """workspace/diagnostic."""
 
     previous_result_ids: tuple[PreviousResult, ...] = ()
 
 
-class AtPosition(Part, frozen=True):
+class PositionParams(Part, frozen=True):
     """The parameters of a request about a position in a document."""
 
     text_document: DocumentId
     position: Position
 
 
-class AtPositions(Part, frozen=True):
+class PositionsParams(Part, frozen=True):
     """The parameters of a request about several positions in a document."""
 
     text_document: DocumentId
@@ -130,7 +130,7 @@ class Lens(Part, frozen=True):
     data: Any = None
 
 
-class OfRange(Part, frozen=True):
+class RangeParams(Part, frozen=True):
     """The parameters of a request about a range of a document."""
 
     text_document: DocumentId
@@ -143,19 +143,19 @@ class ReferenceContext(Part, frozen=True):
     include_declaration: bool = True
 
 
-class AskedReferences(AtPosition, frozen=True):
+class ReferenceParams(PositionParams, frozen=True):
     """textDocument/references."""
 
     context: ReferenceContext = ReferenceContext()
 
 
-class AskedSymbols(Part, frozen=True):
+class WorkspaceSymbolParams(Part, frozen=True):
     """workspace/symbol."""
 
     query: str = ""
 
 
-class GivenProblem(Part, frozen=True):
+class ClientDiagnostic(Part, frozen=True):
     """A diagnostic that the client shows."""
 
     range: Range
@@ -166,17 +166,17 @@ class GivenProblem(Part, frozen=True):
 class ActionContext(Part, frozen=True):
     """The kinds of actions that are requested; all without `only`."""
 
-    diagnostics: tuple[GivenProblem, ...] = ()
+    diagnostics: tuple[ClientDiagnostic, ...] = ()
     only: tuple[str, ...] | None = None
 
 
-class AskedActions(OfRange, frozen=True):
+class CodeActionParams(RangeParams, frozen=True):
     """textDocument/codeAction."""
 
     context: ActionContext = ActionContext()
 
 
-class AskedRename(AtPosition, frozen=True):
+class RenameParams(PositionParams, frozen=True):
     """textDocument/rename."""
 
     new_name: str
@@ -189,7 +189,7 @@ class FileRename(Part, frozen=True):
     new_uri: str
 
 
-class AskedFileRenames(Part, frozen=True):
+class RenameFilesParams(Part, frozen=True):
     """workspace/willRenameFiles."""
 
     files: tuple[FileRename, ...]
@@ -202,7 +202,7 @@ class Command(Part, frozen=True):
     arguments: tuple[Any, ...] = ()
 
 
-class AskedContent(Part, frozen=True):
+class TextDocumentContentParams(Part, frozen=True):
     """workspace/textDocumentContent."""
 
     uri: str

@@ -153,17 +153,16 @@ def type_data_source(model: link.Model, parent: str = "") -> str:
 
 def _parts(tables: TypesDict, parent: str) -> Iterator[str]:
     """Yield pieces that joined are the JSON text."""
-    yield f'{{"package":{_json(tables["package"])}'
-    if parent:
-        yield f',"around":{_json(f"{parent}.")}'
+    around = f',"around":{_json(f"{parent}.")}' if parent else ""
+    mark = f'{{"package":{_json(tables["package"])}{around}'
     for key in ("descriptions", "hashes", "sources"):
-        mark = f',"{key}":{{'
+        mark += f',"{key}":{{'
         entries: dict[str, Any] = tables[key]
         for name, value in entries.items():
             yield f"{mark}{_json(name)}:{_json(value)}"
             mark = ","
-        yield "}" if entries else mark + "}"
-    yield "}"
+        mark = "}" if entries else mark + "}"
+    yield mark + "}"
 
 
 _json = json.JSONEncoder(ensure_ascii=True, separators=(",", ":")).encode

@@ -6,10 +6,11 @@ from array import array
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
 
 from idlc.recordings.containers import bag
 from idlc.recordings.containers.compression import ZSTD_MAGIC
@@ -26,12 +27,12 @@ from idlc.recordings.containers.mcap import MAGIC as MCAP_MAGIC
 from idlc.recordings.containers.source import (
     CDR,
     RecordingError,
-    Unread,
+    UnreadTopic,
     first_bytes,
     is_local,
     of_file,
     source_of,
-    unread,
+    unread_reason,
 )
 
 if TYPE_CHECKING:
@@ -45,8 +46,7 @@ MSG = "ros2msg"
 __all__ = ["Container", "RecordingError", "Schema", "Topic", "open_recording"]
 
 
-@dataclass(frozen=True)
-class Schema:
+class Schema(msgspec.Struct, frozen=True):
     """A definition as it was recorded; `encoding` is ros2msg or ros2idl for those of ROS 2."""
 
     name: str
@@ -59,8 +59,7 @@ class Schema:
         return not self.text.strip()
 
 
-@dataclass(frozen=True)
-class Topic:
+class Topic(msgspec.Struct, frozen=True):
     """The messages recorded under one name, of one type.
 
     `hash` is the type hash (RIHS01) and None where the recorder wrote none. `schema` is None where
@@ -261,14 +260,14 @@ class Container(File):
                 with of_file(file.name):
                     check_count(topic.name, counted, total)
 
-    def unread(self) -> list[Unread]:
+    def unread(self) -> list[UnreadTopic]:
         """Return the topics that cannot be read, judging by the first message of each."""
-        reasons: dict[Unread, None] = {}
+        reasons: dict[UnreadTopic, None] = {}
         for file in self.files:
             names = {number: topic.name for topic, number in file.topics if topic.encoding == CDR}
             with suppress(RecordingError):  # reading the messages says what is wrong
                 for number, start in file.first_messages():
-                    why = unread(names[number], start) if number in names else None
+                    why = unread_reason(names[number], start) if number in names else None
                     if why:
                         reasons[why] = None
         return list(reasons)
@@ -394,4 +393,4 @@ def _joined(same: list[Topic]) -> list[Topic]:
     """Return at most one topic for channels: their total, their first definition and hash."""
     digest = next((topic.hash for topic in same if topic.hash), None)
     total = sum(topic.count for topic in same)
-    return [replace(topic, count=total, hash=digest) for topic in same[:1]]
+    return [msgspec.structs.replace(topic, count=total, hash=digest) for topic in same[:1]]

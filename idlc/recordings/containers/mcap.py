@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 from struct import Struct
 from typing import NamedTuple
+
+import msgspec
 
 from idlc.recordings.containers.compression import Room, decompress
 from idlc.recordings.containers.source import START, RecordingError, Source
@@ -211,20 +212,19 @@ MESSAGE_HEAD = 22
 CHANNEL_AND_TIME = Struct("<HIQ")
 
 
-@dataclass
-class McapFacts:
+class McapFacts(msgspec.Struct):
     """The content of a file; `start` is the time of the first message.
 
     `counts` is by channel; so is `loose`, of messages outside of chunks in a file with a summary.
     """
 
-    schemas: dict[int, McapSchema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
-    counts: dict[int, int] = field(default_factory=dict)
+    schemas: dict[int, McapSchema] = {}
+    channels: dict[int, Channel] = {}
+    chunks: list[Chunk] = []
+    counts: dict[int, int] = {}
     loose: dict[int, int] | None = None
     start: int | None = None
-    notes: list[str] = field(default_factory=list)
+    notes: list[str] = []
 
     def add(self, op: int, data: memoryview) -> None:
         """Add a schema or a channel; definitions of one id must be equal."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from struct import Struct
 from typing import Any, NamedTuple, TypeAlias
 
+import msgspec
 import numpy as np
 
 from idlc.recordings.containers import mcap
@@ -67,8 +67,7 @@ class Window(NamedTuple):
 ALWAYS = Window()
 
 
-@dataclass(frozen=True)
-class Messages:
+class Messages(msgspec.Struct, frozen=True, eq=False):
     """Messages of one topic, in the order in which they were recorded, for `to_columns` to read.
 
     Times are int64, in nanoseconds; `publish_times` is None where a recording has none.
@@ -85,8 +84,7 @@ class Messages:
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
-class Ranges(Messages):
+class Ranges(Messages, frozen=True, eq=False):
     """Messages that are each a part of one buffer."""
 
     buffer: Any
@@ -109,8 +107,7 @@ class Ranges(Messages):
         return [view[start:stop] for start, stop in pairs]
 
 
-@dataclass(frozen=True)
-class Separate(Messages):
+class Separate(Messages, frozen=True, eq=False):
     """Messages in buffers of their own: joining large ones would only copy them."""
 
     raws: list[Raw]
@@ -130,7 +127,7 @@ def times_of(values: Any, what: str) -> Any:
     return values.astype(np.int64)
 
 
-def joined(parts: Sequence[Messages]) -> Messages:
+def join_messages(parts: Sequence[Messages]) -> Messages:
     """Return the messages of all parts, in memory once more only if they are small."""
     if len(parts) == 1:
         return parts[0]
@@ -197,7 +194,7 @@ def mcap_messages(
                     return
                 ranges = _read(source, group, channels, room, check).within(window)
             if len(ranges):
-                yield unpacked(ranges, room)
+                yield decompress_each(ranges, room)
 
 
 def _read(
@@ -389,7 +386,7 @@ def _messages(
     return Ranges(log, publish, buffer, at + MESSAGE.itemsize, stops)
 
 
-def unpacked(ranges: Ranges, room: Room) -> Messages:
+def decompress_each(ranges: Ranges, room: Room) -> Messages:
     """Return messages without the compression that each may have by itself.
 
     No other message begins like a zstd frame.

@@ -54,25 +54,25 @@ _COMPRESSIONS = {
 }
 
 
-class Unread(NamedTuple):
+class UnreadTopic(NamedTuple):
     """Why the messages of a topic cannot be read, and what can be done about it."""
 
     message: str
     hint: str
 
 
-def unread(topic: str, start: bytes) -> Unread | None:
+def unread_reason(topic: str, start: bytes) -> UnreadTopic | None:
     """Return why messages that begin so cannot be read, or None if no such reason is known."""
     kind = _ENCAPSULATIONS.get(bytes((start[0], start[1] & ~1))) if len(start) > 1 else None
     if kind:
         what = f"messages of `{topic}` are written as {kind}, and idlc reads only plain CDR"
-        return Unread(what, "record them from a publisher whose data representation is XCDR1")
+        return UnreadTopic(what, "record them from a publisher whose data representation is XCDR1")
     for magic, name in _COMPRESSIONS.items():
         if start.startswith(magic):
             what = (
                 f"messages of `{topic}` are each compressed with {name}, and idlc reads only zstd"
             )
-            return Unread(what, "`ros2 bag convert` can write the bag without compression")
+            return UnreadTopic(what, "`ros2 bag convert` can write the bag without compression")
     return None
 
 

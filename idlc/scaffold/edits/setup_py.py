@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import libcst as cst
 
-from idlc.check.package.installation import wiring
+from idlc.check.package.installation import check_setup
 from idlc.diagnostics.report import apply
 from idlc.diagnostics.source import Source
 from idlc.project.edits import Edited, Outcome, Refused, Script, already_taken, split
@@ -475,7 +475,7 @@ def add_interfaces(
 
     Computed values stay; `idlc check` and the build report missing ones then.
     """
-    problems = wiring(Source("setup.py", text), package, {key: key for key in keys}, folders)
+    problems = check_setup(Source("setup.py", text), package, {key: key for key in keys}, folders)
     return apply(text, (edit for problem in problems for edit in problem.edits))[0]
 
 

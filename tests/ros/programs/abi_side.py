@@ -10,7 +10,7 @@ OTHERS = (0, 1, 2, 7, 0x100, 0x1_0000_0000, 0xDEAD_BEEF_0000, 2**63 - 8, 2**64 -
 
 
 def measuring():
-    return importlib.import_module("std_msgs._idlc.typesupport.abi")
+    return importlib.import_module("std_msgs._idlc.introspection")
 
 
 def handles_of(library):
@@ -60,7 +60,7 @@ def alter(path):
 def fast_cdr(path):
     """Find the pointers of an older Fast CDR, which is the only one in this process."""
     ctypes.CDLL(path)
-    return importlib.import_module("std_msgs._idlc.typesupport.fastrtps").fast_cdr()
+    return importlib.import_module("std_msgs._idlc.fastrtps").fast_cdr()
 
 
 if __name__ == "__main__":

@@ -89,7 +89,10 @@ def nothing_is_loaded_before_rclpy_asks():
     """The classes alone load neither ctypes nor the data of types."""
     assert "ctypes" not in sys.modules or "std_msgs._idlc.typesupport" not in sys.modules
     String("text").serialize()
-    assert not [name for name in sys.modules if "typesupport" in name and "_idlc" in name]
+    waiting = {
+        f"std_msgs._idlc.{name}" for name in ("c", "introspection", "typeinfo", "typesupport")
+    }
+    assert not waiting & set(sys.modules)
     assert type(String)._TYPE_SUPPORT is None
     serialize_message(String("text"))
     assert type(String)._TYPE_SUPPORT is not None
@@ -178,8 +181,8 @@ def garbage_is_dropped():
 
 def without_machine_code(name):
     """Do something where there is no machine code, which Fast DDS can do without."""
-    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
-    callbacks.CODE, callbacks._executable = {}, None  # to call this would be an error
+    c = importlib.import_module("std_msgs._idlc.c")
+    c.CODE, c._executable = {}, None  # to call this would be an error
     globals()[name]()
 
 
@@ -454,15 +457,15 @@ def serves_without_events():
 def says_what_to_do(case):
     """Print the error of a surrounding that type support cannot work in."""
     utilities = importlib.import_module("rclpy.utilities")
-    fastrtps = importlib.import_module("std_msgs._idlc.typesupport.fastrtps")
-    introspection = importlib.import_module("std_msgs._idlc.typesupport.introspection")
-    callbacks = importlib.import_module("std_msgs._idlc.typesupport.callbacks")
+    fastrtps = importlib.import_module("std_msgs._idlc.fastrtps")
+    introspection = importlib.import_module("std_msgs._idlc.introspection")
+    c = importlib.import_module("std_msgs._idlc.c")
     if case in {"machine", "memory"}:
         utilities.get_rmw_implementation_identifier = lambda: "rmw_cyclonedds_cpp"
     if case == "machine":
-        callbacks.CODE = {}
+        c.CODE = {}
     elif case == "memory":
-        callbacks._MAP_PRIVATE = 0  # the system refuses this, too
+        c._MAP_PRIVATE = 0  # the system refuses this, too
     elif case == "middleware":
         utilities.get_rmw_implementation_identifier = lambda: "rmw_connextdds"
     elif case == "layout":
@@ -472,7 +475,7 @@ def says_what_to_do(case):
     elif case == "fast cdr":
         fastrtps._VERSIONS = (fastrtps._VERSIONS[1],)
     elif case == "tables":
-        importlib.import_module("std_msgs._idlc.typesupport.abi")._TABLES = ((40, 128, 33),)
+        importlib.import_module("std_msgs._idlc.introspection")._TABLES = ((40, 128, 33),)
     elif case == "library":
         introspection.IDENTIFIER = "rosidl_typesupport_elsewhere_c"
     print(raises(ImportError, serialize_message, String("text")))

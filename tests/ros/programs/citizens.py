@@ -48,18 +48,14 @@ def check_serialization():
 
 def check_structs():
     """As Cyclone DDS would: through C structures."""
-    from hiding_msgs._idlc.typesupport import structs
+    from hiding_msgs._idlc import structs, typeinfo
 
     for message in (HIDING, TRUE):
-        memory = Memory(structs.message(type(message), wire_name(type(message))))
+        memory = Memory(structs.message(type(message), typeinfo.structure_of(type(message))))
         place = memory.create()
         assert memory.store(message, place)
         assert memory.fetch(place) == message
         memory.destroy(place)
-
-
-def wire_name(cls):
-    return f"hiding_msgs/msg/{cls.__name__.rstrip('_')}"
 
 
 def spin(node, condition):

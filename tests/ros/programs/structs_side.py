@@ -45,8 +45,10 @@ def rosidls(name):
 def support_of(name):
     cls = interface_of(name)
     package = cls.__module__.split(".")[0]
-    structs = importlib.import_module(f"{package}._idlc.typesupport.structs")
-    return structs.message(cls, name)
+    structs, typeinfo = (
+        importlib.import_module(f"{package}._idlc.{module}") for module in ("structs", "typeinfo")
+    )
+    return structs.message(cls, typeinfo.structure_of(cls))
 
 
 def look_at(name, values, official):

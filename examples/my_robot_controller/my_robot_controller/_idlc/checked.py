@@ -17,7 +17,7 @@ from typing import Any
 
 from .errors import FieldCheckError, FieldNameError, FieldTypeError, ValidationError
 from .objects import owner_of
-from .on_demand.typeinfo import (
+from .typeinfo import (
     FieldInfo,
     Primitive,
     spelling_hint,

@@ -15,7 +15,7 @@ from .objects import owner_of
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
     from functools import partial
     from typing import Any, Protocol, TypeAlias
 
@@ -200,7 +200,7 @@ def recover(kind: type, buffer: Any, failure: Exception) -> Any:
     """Return the message after all, if a middleware would; raise DecodeError otherwise."""
     if isinstance(failure, DecodeError):
         raise failure
-    from .on_demand.typeinfo import read_carefully
+    from .typeinfo import read_carefully
 
     data = bytes(buffer)
     return read_carefully(kind, data, maker)
@@ -210,13 +210,69 @@ def encode_error(message: Any, byteorder: str, error: Exception) -> Exception:
     """Return the exception that says which field was wrong."""
     if byteorder not in ORDERS:
         return ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
-    from .on_demand.typeinfo import validate
+    from .typeinfo import validate
 
     try:
         validate(message, wire_only=True)
     except ValidationError as exact:
         return exact
     return error
+
+
+# many messages of one type
+
+
+def serialize_many(kind: Any, messages: Iterable[Any], byteorder: str) -> list[bytes]:
+    """Return each message's bytes; raise ValidationError that names the message by its index."""
+    if byteorder not in ORDERS:
+        raise ValueError(f"byteorder must be 'little' or 'big', not {byteorder!r}")
+    encode = kind._codec_(ORDERS[byteorder]).encode
+    join = b"".join
+    messages = list(messages)
+    result: list[bytes] = []
+    put = result.append
+    try:
+        for message in messages:
+            put(encode(message, join))
+    except Exception as error:
+        index = len(result)
+        failure = encode_error(messages[index], byteorder, error)
+        if isinstance(failure, ValidationError):
+            raise failure.at(f"[{index}].{failure.path}") from error
+        raise failure from error
+    return result
+
+
+def deserialize_many(kind: Any, buffers: Iterable[Any], copy: bool) -> list[Any]:
+    """Return the message of each buffer; raise DecodeError that names the buffer by its index."""
+    owner = owner_of(kind)
+    codecs = owner._codec_
+    decode = codecs("<", READINGS[bytes.decode, copy]).decode
+    result: list[Any] = []
+    put = result.append
+    rest = iter(buffers)
+    if kind is owner:
+        for buffer in rest:
+            try:
+                if type(buffer) is bytes and buffer[1] == 1 and not buffer[0]:
+                    put(decode(buffer))
+                else:
+                    put(read(codecs, buffer, copy))
+            except FAILURES:
+                put(_indexed(kind, buffer, copy, len(result)))
+    else:
+        for buffer in rest:
+            put(_indexed(kind, buffer, copy, len(result)))
+    return result
+
+
+def _indexed(kind: Any, buffer: Any, copy: bool, index: int) -> Any:
+    """Return one message as `deserialize` would; a DecodeError has the index in its path."""
+    try:
+        return deserialize(kind, buffer, copy=copy)
+    except DecodeError as error:
+        path = f"[{index}].{error.path}" if error.path else f"[{index}]"
+        raise DecodeError(error.problem, path, error.offset) from error
 
 
 # constructors

@@ -80,8 +80,11 @@ class importing:
     def __exit__(
         self, _kind: object, error: BaseException | None, _trace: object
     ) -> None:
-        if isinstance(error, ImportError) and not isinstance(
-            error, MissingPackageError
+        # a package that misses its runtime says so itself
+        if (
+            isinstance(error, ImportError)
+            and not isinstance(error, MissingPackageError)
+            and error.name != "idlc_runtime"
         ):
             raise missing_package(error) from error
 

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from typing import Any, ClassVar, Literal
 
     import typing_extensions
-
-    from .on_demand.columns import Batch
 else:
 
     def dataclass(**_options):
@@ -65,23 +63,35 @@ class OnDemand:
 
 def slot_types(kind: type) -> tuple[Any, ...]:
     """Return SLOT_TYPES of a message class."""
-    from .on_demand import typeinfo
+    from . import typeinfo
 
     return typeinfo.slot_types(kind)
 
 
 def dataclass_fields(kind: type) -> dict[str, Field[Any]]:
     """Return `__dataclass_fields__` of a message class."""
-    from .on_demand import conversions
+    from . import conversions
 
     return conversions.dataclass_fields(kind)
 
 
 def dataclass_params(_kind: type) -> Any:
     """Return `__dataclass_params__` of a message class."""
-    from .on_demand import conversions
+    from . import conversions
 
     return conversions.dataclass_params()
+
+
+def _columns() -> Any:
+    """Return what reads columns: a part of idlc, of whichever version is installed."""
+    try:
+        return __import__("idlc.recordings.columns", fromlist=["to_columns"])
+    except ImportError as error:
+        raise ImportError(
+            f"columns are read by idlc, which cannot be imported ({error}): "
+            f"pip install --upgrade 'idlc[recordings]'",
+            name=error.name,
+        ) from error
 
 
 # messages
@@ -227,23 +237,19 @@ class Message(metaclass=MessageMeta):
 
         A ValidationError's path begins with the message's index.
         """
-        from .on_demand.batches import serialize_many
-
-        return serialize_many(cls, messages, byteorder)
+        return codec.serialize_many(cls, messages, byteorder)
 
     @classmethod
     def deserialize_many(
         cls, buffers: Iterable[bytes | bytearray | memoryview], *, copy: bool = True
     ) -> list[typing_extensions.Self]:
         """Return what `deserialize` returns of each; a DecodeError's path begins with the index."""
-        from .on_demand.batches import deserialize_many
-
-        return deserialize_many(cls, buffers, copy)
+        return codec.deserialize_many(cls, buffers, copy)
 
     @classmethod
     def to_columns(
         cls,
-        messages: Iterable[bytes | bytearray | memoryview] | Batch,
+        messages: Iterable[bytes | bytearray | memoryview],
         *,
         fields: Iterable[str] | None = None,
         ragged: bool | None = None,
@@ -251,16 +257,15 @@ class Message(metaclass=MessageMeta):
     ) -> Any:
         """Return many serialized messages as columns of numpy, without making messages.
 
-        They are a structured array; or Columns, where that cannot hold them or if `ragged`.
+        They are a structured array; or Columns, where that cannot hold them or if `ragged`. An
+        `idlc.Batch` of messages is not copied. Needs idlc itself.
         """
-        from .on_demand.columns import to_columns
-
-        return to_columns(cls, messages, fields, ragged, datetimes)
+        return _columns().to_columns(cls, messages, fields, ragged, datetimes)
 
     @classmethod
     def to_arrow(
         cls,
-        messages: Iterable[bytes | bytearray | memoryview] | Batch,
+        messages: Iterable[bytes | bytearray | memoryview],
         *,
         fields: Iterable[str] | None = None,
         flat: bool = False,
@@ -269,15 +274,14 @@ class Message(metaclass=MessageMeta):
     ) -> Any:
         """Return many serialized messages as a `pyarrow.Table`, without making messages.
 
-        With `flat`, nested messages are columns with names such as "header.stamp.sec".
+        With `flat`, nested messages are columns with names such as "header.stamp.sec". Needs idlc
+        itself.
         """
-        from .on_demand.columns.arrow import to_arrow
-
-        return to_arrow(cls, messages, fields, flat, datetimes, dictionary)
+        return _columns().to_arrow(cls, messages, fields, flat, datetimes, dictionary)
 
     def validate(self) -> None:
         """Raise ValidationError if a field, at any depth, holds what it cannot hold."""
-        from .on_demand.typeinfo import validate
+        from .typeinfo import validate
 
         validate(self)
 
@@ -286,7 +290,7 @@ class Message(metaclass=MessageMeta):
 
         Nested messages become dictionaries, arrays lists, and bytes integers.
         """
-        from .on_demand.conversions import to_dict
+        from .conversions import to_dict
 
         return to_dict(self)
 
@@ -296,7 +300,7 @@ class Message(metaclass=MessageMeta):
 
         Raises ValidationError for an unknown name or a value that its field cannot hold.
         """
-        from .on_demand.conversions import from_dict
+        from .conversions import from_dict
 
         message: typing_extensions.Self = from_dict(cls, values)
         return message
@@ -326,7 +330,7 @@ class Message(metaclass=MessageMeta):
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a message."""
-        from .on_demand.conversions import message_schema
+        from .conversions import message_schema
 
         return message_schema(cls, handler(source), handler)
 

@@ -57,7 +57,7 @@ def to_array(code: str, values: Any, name: str) -> Any:
         return converted(code, values)
     except (TypeError, ValueError, OverflowError) as error:
         failure = error
-    from .on_demand.typeinfo import refused
+    from .typeinfo import refused
 
     raise refused(name, code, None, values, failure) from None
 
@@ -102,7 +102,7 @@ class NumberSequence(Generic[Number]):
     @classmethod
     def __get_pydantic_core_schema__(cls, _source: Any, handler: Any) -> Any:
         """Return how pydantic checks and writes a sequence."""
-        from .on_demand.conversions import numbers_schema
+        from .conversions import numbers_schema
 
         kind = float if cls.code in "fd" else int
         return numbers_schema(handler.generate_schema(list[kind]))  # type: ignore[valid-type]

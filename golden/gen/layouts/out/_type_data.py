@@ -3,8 +3,7 @@
 """The types of layouts_msgs, as ROS 2 describes them."""
 
 JSON = (
-    '{"package":"layouts_msgs"'
-    ',"descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
+    '{"package":"layouts_msgs","descriptions":{"builtin_interfaces/msg/Time":{"type_name":"builtin_interfaces/msg/Time","fields":[{"name":"sec","type":{"type_id":6,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"nanosec","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"layouts_msgs/msg/Everything":{"type_name":"layouts_msgs/msg/Everything","fields":[{"name":"flag","type":{"type_id":15,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"inner","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Inner"},"default_value":""},{"name":"inners","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Inner"},"default_value":""},{"name":"rows","type":{"type_id":97,"capacity":4,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Row"},"default_value":""},{"name":"pair","type":{"type_id":49,"capacity":2,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Row"},"default_value":""},{"name":"nothing","type":{"type_id":1,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Nothing"},"default_value":""},{"name":"nothings","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Nothing"},"default_value":""},{"name":"doubles","type":{"type_id":155,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"shorts","type":{"type_id":100,"capacity":3,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"flags","type":{"type_id":159,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"octets","type":{"type_id":64,"capacity":2,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"texts","type":{"type_id":161,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"wides","type":{"type_id":66,"capacity":2,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"stamps","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"builtin_interfaces/msg/Time"},"default_value":""},{"name":"weights","type":{"type_id":58,"capacity":4,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"last","type":{"type_id":8,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"layouts_msgs/msg/Inner":{"type_name":"layouts_msgs/msg/Inner","fields":[{"name":"a","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"b","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"c","type":{"type_id":17,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"d","type":{"type_id":18,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"layouts_msgs/msg/Nothing":{"type_name":"layouts_msgs/msg/Nothing","fields":[{"name":"structure_needs_at_least_one_member","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
@@ -12,8 +11,7 @@ JSON = (
     ',"layouts_msgs/msg/Row":{"type_name":"layouts_msgs/msg/Row","fields":[{"name":"a","type":{"type_id":7,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"b","type":{"type_id":5,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"c","type":{"type_id":51,"capacity":3,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"layouts_msgs/msg/Texts":{"type_name":"layouts_msgs/msg/Texts","fields":[{"name":"pairs","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Pair"},"default_value":""},{"name":"few","type":{"type_id":97,"capacity":2,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Pair"},"default_value":""},{"name":"titled","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Titled"},"default_value":""},{"name":"last","type":{"type_id":17,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
     ',"layouts_msgs/msg/Titled":{"type_name":"layouts_msgs/msg/Titled","fields":[{"name":"level","type":{"type_id":3,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"title","type":{"type_id":17,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""},{"name":"pairs","type":{"type_id":145,"capacity":0,"string_capacity":0,"nested_type_name":"layouts_msgs/msg/Pair"},"default_value":""},{"name":"number","type":{"type_id":11,"capacity":0,"string_capacity":0,"nested_type_name":""},"default_value":""}]}'
-    "}"
-    ',"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
+    '},"hashes":{"builtin_interfaces/msg/Time":"RIHS01_b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197"'
     ',"layouts_msgs/msg/Everything":"RIHS01_37a0594da501038c6109d3781168c60dde9f52896a0314cd03563796f8c065c6"'
     ',"layouts_msgs/msg/Inner":"RIHS01_071b6ec33c7345fcd8b709c12009ec8d199ec08c7e0dae6790e83f6007e273a4"'
     ',"layouts_msgs/msg/Nothing":"RIHS01_e5ba5fa2bac6771f185762e64cd2123504138992ac319c61de27fee8b71d5411"'
@@ -21,14 +19,12 @@ JSON = (
     ',"layouts_msgs/msg/Row":"RIHS01_629f980ccde5b8eadff2d5688f813c525045b9b88bc49e80deea9fe4532623e9"'
     ',"layouts_msgs/msg/Texts":"RIHS01_558d8442e6e936654a8aeba46293eb7fda0e45bc72dddd31a40d98b2c9889652"'
     ',"layouts_msgs/msg/Titled":"RIHS01_0a5cbb20003d7bba9416523d554572be3ee26fee4fff02ff5a4091bd2d817096"'
-    "}"
-    ',"sources":{"layouts_msgs/msg/Everything":"bool flag\\nInner inner\\nInner[] inners\\nRow[<=4] rows\\nRow[2] pair\\nNothing nothing\\nNothing[] nothings\\nfloat64[] doubles\\nint16[<=3] shorts\\nbool[] flags\\nbyte[2] octets\\nstring[] texts\\nwstring[2] wides\\nbuiltin_interfaces/Time[] stamps\\nfloat32[4] weights\\nint64 last\\n"'
+    '},"sources":{"layouts_msgs/msg/Everything":"bool flag\\nInner inner\\nInner[] inners\\nRow[<=4] rows\\nRow[2] pair\\nNothing nothing\\nNothing[] nothings\\nfloat64[] doubles\\nint16[<=3] shorts\\nbool[] flags\\nbyte[2] octets\\nstring[] texts\\nwstring[2] wides\\nbuiltin_interfaces/Time[] stamps\\nfloat32[4] weights\\nint64 last\\n"'
     ',"layouts_msgs/msg/Inner":"uint8 a\\nfloat64 b\\nstring c\\nwstring d\\n"'
     ',"layouts_msgs/msg/Nothing":""'
     ',"layouts_msgs/msg/Pair":"string key\\nstring value\\n"'
     ',"layouts_msgs/msg/Row":"uint32 a\\nuint16 b\\nuint8[3] c\\n"'
     ',"layouts_msgs/msg/Texts":"Pair[] pairs\\nPair[<=2] few\\nTitled[] titled\\nstring last\\n"'
     ',"layouts_msgs/msg/Titled":"uint8 level\\nstring title\\nPair[] pairs\\nfloat64 number\\n"'
-    "}"
-    "}"
+    "}}"
 )

@@ -1,0 +1,472 @@
+"""The opaque kind: rmw_fastrtps_cpp and others that use its type support.
+
+The middleware never looks into message memory here, so it is a `Memory` that holds the
+encoded bytes. Encoding comes before the middleware is called, decoding after it: Fast DDS
+calls the two functions that copy the bytes while it holds the mutex of a writer or a
+reader, and another thread may wait for that mutex while it holds the interpreter's lock.
+Whoever gave that lock away in there would never get it back. So these functions are
+machine code that allocates nothing but `bytes`, which starts no garbage collection.
+
+Where there can be no machine code, they are Python that lets no other thread run: the
+interpreter may do so after a call and where it jumps, so there is neither. Only Python
+3.11 and older may collect garbage in between.
+
+They read and write through three pointers inside Fast CDR's `Cdr`: where the next byte is,
+where the message began, and where the buffer ends. Each is the second word of a pair whose
+first word is the start of the buffer. `fast_cdr` makes a `Cdr` of its own and looks for these
+pairs; where it does not find them, it raises ImportError instead of touching anybody's memory.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Callable
+from ctypes import (
+    PYFUNCTYPE,
+    c_bool,
+    c_char,
+    c_char_p,
+    c_int,
+    c_size_t,
+    c_void_p,
+    py_object,
+)
+from functools import cache
+from struct import pack
+from typing import Any, NamedTuple
+
+from . import c, introspection
+from .c import RefusedError
+from .cdr import HEADERS, NATIVE
+from .codec import encode_error, functions
+from .introspection import about
+from .typeinfo import Structure
+
+IDENTIFIER = "rosidl_typesupport_fastrtps_c"
+
+#: The encapsulation header, which the middleware reads and writes itself.
+_HEADER = 4
+#: An array with this many bytes is not copied on its way to the middleware.
+_LARGE = 16384
+
+
+# Fast CDR, whose layout is found out and never assumed
+
+_CDR = "_ZN8eprosima7fastcdr3Cdr"
+_NEW_BUFFER = "_ZN8eprosima7fastcdr10FastBufferC1EPcm"
+_NEW_CDR = f"{_CDR}C1ERNS0_10FastBufferENS1_10EndiannessE"
+_LITTLE_ENDIAN = 1
+
+
+class _Names(NamedTuple):
+    """The names that a version of Fast CDR has for the needed functions."""
+
+    libraries: tuple[str, ...]
+    new: str
+    plain: int  #: the constructor's value for plain CDR
+    append: str
+    position: str
+    begin: str
+
+
+_VERSIONS = (
+    _Names(
+        ("libfastcdr.so.2", "libfastcdr.2.dylib"),
+        f"{_NEW_CDR}NS0_10CdrVersionE",
+        2,
+        f"{_CDR}15serialize_arrayEPKcm",
+        f"{_CDR}20get_current_positionEv",
+        f"{_CDR}18get_buffer_pointerEv",
+    ),
+    _Names(  # ROS 2 Humble
+        ("libfastcdr.so.1", "libfastcdr.1.dylib"),
+        f"{_NEW_CDR}NS1_7CdrTypeE",
+        1,
+        f"{_CDR}14serializeArrayEPKcm",
+        f"{_CDR}18getCurrentPositionEv",
+        f"{_CDR}16getBufferPointerEv",
+    ),
+)
+#: Generous room for the C++ objects (200 and 40 bytes in Fast CDR 2.2).
+_OBJECT_SIZE = 4096
+_WORDS = 64
+_ADVICE = (
+    "idlc's type support for Fast DDS knows Fast CDR 1 and 2. Build the interface package "
+    "with colcon instead, or use another middleware (RMW_IMPLEMENTATION=rmw_cyclonedds_cpp)"
+)
+
+
+class FastCdr(NamedTuple):
+    """The pointers in a `Cdr`: indices of machine words in it."""
+
+    position: int
+    end: int
+
+
+def _load() -> tuple[ctypes.CDLL, _Names]:
+    """Return the Fast CDR that the middleware has already loaded, never another one."""
+    names = [(name, version) for version in _VERSIONS for name in version.libraries]
+    for name, version in names:
+        try:
+            return ctypes.CDLL(name, mode=os.RTLD_NOLOAD | os.RTLD_LAZY), version
+        except OSError:
+            continue
+    tried = " or ".join(name for name, _ in names)
+    raise ImportError(f"the middleware has not loaded {tried}. {_ADVICE}")
+
+
+def _words_of(cdr: int) -> list[int]:
+    return c.WORDS[cdr >> 3 : (cdr >> 3) + _WORDS].tolist()
+
+
+def _find(words: list[int], begin: int, positions: tuple[int, int, int]) -> int | None:
+    """Return the only index of the three pairs, else None."""
+    pattern = [word for position in positions for word in (begin, position)]
+    indices = [i for i in range(_WORDS - 6) if words[i : i + 6] == pattern]
+    return indices[0] if len(indices) == 1 else None
+
+
+@cache
+def fast_cdr() -> FastCdr:
+    """Return how to use the loaded Fast CDR; raises ImportError if that cannot be found out."""
+    library, names = _load()
+
+    def method(name: str, result: Any, *arguments: Any) -> Any:
+        return PYFUNCTYPE(result, *arguments)((name, library))
+
+    try:
+        new_buffer = method(_NEW_BUFFER, None, c_void_p, c_void_p, c_size_t)
+        new_cdr = method(names.new, None, c_void_p, c_void_p, c_int, c_int)
+        append = method(names.append, c_void_p, c_void_p, c_void_p, c_size_t)
+        position_of = method(names.position, c_void_p, c_void_p)
+        begin_of = method(names.begin, c_void_p, c_void_p)
+    except AttributeError as error:
+        raise ImportError(f"this Fast CDR is unknown: {error}. {_ADVICE}") from error
+
+    data = ctypes.create_string_buffer(64)
+    begin, size = ctypes.addressof(data), len(data)
+    buffer, cdr = (ctypes.create_string_buffer(_OBJECT_SIZE) for _ in range(2))
+    here = ctypes.addressof(cdr)
+    new_buffer(buffer, begin, size)
+    new_cdr(cdr, buffer, _LITTLE_ENDIAN, names.plain)
+    indices = set()
+    for text in (b"\1\2\3", b"\4\5"):
+        append(here, ctypes.cast(c_char_p(text), c_void_p), len(text))
+        position = position_of(here)
+        indices.add(_find(_words_of(here), begin, (position, begin, begin + size)))
+    index = indices.pop()
+    if (
+        indices
+        or index is None
+        or begin_of(here) != begin
+        or data.value != b"\1\2\3\4\5"
+    ):
+        raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
+    layout = FastCdr(index + 1, index + 5)
+    c.WORDS[(here >> 3) + layout.position] = begin + 1
+    if position_of(here) != begin + 1:
+        raise ImportError(f"the layout of this Fast CDR is unknown. {_ADVICE}")
+    return layout
+
+
+# message memory
+
+
+class Memory:
+    """Message memory: `message @ memory` encodes into it, `+memory` is the message."""
+
+    __slots__ = ("body", "message", "received", "spans")
+
+    #: The encoded message with header; the parts of a large one, which are not copied.
+    body: Any
+    #: For machine code, where there are parts: the size of all without header, then
+    #: address and size of each, as words.
+    spans: bytes
+    #: The message that `body` was made from.
+    message: Any
+    #: What was received, with header; no attribute in a memory that is sent.
+    received: bytes
+
+    def keep_apart(self, parts: list[Any]) -> int:
+        """Take the parts of a message, and return their size without header.
+
+        Arrays cannot change their length until it is sent.
+        """
+        parts[0] = parts[0][_HEADER:]
+        self.body = views = [memoryview(part).cast("B") for part in parts]
+        start = _view_start() >> 3
+        words: list[int] = []
+        for view in views:
+            words += c.WORDS[(id(view) >> 3) + start], len(view)
+        size = sum(words[1::2])
+        self.spans = pack(f"={1 + len(words)}Q", size, *words)
+        return size
+
+
+def _memory_type(name: str, cls: Any, *, apart: bool = True) -> type[Memory]:
+    """Return the memory of a message class; `apart`: large ones may stay in parts."""
+    codec = cls._codec_(NATIVE)
+    encode, bulk = codec.encode, codec.bulk and apart
+    join = b"".join
+    true = c.TRUE
+    large = False
+
+    def store(memory: Any, message: Any) -> object:
+        nonlocal large
+        try:
+            # what follows on a topic is as large as what came before
+            if large:
+                large = encode(message, memory.keep_apart) >= _LARGE
+            else:
+                memory.body = body = encode(message, join)
+                large = bulk and len(body) >= _LARGE
+        except Exception as error:
+            raise encode_error(message, sys.byteorder, error) from error
+        memory.message = message
+        return true
+
+    namespace = {"__slots__": (), "__rmatmul__": store, "__pos__": _taker(name, cls)}
+    return type("Memory", (Memory,), namespace)
+
+
+def _offset(owner: object, word: int) -> int:
+    """Return where in an object a word lies; raises RefusedError if that is unknown."""
+    first, last = id(owner), id(owner) + type(owner).__basicsize__
+    words = c.WORDS[first >> 3 : last >> 3].tolist()
+    if words.count(word) != 1:
+        raise RefusedError("the layout of this Python's objects is unknown")
+    return 8 * words.index(word)
+
+
+@cache
+def _view_start() -> int:
+    """Return where a memoryview says where its content is."""
+    content = b"content"
+    return _offset(memoryview(content), id(content) + c.BYTES_OFFSET)
+
+
+@cache
+def _words() -> dict[str, int]:
+    """Return what the machine code reads, the same for all types."""
+    position, end = fast_cdr()
+    memory, spans, received, body = Memory(), b"spans", b"received", bytes(54321)
+    memory.spans, memory.received, memory.body = spans, received, body
+    _view_start()
+    return {
+        "copy": c.address(ctypes.CDLL(None).memcpy),
+        "new_bytes": c.c_function("PyBytes_FromStringAndSize"),
+        "forget": c.c_function("Py_DecRef"),
+        "clear_error": c.c_function("PyErr_Clear"),
+        "position": 8 * position,
+        "end": 8 * end,
+        "spans": _offset(memory, id(spans)),
+        "received": _offset(memory, id(received)),
+        "content": c.BYTES_OFFSET,
+        "body": _offset(memory, id(body)),
+        "length": _offset(body, len(body)),
+    }
+
+
+def _native(answers: dict[bytes, int], memory: type[Memory]) -> dict[str, int]:
+    """Return the addresses of the functions that Fast DDS calls; raises RefusedError.
+
+    rclpy calls one, too: `create`, which so needs no callback of ctypes.
+    """
+    table = [
+        word
+        for identifier, handle in answers.items()
+        for word in (id(c.keep(identifier)) + c.BYTES_OFFSET, handle)
+    ]
+    answered = ctypes.addressof(c.keep((c_size_t * (len(table) + 1))(*table)))
+    words = {**_words(), "answers": answered, "memory": id(c.keep(memory))}
+    return c.machine_code(
+        "fastrtps", words | {"make": c.c_function("PyObject_CallNoArgs")}
+    )
+
+
+def _taker(name: str, cls: Any) -> Callable[[Any], Any]:
+    """Return the function that gives the message in a memory, or `None` for garbage."""
+    decode = cls._codec_(NATIVE).decode
+    _, decode_any = functions(cls)
+    native = HEADERS[NATIVE][1]
+
+    def taken(memory: Any) -> Any:
+        try:
+            data = memory.received
+        except AttributeError:
+            return memory.message
+        if data[1] == native and not data[0]:
+            try:
+                return decode(data)
+            except Exception:  # noqa: S110 (the careful decoder reports it)
+                pass
+        return decode_any(data)
+
+    return c.taking(name, taken)
+
+
+def _python_functions(answers: dict[bytes, int]) -> dict[str, int]:
+    """Return the addresses of the functions by name; `answers` is what one of them gives."""
+    return {
+        "serialize": _serializer(),
+        "deserialize": _deserializer(),
+        "serialized_size": _size(),
+        "maximum_size": _unbounded(),
+        "resolve": c.resolver(answers),
+    }
+
+
+def _plain_memory_type(base: type) -> type:
+    """Return a type of memory that knows what the functions here could not find out."""
+    store: Any = base.__dict__["__rmatmul__"]
+
+    def store_plain(memory: Any, message: Any) -> object:
+        done = store(memory, message)
+        memory.body = memory.body[_HEADER:]
+        memory.size = len(memory.body)
+        return done
+
+    return type("Memory", (base,), {"__slots__": ("size",), "__rmatmul__": store_plain})
+
+
+@cache
+def _serializer() -> int:
+    position, end = fast_cdr()
+    everything, words = c.MEMORY, c.WORDS
+
+    def serialize(memory: Any, cdr: int) -> bool:
+        try:
+            here = cdr >> 3
+            start = words[here + position]
+            stop = start + memory.size
+            if stop <= words[here + end]:
+                everything[start:stop] = memory.body
+                words[here + position] = stop
+                return True
+        except BaseException:  # noqa: S110
+            pass
+        return False
+
+    return c.callback(PYFUNCTYPE(c_bool, py_object, c_void_p), serialize)
+
+
+@cache
+def _deserializer() -> int:
+    position, end = fast_cdr()
+    characters, words = c.CHARACTERS, c.WORDS
+
+    def deserialize(cdr: int, memory: Any) -> bool:
+        try:
+            here = cdr >> 3
+            memory.received = characters[
+                words[here + position] - _HEADER : words[here + end]
+            ]
+            return True
+        except BaseException:
+            return False
+
+    return c.callback(PYFUNCTYPE(c_bool, c_void_p, py_object), deserialize)
+
+
+@cache
+def _size() -> int:
+    def size(memory: Any) -> int:
+        try:
+            return memory.size  # type: ignore[no-any-return]
+        except BaseException:
+            return 0
+
+    return c.callback(PYFUNCTYPE(c_size_t, py_object), size)
+
+
+@cache
+def _unbounded() -> int:
+    def maximum(bounds_info: Any) -> int:
+        try:  # noqa: SIM105 (a context manager would be called outside of it)
+            bounds_info[0] = b"\0"
+        except BaseException:  # noqa: S110
+            pass
+        return 0
+
+    return c.callback(PYFUNCTYPE(c_size_t, ctypes.POINTER(c_char)), maximum)
+
+
+class _Callbacks(ctypes.Structure):
+    """`message_type_support_callbacks_t`."""
+
+    _fields_ = (
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("cdr_serialize", c_void_p),
+        ("cdr_deserialize", c_void_p),
+        ("get_serialized_size", c_void_p),
+        ("max_serialized_size", c_void_p),
+        ("key_callbacks", c_void_p),
+        # what later versions read: three words so far, zero for "none of it"
+        ("later", c_void_p * 9),
+    )
+
+
+class _ServiceCallbacks(ctypes.Structure):
+    """`service_type_support_callbacks_t`."""
+
+    _fields_ = (
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("request", c_void_p),
+        ("response", c_void_p),
+    )
+
+
+@cache
+def _identifier() -> int:
+    library = c.load_library(f"lib{IDENTIFIER}.so")
+    return c_void_p.in_dll(library, f"{IDENTIFIER}__identifier").value or 0
+
+
+def message(cls: Any, structure: Structure) -> c.MessageSupport:
+    """Return what rclpy needs to publish and take messages of a class."""
+    name = structure.name
+    package, kind, short = name.split("/")
+    support = c.keep(c.MessageTypeSupport(_identifier()))
+    answers = {
+        IDENTIFIER.encode(): ctypes.addressof(support),
+        introspection.IDENTIFIER.encode(): introspection.handle(structure, False),
+    }
+    memory = _memory_type(name, cls)
+    try:
+        functions = _native(answers, memory)
+    except RefusedError:
+        memory = _plain_memory_type(_memory_type(name, cls, apart=False))
+        functions = _python_functions(answers)
+        functions["create"] = c.address(PYFUNCTYPE(py_object)(memory))
+    support.data = c.pointer(
+        _Callbacks(
+            f"{package}::{kind}".encode(),
+            short.encode(),
+            functions["serialize"],
+            functions["deserialize"],
+            functions["serialized_size"],
+            functions["maximum_size"],
+        )
+    )
+    support.func = functions["resolve"]
+    support.about = about(structure)
+    return c.MessageSupport(
+        ctypes.addressof(support),
+        functions["create"],
+        c.c_function("Py_DecRef"),
+        c.c_function("PyNumber_MatrixMultiply"),
+        c.c_function("PyNumber_Positive"),
+    )
+
+
+def service(name: str, request: int, response: int, event: int) -> tuple[int, int]:  # noqa: ARG001
+    """Return identifier and data of a service's type support, from its messages' handles."""
+    package, kind, short = name.split("/")
+    functions = _ServiceCallbacks(
+        f"{package}::{kind}".encode(), short.encode(), request, response
+    )
+    return _identifier(), c.pointer(functions)

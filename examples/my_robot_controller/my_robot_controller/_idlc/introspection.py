@@ -1,0 +1,661 @@
+"""Types as ROS 2 asks about them: hash, description, source text, members, C structures.
+
+The facts are JSON in a package's `_type_data.py`, read only when rclpy asks for type support:
+
+    {"package": "pkg",
+     "descriptions": {"pkg/msg/Name": individual description as in ROS 2's own Name.json},
+     "hashes": {"pkg/msg/Name": "RIHS01_…"},
+     "sources": {"pkg/msg/Name": "text of the interface file"}}
+
+`descriptions` and `hashes` hold every structure of the package, derived ones and the
+pseudo-structures of services and actions included, and all that these refer to;
+`sources` holds the files among them. A type id is a base plus 48 for a fixed array, 96
+for a bounded, 144 for an unbounded sequence (rosidl's
+`type_description_interfaces/msg/FieldType`).
+
+Introspection members are field names, types and C offsets, as a middleware walks them. Both
+kinds of type support need them. Fast DDS describes types to its peers from them and never
+looks at the memory; introspection-based middlewares read and write the memory that they
+describe, which is as rosidl has it, with the functions that stand beside it. These, and those
+by which rclpy makes and frees messages, are machine code.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from ctypes import PYFUNCTYPE, c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_void_p
+from functools import cache
+from pathlib import Path
+from struct import unpack_from
+from typing import Any, NamedTuple
+
+from . import c
+from .typeinfo import Structure
+
+IDENTIFIER = "rosidl_typesupport_introspection_c"
+
+NESTED = 1
+SCALAR, ARRAY, BOUNDED_SEQUENCE, SEQUENCE = range(4)
+
+
+class Field(NamedTuple):
+    """A field as described; `capacity` is an array's size or a sequence's bound."""
+
+    name: str
+    type_id: int
+    capacity: int
+    string_capacity: int
+    nested_type_name: str
+    default_value: str
+    nested: Structure | None
+
+    @property
+    def base(self) -> int:
+        """The type id of one element."""
+        return self.type_id % 48
+
+    @property
+    def shape(self) -> int:
+        """SCALAR, ARRAY, BOUNDED_SEQUENCE or SEQUENCE."""
+        return self.type_id // 48
+
+
+@cache
+def fields_of(structure: Structure) -> tuple[Field, ...]:
+    """Return a type's members, the dummy one included."""
+    fields = []
+    for member in structure.members:
+        name = member["type"]["nested_type_name"]
+        nested = structure.types[name] if name else None
+        default = member["default_value"]
+        field = Field(
+            member["name"], **member["type"], default_value=default, nested=nested
+        )
+        fields.append(field)
+    return tuple(fields)
+
+
+@cache
+def references(structure: Structure) -> frozenset[Structure]:
+    """Return all types that a type refers to, directly or not, itself excluded."""
+    direct = {field.nested for field in fields_of(structure) if field.nested}
+    return frozenset(direct.union(*map(references, direct)))
+
+
+def _field(field: Field) -> c.Field:
+    kind = c.FieldType(
+        field.type_id,
+        field.capacity,
+        field.string_capacity,
+        c.string(field.nested_type_name),
+    )
+    return c.Field(c.string(field.name), kind, c.string(field.default_value))
+
+
+@cache
+def _individual(structure: Structure) -> c.IndividualDescription:
+    fields = [_field(field) for field in fields_of(structure)]
+    name = c.string(structure.name)
+    return c.IndividualDescription(name, c.sequence(fields, c.Field))
+
+
+def _installed_text(name: str) -> str | None:
+    """Return another package's interface file, where ROS 2 has installed it."""
+    package, kind, short = name.split("/")
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    for prefix in filter(None, [*prefixes, sys.prefix]):
+        path = Path(prefix, "share", package, kind, f"{short}.{kind}")
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    return None
+
+
+def _source(structure: Structure) -> c.Source:
+    """Return a type's source; derived types have none, and ROS 2 calls that implicit."""
+    name, sources = structure.name, structure.types.sources
+    text = sources.get(name) if structure.is_own else _installed_text(name)
+    encoding = "implicit" if text is None else name.split("/")[1]
+    return c.Source(c.string(name), c.string(encoding), c.string(text or ""))
+
+
+def _type_hash(structure: Structure) -> c.TypeHash:
+    digest = bytes.fromhex(structure.hash.removeprefix("RIHS01_"))
+    return c.TypeHash(1, (ctypes.c_uint8 * 32)(*digest))
+
+
+@cache
+def about(structure: Structure) -> c.About:
+    """Return functions that never fail and never return NULL, as rcl demands."""
+    others = sorted(references(structure), key=lambda other: other.name)
+    individuals = c.sequence(list(map(_individual, others)), c.IndividualDescription)
+    description = c.Description(_individual(structure), individuals)
+    sources = c.sequence(list(map(_source, (structure, *others))), c.Source)
+    values = (_type_hash(structure), description, sources)
+    return c.About(*(c.constant(c.pointer(value)) for value in values))
+
+
+# the C structures of this ROS 2: their layout is measured, never assumed
+
+# Versions differ in what a middleware reads from introspection tables and in the size of
+# sequences, and nothing in them tells which version they are of. So before the first type
+# support of a process, the tables of two messages that are wherever rclpy is are compared
+# with all that is known of these messages. What is not exactly as in a known layout is
+# refused: a wrong one would end the process, or change what is received.
+
+_ADVICE = (
+    "idlc's type support does not know this version of ROS 2: look for a newer idlc, or "
+    "build the interface package with colcon"
+)
+
+
+class Abi(NamedTuple):
+    """Sizes and offsets in bytes, of structures of rosidl."""
+
+    members: int  #: the offset of `members_` in MessageMembers
+    member: int  #: the size of a MessageMember
+    is_array: int  #: the offset of `is_array_` in it
+    sequence: int  #: the size of a sequence of numbers
+    strings: int  #: the size of a sequence of strings
+
+
+#: What has been seen: each has the offset of `members_`, the size of a member and the
+#: offset of its `is_array_`. Sequences are measured apart, by two sizes of each.
+_TABLES = ((32, 112, 32), (40, 112, 33), (40, 120, 33))
+_SEQUENCES = (24, 32)
+
+
+class _Member(NamedTuple):
+    """A field: its name, the id of its type, and its size; a sequence has none."""
+
+    name: bytes
+    type_id: int
+    size: int = 0
+
+
+_STRING = 16
+#: Messages of rcl_interfaces that have been the same ever since.
+_MESSAGES = {
+    "ParameterValue": (
+        _Member(b"type", 8, 1),
+        _Member(b"bool_value", 6, 1),
+        _Member(b"integer_value", 15, 8),
+        _Member(b"double_value", 2, 8),
+        _Member(b"string_value", _STRING, 24),
+        _Member(b"byte_array_value", 7),
+        _Member(b"bool_array_value", 6),
+        _Member(b"integer_array_value", 15),
+        _Member(b"double_array_value", 2),
+        _Member(b"string_array_value", _STRING),
+    ),
+    "ListParametersResult": (_Member(b"names", _STRING), _Member(b"prefixes", _STRING)),
+}
+
+
+class _UnknownError(Exception):
+    """The tables are not those of any known version."""
+
+
+class _Reader:
+    """Reads memory that may not be there.
+
+    The system copies it into a pipe, and refuses where the process would be ended.
+    """
+
+    def __init__(self) -> None:
+        self._out, self._in = os.pipe()
+        self._write = ctypes.CDLL(None, use_errno=True).write
+        self._write.argtypes = (ctypes.c_int, c_void_p, ctypes.c_size_t)
+        self._write.restype = ctypes.c_ssize_t
+
+    def close(self) -> None:
+        os.close(self._out)
+        os.close(self._in)
+
+    def read(self, address: int, size: int) -> bytes:
+        """Return memory; raises _UnknownError where there is none."""
+        if not address or address >> 63 or self._write(self._in, address, 1) != 1:
+            raise _UnknownError(f"no memory at {address:#x}")
+        os.read(self._out, 1)
+        written = self._write(self._in, address, size)
+        data = os.read(self._out, written) if written > 0 else b""
+        if len(data) != size:
+            raise _UnknownError(f"no memory at {address + size:#x}")
+        return data
+
+    def words(self, address: int, count: int) -> tuple[int, ...]:
+        """Return 64-bit words."""
+        return unpack_from(f"={count}Q", self.read(address, 8 * count))
+
+    def demand_text(self, address: int, text: bytes) -> None:
+        """Raise _UnknownError unless there is this text, with a zero after it."""
+        content = self.read(address, len(text) + 1)
+        if content != text + b"\0":
+            raise _UnknownError(f"{content!r} where {text!r} should be")
+
+
+def _demand(actual: object, expected: object, subject: str) -> None:
+    if actual != expected:
+        raise _UnknownError(f"{subject} is {actual}, not {expected}")
+
+
+def measure(*handles: int) -> Abi:
+    """Return the layout that the introspection type support of known messages has.
+
+    `handles` are the addresses of the `rosidl_message_type_support_t` of ParameterValue and
+    of ListParametersResult. Raises ImportError if they are not exactly as one of the known
+    layouts has them.
+    """
+    reader = _Reader()
+    reasons, layouts = [], []
+    try:
+        for table in _TABLES:
+            try:
+                offsets = [
+                    _offsets(reader, handle, name, fields, *table)
+                    for handle, (name, fields) in zip(
+                        handles, _MESSAGES.items(), strict=True
+                    )
+                ]
+                layouts.append(Abi(*table, *_sequences(offsets)))
+            except _UnknownError as reason:
+                reasons.append(f"{'/'.join(map(str, table))}: {reason}")
+    finally:
+        reader.close()
+    if len(layouts) != 1:
+        seen = "; ".join(reasons) or "several layouts fit"
+        raise ImportError(f"{_ADVICE} (introspection tables, {seen})")
+    return layouts[0]
+
+
+def _offsets(
+    reader: _Reader,
+    handle: int,
+    message: str,
+    fields: tuple[_Member, ...],
+    members: int,
+    member: int,
+    is_array: int,
+) -> list[int]:
+    """Return where a message's fields begin, and its size, if its tables fit a layout."""
+    identifier, data, function = reader.words(handle, 3)
+    reader.demand_text(identifier, IDENTIFIER.encode())
+    reader.read(function, 1)
+    namespace, name, count, size, *rest = reader.words(data, members // 8 + 3)
+    reader.demand_text(namespace, b"rcl_interfaces__msg")
+    reader.demand_text(name, message.encode())
+    _demand(count & 0xFFFF_FFFF, len(fields), "the number of members")
+    *key, rows, init, fini = rest
+    _demand(any(key), False, "whether there is a key")
+    for code in (init, fini):
+        reader.read(code, 1)
+    table = reader.read(rows, member * len(fields))
+    parts = [table[at : at + member] for at in range(0, len(table), member)]
+    for part, field in zip(parts, fields, strict=True):
+        _check_member(reader, part, field, is_array)
+    return [*(unpack_from("=I", part, 52)[0] for part in parts), size]
+
+
+def _check_member(reader: _Reader, part: bytes, field: _Member, is_array: int) -> None:
+    """Raise _UnknownError unless a member says what is known of its field."""
+    name, _, bound, nested = unpack_from("=4Q", part)
+    reader.demand_text(name, field.name)
+    _demand(part[8], field.type_id, f"the type of {field.name!r}")
+    _demand((bound, nested), (0, 0), f"bound and type of {field.name!r}")
+    flags = bytearray(8)
+    flags[is_array - 32] = not field.size
+    _demand(part[32:40], bytes(flags), f"whether {field.name!r} is an array")
+    size, bounded = unpack_from("=QB", part, 40)
+    default, *functions = unpack_from("=7Q", part, 56)
+    _demand((size, bounded, default), (0, 0, 0), f"the bounds of {field.name!r}")
+    if field.size:
+        _demand(any(functions), False, f"whether {field.name!r} has functions")
+    for function in functions:
+        if function:
+            reader.read(function, 1)
+    if len(part) > 112:  # whether it may be a buffer of another kind
+        _demand(part[112] in (0, 1), True, f"whether {field.name!r} has a flag")
+
+
+def _sequences(offsets: list[list[int]]) -> tuple[int, int]:
+    """Return the sizes of both kinds of sequences, by which fields begin where they do."""
+    for sequence in _SEQUENCES:
+        for strings in _SEQUENCES:
+            expected = [
+                _laid_out(fields, sequence, strings) for fields in _MESSAGES.values()
+            ]
+            if expected == offsets:
+                return sequence, strings
+    raise _UnknownError(f"fields begin at {offsets}")
+
+
+def _laid_out(fields: tuple[_Member, ...], sequence: int, strings: int) -> list[int]:
+    """Return where fields begin, and where the last one ends."""
+    offsets, end = [], 0
+    for field in fields:
+        end += -end % min(field.size or 8, 8)
+        offsets.append(end)
+        end += field.size or (strings if field.type_id == _STRING else sequence)
+    return [*offsets, end]
+
+
+@cache
+def abi() -> Abi:
+    """Return the layout of this process's ROS 2; raises ImportError if it is unknown."""
+    library = c.load_library(f"librcl_interfaces__{IDENTIFIER}.so")
+    prefix = f"{IDENTIFIER}__get_message_type_support_handle__rcl_interfaces__msg__"
+    try:
+        getters = [PYFUNCTYPE(c_void_p)((prefix + name, library)) for name in _MESSAGES]
+    except AttributeError as error:
+        raise ImportError(f"{_ADVICE} ({error})") from error
+    return measure(*(getter() or 0 for getter in getters))
+
+
+@cache
+def has_hashes() -> bool:
+    """Return whether this ROS 2 knows type hashes, and with them events of services."""
+    runtime = c.load_library("librosidl_runtime_c.so")
+    return hasattr(runtime, "rosidl_stringify_type_hash")
+
+
+# C structures of messages, laid out as rosidl's C generator lays them out
+
+#: Type id in descriptions -> (type id in introspection, C type of one element).
+_ELEMENTS: dict[int, tuple[int, Any]] = {
+    2: (9, ctypes.c_int8),
+    3: (8, ctypes.c_uint8),
+    4: (11, ctypes.c_int16),
+    5: (10, ctypes.c_uint16),
+    6: (13, ctypes.c_int32),
+    7: (12, ctypes.c_uint32),
+    8: (15, ctypes.c_int64),
+    9: (14, ctypes.c_uint64),
+    10: (1, ctypes.c_float),
+    11: (2, ctypes.c_double),
+    15: (6, ctypes.c_bool),
+    16: (7, ctypes.c_uint8),
+    17: (16, c.String),
+    18: (17, c.String),
+    21: (16, c.String),
+    22: (17, c.String),
+}
+_MESSAGE = 18
+
+
+@cache
+def c_structure(structure: Structure) -> type[ctypes.Structure]:
+    """Return the C structure that rosidl's C generator would make for a message."""
+    fields = [(f"f{i}", _c_type(field)) for i, field in enumerate(fields_of(structure))]
+    name = structure.name.replace("/", "__")
+    return type(name, (ctypes.Structure,), {"_fields_": fields})
+
+
+def introspection_id(field: Field) -> int:
+    """Return how introspection calls the type of a field's elements."""
+    return _MESSAGE if field.base == NESTED else _ELEMENTS[field.base][0]
+
+
+def element_type(field: Field) -> Any:
+    """Return the C type of one element of a field."""
+    return c_structure(field.nested) if field.nested else _ELEMENTS[field.base][1]
+
+
+def _c_type(field: Field) -> Any:
+    if field.shape == SCALAR:
+        return element_type(field)
+    if field.shape == ARRAY:
+        return element_type(field) * field.capacity
+    return _sequence_type(field)
+
+
+def _sequence_type(field: Field) -> Any:
+    if field.base == NESTED:
+        return c.Sequence
+    size = abi().strings if element_type(field) is c.String else abi().sequence
+    return c.Sequence if size == ctypes.sizeof(c.Sequence) else c.FlaggedSequence
+
+
+def placed_fields(structure: Structure) -> list[tuple[Field, int]]:
+    """Return a message's fields and where each begins in the C structure."""
+    kind = c_structure(structure)
+    offsets = [getattr(kind, field_name).offset for field_name, *_ in kind._fields_]
+    return list(zip(fields_of(structure), offsets, strict=True))
+
+
+# members
+
+
+@cache
+def _member_type() -> Any:
+    """Return `rosidl_typesupport_introspection_c__MessageMember` of this ROS 2."""
+    layout = abi()
+    fields = (
+        ("name", c_char_p),
+        ("type_id", c_uint8),
+        ("string_upper_bound", c_size_t),
+        ("members", c_void_p),
+        ("flags", c_uint8 * (layout.is_array - 32)),  # whether it is a key
+        ("is_array", c_bool),
+        ("array_size", c_size_t),
+        ("is_upper_bound", c_bool),
+        ("offset", c_uint32),
+        ("default_value", c_void_p),
+        ("size_function", c_void_p),
+        ("get_const_function", c_void_p),
+        ("get_function", c_void_p),
+        ("fetch_function", c_void_p),
+        ("assign_function", c_void_p),
+        ("resize_function", c_void_p),
+        ("later", c_uint8 * (layout.member - 112)),  # whether it is a buffer
+    )
+    return type("MessageMember", (ctypes.Structure,), {"_fields_": fields})
+
+
+@cache
+def _members_type() -> Any:
+    """Return `rosidl_typesupport_introspection_c__MessageMembers` of this ROS 2."""
+    fields = (
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("count", c_uint32),
+        ("size_of", c_size_t),
+        ("flags", c_uint8 * (abi().members - 32)),  # whether there is a key
+        ("members", c_void_p),
+        ("init_function", c_void_p),
+        ("fini_function", c_void_p),
+    )
+    return type("MessageMembers", (ctypes.Structure,), {"_fields_": fields})
+
+
+class Library(NamedTuple):
+    """Addresses in ROS 2's own libraries."""
+
+    identifier: int
+    same_handle: int
+    same_service: int
+
+
+@cache
+def library() -> Library:
+    """Return addresses in the libraries that define what introspection is.
+
+    The identifier is rosidl's own string, because middlewares compare the pointers.
+    `same_handle` and `same_service` answer with the handle itself if the identifier
+    fits.
+    """
+    introspection = c.load_library(f"lib{IDENTIFIER}.so")
+    runtime = c.load_library("librosidl_runtime_c.so")
+    return Library(
+        c_void_p.in_dll(introspection, f"{IDENTIFIER}__identifier").value or 0,
+        c.address(runtime.get_message_typesupport_handle_function),
+        c.address(runtime.get_service_typesupport_handle_function),
+    )
+
+
+def _member(field: Field, offset: int, functional: bool) -> Any:
+    """Return the member that describes a field to the middleware."""
+    member = _member_type()(
+        name=field.name.encode(),
+        type_id=introspection_id(field),
+        string_upper_bound=field.string_capacity,
+        is_array=field.shape != SCALAR,
+        array_size=field.capacity,
+        is_upper_bound=field.shape == BOUNDED_SEQUENCE,
+        offset=offset,
+    )
+    if field.nested:
+        member.members = handle(field.nested, functional)
+    if field.shape != SCALAR and functional:
+        size = ctypes.sizeof(element_type(field))
+        functions = elements(size, element_content(field))
+        if field.shape == ARRAY:
+            member.get_function = functions.in_array
+        else:
+            member.size_function = functions.length
+            member.get_function = functions.in_sequence
+            member.resize_function = functions.resize
+        member.get_const_function = member.get_function
+    return member
+
+
+def members(structure: Structure, functional: bool) -> Any:
+    """Return a message's members."""
+    placed = placed_fields(structure)
+    table = [_member(field, offset, functional) for field, offset in placed]
+    size = ctypes.sizeof(c_structure(structure))
+    finish = elements(size, content(structure)).finish if functional else None
+    package, kind, short = structure.name.split("/")
+    return c.keep(
+        _members_type()(
+            namespace=f"{package}__{kind}".encode(),
+            name=short.encode(),
+            count=len(table),
+            size_of=size,
+            members=c.sequence(table, _member_type()).data,
+            fini_function=finish,
+        )
+    )
+
+
+@cache
+def handle(structure: Structure, functional: bool) -> int:
+    """Return the address of a message's introspection type support.
+
+    `functional`: with the functions by which message memory is written and read.
+    """
+    support = c.MessageTypeSupport(
+        library().identifier,
+        ctypes.addressof(members(structure, functional)),
+        library().same_handle,
+        about(structure),
+    )
+    return c.pointer(support)
+
+
+# message memory
+
+
+class MemoryFunctions(NamedTuple):
+    """Addresses of functions that know one type of message, and its sequences and arrays.
+
+    `convert_from_py` and `convert_to_py` are the only ones that need Python: they call
+    `converter[address] = message` and `converter[address]`.
+    """
+
+    create: int
+    destroy: int
+    convert_from_py: int
+    convert_to_py: int
+    finish: int
+    resize: int
+    length: int
+    in_sequence: int
+    in_array: int
+
+
+@cache
+def elements(size: int, content: int) -> MemoryFunctions:
+    """Return functions for all elements of a size and with a content to free."""
+    return memory_functions(size, content, None)
+
+
+def memory_functions(size: int, content: int, converter: object) -> MemoryFunctions:
+    """Return new functions; they live as long as the process."""
+    allocate, deallocate = allocator()
+    addresses = c.machine_code(
+        "structs",
+        {
+            "allocate": allocate,
+            "deallocate": deallocate,
+            "set_item": c.c_function("PySequence_SetItem"),
+            "get_item": c.c_function("PySequence_GetItem"),
+            "converter": id(c.keep(converter)),
+            "plan": content or _table(),
+            "sequence": _table((0, 0, size, content)),
+            "size": size,
+        },
+    )
+    return MemoryFunctions(*(addresses[name] for name in MemoryFunctions._fields))
+
+
+class _Allocator(ctypes.Structure):
+    """`rcutils_allocator_t`."""
+
+    _fields_ = tuple(
+        (name, c_void_p)
+        for name in ("allocate", "deallocate", "reallocate", "zero_allocate", "state")
+    )
+
+
+class Allocator(NamedTuple):
+    """Addresses of the functions that give zeroed memory, and take memory back."""
+
+    zeroed: int
+    free: int
+
+
+@cache
+def allocator() -> Allocator:
+    """Return the allocator that all of rosidl uses."""
+    default = c.load_library("librcutils.so").rcutils_get_default_allocator
+    default.restype = _Allocator
+    functions = default()
+    return Allocator(functions.zero_allocate, functions.deallocate)
+
+
+# A table of words says what must be freed in a structure: how many entries, and for
+# each entry an offset, how many elements are there (none: they are in memory of their
+# own, as the three words of a sequence or string say), the size of an element, and the
+# table of an element (none: there is nothing to free in it).
+
+
+def _table(*entries: tuple[int, int, int, int]) -> int:
+    words = [len(entries), *(word for entry in entries for word in entry)]
+    return ctypes.addressof(c.keep((c_size_t * len(words))(*words)))
+
+
+@cache
+def content(structure: Structure) -> int:
+    """Return the table of a type, 0 if there is nothing to free in it."""
+    entries = []
+    for field, offset in placed_fields(structure):
+        inner = element_content(field)
+        count = {SCALAR: 1, ARRAY: field.capacity}.get(field.shape, 0)
+        if inner or not count:
+            size = ctypes.sizeof(element_type(field))
+            entries.append((offset, count, size, inner))
+    return _table(*entries) if entries else 0
+
+
+def element_content(field: Field) -> int:
+    """Return the table of one element of a field, 0 if there is nothing to free in it."""
+    if field.nested:
+        return content(field.nested)
+    return _text() if element_type(field) is c.String else 0
+
+
+@cache
+def _text() -> int:
+    """Return the table of a string."""
+    return _table((0, 0, 0, 0))

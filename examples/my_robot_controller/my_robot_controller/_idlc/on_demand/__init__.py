@@ -1,1 +1,0 @@
-"""Features of messages that most programs never use: imported on first use."""

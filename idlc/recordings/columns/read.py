@@ -1,0 +1,161 @@
+"""Reading the columns of many messages, and saying which message cannot be read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from typing import Any, NamedTuple, NoReturn
+
+import numpy as np
+
+from idlc.recordings.columns.plan import Level, plan_of
+from idlc.recordings.columns.scan import (
+    Cursors,
+    ScanResult,
+    UnreadableError,
+    VectorScan,
+    scan_uniform,
+)
+from idlc.recordings.columns.source import Flat, Pieces, Source
+from idlc.recordings.columns.table import Elements, Table, UnevenError, columns_of, structured
+from idlc.runtime.errors import DecodeError
+from idlc.runtime.objects import owner_of
+from idlc.runtime.typeinfo import check_buffer, structure_of
+
+#: From this mean size on, messages are not copied into one array.
+LARGE = 1 << 15
+
+
+class Messages(NamedTuple):
+    """Serialized messages: where they begin and end in a source, as arrays."""
+
+    source: Source
+    starts: Any
+    stops: Any
+
+    def part(self, first: int, last: int) -> Messages:
+        """Return some of the messages."""
+        return self._replace(starts=self.starts[first:last], stops=self.stops[first:last])
+
+    def raw(self, index: int) -> bytes:
+        """Return one message."""
+        start, stop = (np.array([int(positions[index])]) for positions in (self.starts, self.stops))
+        return bytes(self.source.ranges(start, stop - start))
+
+
+def messages_of(messages: Any) -> Messages:
+    """Return the messages of a batch, or of an iterable; small ones of that are copied."""
+    if all(hasattr(messages, name) for name in ("buffer", "starts", "stops")):
+        return _of_batch(messages)
+    raws = [raw if type(raw) is bytes else memoryview(raw).cast("B") for raw in messages]
+    sizes = np.fromiter(map(len, raws), np.int64, len(raws))
+    stops = np.cumsum(sizes)
+    starts = stops - sizes
+    if len(raws) and stops[-1] >= LARGE * len(raws):
+        return Messages(Pieces(raws, starts), starts, stops)
+    return Messages(Flat(np.frombuffer(b"".join(raws), np.uint8)), starts, stops)
+
+
+def _of_batch(batch: Any) -> Messages:
+    array = np.frombuffer(memoryview(batch.buffer).cast("B"), np.uint8)
+    starts, stops = np.asarray(batch.starts), np.asarray(batch.stops)
+    for positions in (starts, stops):
+        if positions.size and positions.dtype.kind not in "iu":
+            raise TypeError("starts and stops of a batch must be integers")
+    starts, stops = starts.astype(np.int64), stops.astype(np.int64)
+    if starts.shape != stops.shape or starts.ndim != 1:
+        raise ValueError("starts and stops of a batch must be as many")
+    if ((starts < 0) | (starts > stops) | (stops > len(array))).any():
+        raise ValueError("a message of the batch is not within its buffer")
+    return Messages(Flat(array), starts, stops)
+
+
+def to_columns(
+    kind: type,
+    messages: Any,
+    fields: Iterable[str] | None = None,
+    ragged: bool | None = None,
+    datetimes: bool = False,
+) -> Any:
+    """Return a row for each message, as a structured array or as Columns."""
+    table, top = table_of(kind, messages, fields, datetimes)
+    if not ragged:
+        try:
+            return structured(table, top)
+        except UnevenError as error:
+            if ragged is not None:
+                raise ValueError(f"{error}; ragged=True takes it") from None
+    return columns_of(table, top)
+
+
+def table_of(
+    kind: type, messages: Any, fields: Iterable[str] | None, datetimes: bool
+) -> tuple[Table, Elements]:
+    """Return what is in messages, and the rows of the table; raise DecodeError."""
+    structure = structure_of(kind)
+    wanted = (fields,) if isinstance(fields, str) else fields
+    plan = plan_of(structure, None if wanted is None else tuple(wanted), datetimes)
+    all_of_them = messages_of(messages)
+    try:
+        return _read(plan, all_of_them)
+    except UnreadableError:
+        explain(kind, plan, all_of_them)
+
+
+def _read(plan: Level, messages: Messages) -> tuple[Table, Elements]:
+    big = big_endian(messages)
+    mixed = bool(big.any() and not big.all())
+    source, result = messages.source, ScanResult()
+    done: list[Any] = []
+    for order, rows in (("<", np.flatnonzero(~big)), (">", np.flatnonzero(big))):
+        starts = messages.starts[rows] + 4
+        cursors = Cursors(starts, messages.stops[rows], starts)
+        rest = np.ones(len(rows), bool)
+        for chosen in scan_uniform(plan, source, order, cursors, result):
+            done.append(rows[chosen])
+            rest[chosen] = False
+        if rest.any():
+            first = result.count[plan.key]
+            result.count[plan.key] += int(rest.sum())
+            VectorScan(source, order, result).level(plan, cursors.select(rest), first)
+            done.append(rows[rest])
+    order = ">" if big.any() and not mixed else "<"
+    size = int((messages.stops - messages.starts).sum())
+    table = Table(source, size, order, result)
+    order_of_rows: Any = None if len(done) < 2 else np.concatenate(done)
+    return table, Elements(plan, len(big), order_of_rows, big if mixed else None)
+
+
+def big_endian(messages: Messages) -> Any:
+    """Return which messages are, as their encapsulation headers say."""
+    starts = messages.starts
+    if (messages.stops - starts < 4).any():
+        raise UnreadableError
+    first, second = (messages.source.items(starts + at, "u1") for at in (0, 1))
+    if (first != 0).any() or (second > 1).any():
+        raise UnreadableError
+    return second == 0
+
+
+def explain(kind: Any, plan: Level, messages: Messages) -> NoReturn:
+    """Raise the DecodeError of a class's package for the first message that is not one of it."""
+    first, last = 0, len(messages.starts)
+    while last - first > 1:  # the first one that cannot be read is in between
+        middle = (first + last) // 2
+        try:
+            _read(plan, messages.part(first, middle))
+            first = middle
+        except UnreadableError:
+            last = middle
+    try:
+        check_buffer(structure_of(kind), messages.raw(first))
+    except DecodeError as error:
+        path = f"[{first}].{error.path}" if error.path else f"[{first}]"
+        raise _runtime_of(kind).DecodeError(error.problem, path, error.offset) from error
+    raise AssertionError(f"[{first}] can be read by itself")
+
+
+def _runtime_of(kind: Any) -> Any:
+    """Return the runtime package that a message class comes from: carried, or installed."""
+    base = owner_of(kind).__base__
+    return import_module(base.__module__.rpartition(".")[0])

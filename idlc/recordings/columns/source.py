@@ -1,0 +1,271 @@
+"""Serialized messages in memory: reading at many positions with few operations."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from idlc.recordings.columns.values import Texts
+
+#: From this mean size on, ranges are copied one by one.
+LONG = 256
+#: Up to this largest size, ranges are cut out of windows that are all as wide.
+SHORT = 32
+#: No dtype is larger.
+LARGEST_ITEM = 1 << 16
+#: So many bytes of each large message, which mostly are all but its payload, are copied.
+HEAD = 512
+#: What large pages of memory align to.
+PAGE = 1 << 21
+
+
+class Place(NamedTuple):
+    """The place of an array in memory."""
+
+    memory: Any
+    offset: int
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+
+
+class Flat:
+    """Messages in one array of bytes."""
+
+    def __init__(self, array: Any) -> None:
+        self.array = array
+        self.view = memoryview(array)
+
+    def around(self, _position: int) -> tuple[Any, int]:
+        """Return what holds a position, and the position at which that begins."""
+        return self.view, 0
+
+    def shares(self, numbers: Any) -> bool:
+        """Return whether an array may be in this memory."""
+        return np.may_share_memory(numbers, self.array)
+
+    def items(self, starts: Any, dtype: str) -> Any:
+        """Return what begins at each of some positions: a view, if these are regular."""
+        distance = _regular(starts)
+        if distance is None:
+            return self._windows(dtype)[starts]
+        first = int(starts[0])
+        return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
+
+    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
+        """Return bytes, at most `width` from each start, as numpy has them."""
+        same = bool((sizes == sizes[:1]).all())
+        distance = _regular(starts) if same and len(sizes) and sizes[0] else None
+        if distance is not None:
+            dtype, first = f"S{sizes[0]}", int(starts[0])
+            return np.ndarray((len(starts),), dtype, self.array, first, (distance,))
+        if width > SHORT or (starts + width > len(self.array)).any():
+            return _padded(self, starts, sizes, width)
+        rows = self._windows(f"V{width}")[starts].view(np.uint8)
+        inside = np.arange(width) < np.arange(width + 1)[:, None]
+        masks = np.where(inside, np.uint8(255), np.uint8(0)).view(f"V{width}")[:, 0]
+        rows &= masks[sizes].view(np.uint8)
+        return rows.view(f"S{width}")
+
+    def blocks(self, starts: Any, size: int) -> Place:
+        """Return where the bytes from each start are: if they are regular, where they were."""
+        distance = _regular(starts)
+        if distance is not None:
+            return Place(self.array, int(starts[0]), (len(starts),), (distance,))
+        if size > LARGEST_ITEM:
+            rows = self._one_by_one(starts, np.full(len(starts), size))
+        else:
+            rows = self._windows(f"V{size}")[starts].view(np.uint8)
+        return Place(rows, 0, (len(starts),), (size,))
+
+    def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
+        """Return bytes, so many from each start, one after the other.
+
+        All sizes are multiples of `item`.
+        """
+        total = int(sizes.sum())
+        if not total:
+            return np.empty(0, np.uint8)
+        if total >= LONG * len(sizes):
+            return self._one_by_one(starts, sizes)
+        longest = int(sizes.max())
+        if longest <= SHORT and (starts + longest <= len(self.array)).all():
+            rows = self._windows(f"V{longest}")[starts].view(np.uint8)
+            return rows.reshape(-1, longest)[np.arange(longest) < sizes[:, None]]
+        counts = sizes // item
+        shift = starts - (np.cumsum(counts) - counts) * item
+        places = np.repeat(shift, counts)
+        places += np.arange(len(places)) * item
+        return self._windows(f"V{item}")[places].view(np.uint8)
+
+    def _windows(self, dtype: str) -> Any:
+        """Return an array of what begins at each byte."""
+        count = max(0, len(self.array) - np.dtype(dtype).itemsize + 1)
+        return np.ndarray((count,), dtype, self.array, strides=(1,))
+
+    def _one_by_one(self, starts: Any, sizes: Any) -> Any:
+        result = fresh(int(sizes.sum()))
+        target, source, at = memoryview(result), self.view, 0
+        for start, size in zip(starts.tolist(), sizes.tolist(), strict=True):
+            end = at + size
+            target[at:end] = source[start : start + size]
+            at = end
+        return result
+
+
+class Pieces:
+    """Large messages where they are, with positions as if they were one array.
+
+    Of their heads there is a copy, where all can be read at once.
+    """
+
+    def __init__(self, raws: list[Any], starts: Any) -> None:
+        self.raws = [memoryview(raw) for raw in raws]
+        self.starts = starts
+        heads = [raw[:HEAD] for raw in self.raws]
+        self.heads = Flat(np.frombuffer(b"".join(heads), np.uint8))
+        sizes = [len(head) for head in heads]
+        self.head_starts = np.cumsum([0, *sizes[:-1]])
+
+    def around(self, position: int) -> tuple[Any, int]:
+        """Return what holds a position, and the position at which that begins."""
+        row = int(np.searchsorted(self.starts, position, "right")) - 1
+        return self.raws[row], int(self.starts[row])
+
+    def shares(self, _numbers: Any) -> bool:
+        """Return whether an array may be in this memory."""
+        return False
+
+    def items(self, starts: Any, dtype: str) -> Any:
+        """Return what begins at each of some positions."""
+        item = np.dtype(dtype)
+        return self.ranges(starts, np.full(len(starts), item.itemsize)).view(item)
+
+    def strings(self, starts: Any, sizes: Any, width: int) -> Any:
+        """Return bytes, at most `width` from each start, as numpy has them."""
+        return _padded(self, starts, sizes, width)
+
+    def blocks(self, starts: Any, size: int) -> Place:
+        """Return where copies of the bytes from each start are."""
+        rows = self.ranges(starts, np.full(len(starts), size))
+        return Place(rows, 0, (len(starts),), (size,))
+
+    def ranges(self, starts: Any, sizes: Any, item: int = 1) -> Any:
+        """Return bytes, so many from each start, one after the other."""
+        rows = np.searchsorted(self.starts, starts, "right") - 1
+        inside = starts - self.starts[rows]
+        if (inside + sizes <= HEAD).all():
+            return self.heads.ranges(self.head_starts[rows] + inside, sizes, item)
+        result = fresh(int(sizes.sum()))
+        target, raws, at = memoryview(result), self.raws, 0
+        for row, start, size in zip(rows.tolist(), inside.tolist(), sizes.tolist(), strict=True):
+            end = at + size
+            target[at:end] = raws[row][start : start + size]
+            at = end
+        return result
+
+
+Source = Flat | Pieces
+
+
+def rows_of(source: Source, starts: Any, counts: Any, item: int) -> Place | None:
+    """Return where as many items from each start are; None if they are not as many."""
+    if not len(counts) or (counts != counts[0]).any():
+        return None
+    count = int(counts[0])
+    place = Place(b"", 0, (len(counts),), (0,))
+    if count:
+        place = source.blocks(starts, count * item)
+    return place._replace(shape=(*place.shape, count), strides=(*place.strides, item))
+
+
+def fresh(size: int) -> Any:
+    """Return bytes of memory, so that if they are many, large pages are all they are made of."""
+    if size < 2 * PAGE:
+        return np.empty(size, np.uint8)
+    memory: Any = np.empty(size + PAGE, np.uint8)
+    start = -memory.__array_interface__["data"][0] % PAGE
+    return memory[start : start + size]
+
+
+def _regular(starts: Any) -> int | None:
+    """Return the distance of positions that are all as far from each other."""
+    if len(starts) < 2 or starts[1] - starts[0] != starts[-1] - starts[-2]:
+        return None
+    distance = int(starts[1] - starts[0])
+    return distance if (starts[1:] - starts[:-1] == distance).all() else None
+
+
+def _padded(source: Source, starts: Any, sizes: Any, width: int) -> Any:
+    result = np.zeros((len(sizes), width), np.uint8)
+    result[np.arange(width) < sizes[:, None]] = source.ranges(starts, sizes)
+    return result.reshape(-1).view(f"S{width}")
+
+
+# strings, as `deserialize` reads them: invalid UTF-8 and UTF-16 become U+FFFD
+
+
+def without_zeros(source: Source, starts: Any, sizes: Any) -> Any:
+    """Return the sizes of strings without their terminating zeros, if they have any."""
+    last = np.maximum(starts + sizes, 1) - 1
+    return sizes - ((sizes > 0) & (source.items(last, "u1") == 0))
+
+
+def narrow_texts(source: Source, starts: Any, sizes: Any) -> Texts:
+    """Return the strings at some places, of so many bytes."""
+    texts = Texts(offsets_of(sizes), source.ranges(starts, sizes))
+    return texts if _is_utf8(texts) else _encoded(map(_text, _parts(texts)))
+
+
+def wide_texts(source: Source, starts: Any, sizes: Any, order: str, big: Any) -> Texts:
+    """Return the strings at some places, of so many UTF-16 units of four bytes."""
+    units = utf16_units(source, starts, sizes, order)
+    if big is not None:
+        swapped = np.repeat(big, sizes)
+        units[swapped] = units[swapped].byteswap()
+    texts = Texts(offsets_of(sizes * 2), units.astype("<u2").view(np.uint8))
+    return _encoded(part.decode("utf-16-le", "replace") for part in _parts(texts))
+
+
+def utf16_units(source: Source, starts: Any, sizes: Any, order: str) -> Any:
+    """Return the units of strings, one after the other, as numbers."""
+    return source.ranges(starts, sizes * 4, 4).view(order + "u4").astype(np.uint32)
+
+
+def offsets_of(sizes: Any) -> Any:
+    """Return where each of some ranges begins, one after the other, and where all end."""
+    result = np.zeros(len(sizes) + 1, np.int64)
+    np.cumsum(sizes, out=result[1:])
+    return result
+
+
+def _is_utf8(texts: Texts) -> bool:
+    """Return whether each text is; that all of them together are is not enough."""
+    values = texts.values
+    if not len(values) or values.max() < 0x80:
+        return True
+    begins = values[texts.offsets[:-1][texts.sizes > 0]]
+    if ((begins & 0xC0) == 0x80).any():  # within a character
+        return False
+    try:
+        values.tobytes().decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _parts(texts: Texts) -> Any:
+    raw = texts.values.tobytes()
+    ends = texts.offsets.tolist()
+    return (raw[a:b] for a, b in pairwise(ends))
+
+
+def _text(raw: bytes) -> str:
+    return raw.decode("utf-8", "replace")
+
+
+def _encoded(texts: Any) -> Texts:
+    parts = [text.encode() for text in texts]
+    sizes = np.fromiter(map(len, parts), np.int64, len(parts))
+    return Texts(offsets_of(sizes), np.frombuffer(b"".join(parts), np.uint8))
