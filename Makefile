@@ -56,7 +56,7 @@ export ROS_LOG_DIR := $(CURDIR)/build/log
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help install demo test test-long test-bare test-kilted test-all test-lowest vscode test-vscode fuzz soak lint example bench \
-    lock site release-check clean
+    lock site release-check runtime-wheel clean
 
 help: ## show this list
 	@echo 'make TARGET, where TARGET is'

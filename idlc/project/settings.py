@@ -34,7 +34,7 @@ Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
 Switch = Annotated[bool, Meta(title="true or false")]
-Mode = Annotated[Runtime | None, Meta(title="`carried` or `installed`")]
+Mode = Annotated[Runtime | None, Meta(title='`"carried"` or `"installed"`')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 

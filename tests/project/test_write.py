@@ -38,7 +38,12 @@ def put(out: Path, files: dict[str, str], report: Report, *, force: bool = False
         return False
     record = lock.Lock(
         format=lock.FORMAT,
-        idlc="0", package="p", inputs={}, dependencies={}, types={}, outputs=planned.outputs
+        idlc="0",
+        package="p",
+        inputs={},
+        dependencies={},
+        types={},
+        outputs=planned.outputs,
     )
     return write.apply(planned, lock.encode(record), "out", report)
 
