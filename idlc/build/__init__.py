@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from idlc.build.setup_command import distribution_class
 from idlc.check.compiler import models_of
@@ -14,10 +14,10 @@ from idlc.diagnostics.report import Report
 from idlc.diagnostics.text import without_options
 from idlc.generate.gen import GenOptions, gen
 from idlc.generate.prefix import libraries_of, shared
-from idlc.generate.python.render import support_packages
 from idlc.project.files import is_file, read_bytes
 from idlc.project.find import list_files
 from idlc.project.inputs import packages
+from idlc.project.lock import load_lock
 from idlc.project.root import MANIFEST, Root
 from idlc.project.settings import load_settings, scope
 
@@ -52,8 +52,8 @@ def _compiled(package: str) -> type:
     if not inputs:
         return distribution_class(package, {})
     home = home_of(where.root.base, package, where.root).relative_to(where.root.base).as_posix()
-    runtime, vendor = settings.runtime, settings.vendor_deps
-    done = gen(GenOptions((".",), where, home, runtime=runtime, vendor_deps=vendor), report)
+    runtime, vendoring = settings.runtime, settings.vendoring
+    gen(GenOptions((".",), where, home, runtime=runtime, vendoring=vendoring), report)
     manifest = read_bytes(Path(MANIFEST), MANIFEST, report) if is_file(Path(MANIFEST)) else None
     if report.had_errors:
         output.show(report, "text", sys.stderr)
@@ -63,8 +63,8 @@ def _compiled(package: str) -> type:
     files = shared(model, manifest, libraries, report)
     output.show(report, "text", sys.stderr)
     output.notes(report, sys.stderr)
-    parts = {key.partition("/")[0] for key in inputs[0].digests}
-    if done[0].runtime == "carried":
-        parts.update(support_packages())
-    generated = (package, *(f"{package}.{part}" for part in parts))
+    lock = load_lock(where.root.base / home, home, Report())
+    modules = (PurePosixPath(package, path) for path in (lock.outputs if lock else ()))
+    folders = {module.parent for module in modules if module.suffix == ".py"}
+    generated = tuple(sorted(".".join(folder.parts) for folder in folders))
     return distribution_class(package, files, generated, libraries.build_tag)

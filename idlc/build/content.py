@@ -51,9 +51,9 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
     config = load_settings(root, report)
     if config.source:
         place = TableLocation(config.source, "tool.idlc", "[tool.idlc]")
-        if config.vendor_deps:
-            message = "`vendor-deps` does not work in a wheel: it would overwrite packages of ROS 2"
-            hint = "remove it, and name wheels with these packages in `dependencies` of [project]"
+        if config.vendoring == "beside":
+            message = "`vendor-deps` is `beside`: a wheel would overwrite packages of ROS 2"
+            hint = "set it to true, so that the types that are used are in the package itself"
             place.wrong("vendor-deps", message, report, hint)
         if config.package not in (None, name):
             message = f"`package` is `{config.package}`, and package.xml names the package `{name}`"
@@ -67,7 +67,9 @@ def compile_package(name: str, classes: Path, options: Options, report: Report) 
         return None
     _refuse_code(name, root, report)
     generated = Report()
-    gen(GenOptions((".",), where, str(classes), runtime=config.runtime), generated)
+    runtime, vendoring = config.runtime, config.vendoring
+    request = GenOptions((".",), where, str(classes), runtime=runtime, vendoring=vendoring)
+    gen(request, generated)
     # the environment of a build need not be able to import the package
     unimportable = codes.DEPENDENCY_NOT_IMPORTABLE.id
     report.extend(each for each in generated if each.code != unimportable)

@@ -58,9 +58,9 @@ def topics(word: str, paths: Sequence[str]) -> list[str]:
     from idlc.recordings.find import split_recordings
     from idlc.recordings.types import read_topics
 
-    recordings = filter(
-        None, (read_topics(path, Report()) for path in split_recordings(paths, Root.here())[0])
-    )
+    root = Root.here()
+    words = split_recordings(paths, root)[0]
+    recordings = filter(None, (read_topics(path, root, Report()) for path in words))
     names = {topic.topic.name for recording in recordings for topic in recording.topics}
     return sorted(name for name in names if name.startswith(word))
 

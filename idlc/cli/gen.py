@@ -156,7 +156,16 @@ All options can be kept in pyproject.toml:
 """
 
 
-@click.command("gen", epilog=EPILOG)
+class _Command(click.Command):
+    """The command, in which --vendor-deps does not take the next argument for its value."""
+
+    def parse_args(self, context: click.Context, words: list[str]) -> list[str]:
+        """Parse the words after the command."""
+        words = [f"{word}=private" if word == "--vendor-deps" else word for word in words]
+        return super().parse_args(context, words)
+
+
+@click.command("gen", cls=_Command, epilog=EPILOG)
 @click.argument("paths", metavar="PATH|PACKAGE|TYPE|REC...", nargs=-1, type=click.Path())
 @click.option("-o", "--out", metavar="OUT", type=click.Path(), help="The folder to write.")
 @click.option(
@@ -181,7 +190,13 @@ All options can be kept in pyproject.toml:
 @click.option("--check", is_flag=True, help="Write nothing; fail if OUT is out of date.")
 @click.option("--watch", is_flag=True, help="Go on, and compile again after every change.")
 @click.option(
-    "--vendor-deps", is_flag=True, help="Write the packages that are depended on beside OUT."
+    "--vendor-deps",
+    "vendoring",
+    type=click.Choice(("private", "beside")),
+    is_flag=False,
+    flag_value="private",
+    metavar="[=beside]",
+    help="Write the types that OUT uses of other packages into it, or these packages beside it.",
 )
 @click.option(
     "--runtime",
@@ -216,6 +231,7 @@ def command(style: str, watch: bool, **arguments: Any) -> int:
     package = arguments["package"]
     words = [arguments.pop(name) for name in ("package", "include", "exclude", "distro")]
     again = shlex.join(("idlc", "gen", *options.typed("check", "style")))
+    arguments["vendoring"] = arguments["vendoring"] or ""
     typed = GenOptions(**arguments, scope=scope(settings, *words), again=again)
     request = in_package(with_settings(typed, settings))
     if not request.paths or not (request.out or request.ament):

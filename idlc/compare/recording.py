@@ -47,7 +47,7 @@ def compare_with_recordings(
     problems = Report()
     packages = inputs.packages(listing.files, options.scope, problems)
     report.extend(problems)
-    topics = topics_of(recordings, (), report)
+    topics = topics_of(recordings, (), options.scope.root, report)
     if topics is None or report.had_errors:
         return None
     local = _LocalVersions(packages, options, report)

@@ -156,7 +156,7 @@ def topics(path: str, scope: Scope, report: Report) -> list[TopicFacts]:
     """Return the topics of a recording, sorted by name; empty after an error."""
     from idlc.recordings.types import LocalTypes, read_topics, recorded_types, versions
 
-    recording = read_topics(path, report, check=True)
+    recording = read_topics(path, scope.root, report, check=True)
     report.notes += [topic.message for topic in recording.unread] if recording else []
     local = LocalTypes(scope, report)
     facts = []
@@ -191,7 +191,7 @@ def definitions(
     """Yield the interfaces of topics, each once, as text in a format."""
     from idlc.recordings.types import LocalTypes, recorded_types, topics_of, versions
 
-    recorded = topics_of([path], selected, report)
+    recorded = topics_of([path], selected, scope.root, report)
     local = LocalTypes(scope, report)
     for version in versions(recorded or ()):
         types = recorded_types(version, local, scope, report)

@@ -27,11 +27,11 @@ from idlc.project import inputs, lock, settings
 from idlc.project.files import is_file
 from idlc.project.find import is_path, root_of
 from idlc.project.library import Library, resolve
-from idlc.project.lock import load_lock
+from idlc.project.lock import Runtime, Vendoring, load_lock
 from idlc.project.package_xml import declared_name
 from idlc.project.root import Root
 from idlc.project.settings import Config, Scope, load_settings, scope
-from idlc.recordings.find import is_recording, split_recordings
+from idlc.recordings.find import split_recordings
 from idlc.version import __version__
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ class GenOptions(NamedTuple):
     out: str = ""
     topics: tuple[str, ...] = ()
     check: bool = False
-    runtime: lock.Runtime | None = None
-    vendor_deps: bool = False
+    runtime: Runtime | None = None
+    vendoring: Vendoring = ""
     force: bool = False
     ament: str = ""
     again: str = "idlc gen"
@@ -63,7 +63,7 @@ def with_settings(options: GenOptions, settings: Config) -> GenOptions:
         paths=options.paths or settings.paths,
         out=options.out or ("" if options.ament else settings.out or ""),
         runtime=options.runtime or settings.runtime,
-        vendor_deps=options.vendor_deps or settings.vendor_deps,
+        vendoring=options.vendoring or settings.vendoring,
     )
 
 
@@ -91,7 +91,9 @@ def in_package(options: GenOptions) -> GenOptions:
 def gen(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     """Write, or with `check` compare, packages and what they vendor; empty after an error."""
     runs = [options._replace(ament="")] if options.out else []
-    runs += [options] if options.ament else []  # the package may be named by OUT
+    if options.ament:  # last, because the package may be named by OUT
+        # all that is in a prefix is beside each other
+        runs.append(options._replace(vendoring="beside" if options.vendoring else ""))
     done: list[Generated] = []
     for run in runs:
         if not report.had_errors:
@@ -126,7 +128,7 @@ def _run_once(options: GenOptions, report: Report) -> tuple[Generated, ...]:
     folders = _targets(packages, options, report) if packages else ()
     if not folders:
         return ()
-    with folders[0].exclusive(beside=options.vendor_deps or len(folders) > 1):
+    with folders[0].exclusive(beside=options.vendoring == "beside" or len(folders) > 1):
         done = _compile_and_write(dict(zip(folders, packages, strict=True)), texts, options, report)
         if options.ament and done and not options.check:
             from idlc.generate.prefix import write_setup_scripts
@@ -217,7 +219,7 @@ def _compile_and_write(
     refusable = _may_be_refused(requested.values(), library.distro)
     if not (options.check or report.had_errors or refusable):
         current = [
-            up_to_date(target, package.digests, library, options.vendor_deps)
+            up_to_date(target, package.digests, library, options.vendoring)
             for target, package in requested.items()
         ]
         if all(current):
@@ -231,7 +233,7 @@ def _compile_and_write(
     packages = []
     if not report.had_errors:
         packages = planned(
-            models, requested, compiler, check=options.check, vendor_deps=options.vendor_deps
+            models, requested, compiler, check=options.check, vendoring=options.vendoring
         )
     if options.check:
         for package in packages:
@@ -274,11 +276,8 @@ class Run(NamedTuple):
     def make(self, report: Report) -> tuple[Generated, ...]:
         """Write, and return the packages; empty after an error. Raises OSError."""
         root = Root.at(self.folder)
-        paths = tuple(
-            root.path(word) if is_recording(word, root) else word for word in self.options.paths
-        )
         scope = msgspec.structs.replace(self.options.scope, root=root)
-        return gen(self.options._replace(paths=paths, scope=scope), report)
+        return gen(self.options._replace(scope=scope), report)
 
 
 def run_for(path: Path, package: str) -> Run | None:
@@ -309,5 +308,5 @@ def _by_lock(path: Path, package: str) -> Run | None:
         if lock is not None and lock.package == package:
             settings = scope(load_settings(Root.at(home), Report()), package)
             name = out.relative_to(home).as_posix()
-            return Run(home, GenOptions((".",), settings, name, vendor_deps=lock.vendor_deps))
+            return Run(home, GenOptions((".",), settings, name, vendoring=lock.vendoring))
     return None

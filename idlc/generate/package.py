@@ -49,13 +49,18 @@ def package_of(
     library: Library,
     *,
     check: bool,
-    vendored: Sequence[str] | None = None,
+    vendoring: lock.Vendoring = "",
+    copies: Sequence[Model] = (),
+    beside: Sequence[str] = (),
 ) -> Package | None:
     """Return a sound model rendered and compared with the files on disk.
 
-    `vendored` are the packages that are written because of it, with --vendor-deps.
+    `copies` are models of other packages' types that are written into it, `beside` the packages
+    that are written beside it.
     """
-    from idlc.generate.python.render import installed_runtime, render_package
+    from idlc.generate.python.imports import ALONE, VENDORING
+    from idlc.generate.python.render import carried_runtime, installed_runtime, render_package
+    from idlc.generate.python.vendored import vendored_files
     from idlc.project import templates
     from idlc.wire.layout import oversized
 
@@ -64,9 +69,15 @@ def package_of(
         target.report.extend(refused)
         return None
     templates.keep_compiled()
-    runtime = installed_runtime(model.package) if target.runtime == "installed" else None
     with stage("render", model.package):
-        modules = {file.path: file.text for file in render_package(model, runtime=runtime)}
+        runtime = (
+            carried_runtime() if target.runtime == "carried" else installed_runtime(model.package)
+        )
+        rendered = (
+            *render_package(model, VENDORING if copies else ALONE, runtime),
+            *vendored_files(model.package, copies),
+        )
+        modules = {file.path: file.text for file in rendered}
         files = _with_surroundings(model, modules, target)
     plan = target.plan(files, check=check)
     if plan is None:
@@ -75,7 +86,7 @@ def package_of(
     own = {
         ir.TypeName(model.package, n.kind, n.name) for n in model.interfaces if _key(n) in digests
     }
-    others = [name for name in model.interfaces if name not in own]
+    others = {name for each in (model, *copies) for name in each.interfaces if name not in own}
     return Package(
         target,
         plan,
@@ -84,10 +95,10 @@ def package_of(
             idlc=__version__,
             package=model.package,
             runtime=target.runtime,
-            vendor_deps=vendored is not None,
+            vendor_deps=bool(vendoring),
             converts_values=model.distro.converts_values or UNSET,
-            vendored=tuple(vendored or ()),
-            imports=_imports(model),
+            vendored=tuple(beside),
+            imports=() if copies else _imports(model),
             inputs=digests,
             dependencies=dependencies(others, library),
             types={n: model.describer.hash(n) for own in model.own for n in derived_names(own)},
@@ -133,18 +144,41 @@ def planned(
     compiler: Compiler,
     *,
     check: bool,
-    vendor_deps: bool,
+    vendoring: lock.Vendoring,
 ) -> list[Package]:
     """Return sound models, and packages to vendor, ready to be written; empty after an error."""
     vendor = _Vendor({model.package for model in models}, compiler, check=check)
     packages: list[Package | None] = []
     for model, (target, package) in zip(models, requested.items(), strict=True):
-        names = vendor.add(model, target) if vendor_deps else None
-        library = compiler.library
-        digests = package.digests
-        packages.append(package_of(model, target, digests, library, check=check, vendored=names))
+        packages.append(
+            package_of(
+                model,
+                target,
+                package.digests,
+                compiler.library,
+                check=check,
+                vendoring=vendoring,
+                copies=_copies(model, compiler, target.report) if vendoring == "private" else (),
+                beside=vendor.add(model, target) if vendoring == "beside" else (),
+            )
+        )
     packages += [vendor.packages[name] for name in sorted(vendor.packages)]
     return [] if None in packages else [package for package in packages if package]
+
+
+def _copies(model: Model, compiler: Compiler, report: Report) -> list[Model]:
+    """Return models of the other packages' types that a model's generated code may import."""
+    names = set(model.interfaces)
+    if any(own.name.kind == "action" for own in model.own):
+        names |= derive.ACTION_PROTOCOL
+    used: dict[str, list[ir.Interface]] = {}
+    for name, interface in sorted(compiler.reached(names).items()):
+        used.setdefault(name.package, []).append(interface)
+    used.pop(model.package, None)
+    problems = Report()
+    copies = [compiler.model(package, own, problems) for package, own in used.items()]
+    report.extend(each for each in problems if each.severity is Severity.ERROR)
+    return copies
 
 
 class _Vendor:
@@ -220,10 +254,10 @@ def _outcome(target: Target, record: lock.Lock) -> Generated:
 
 
 def up_to_date(
-    target: Target, digests: dict[str, str], library: Library, vendor_deps: bool
+    target: Target, digests: dict[str, str], library: Library, vendoring: lock.Vendoring
 ) -> tuple[Generated, ...]:
     """Return the packages if a run would change nothing; empty otherwise."""
-    if not target.unchanged(digests, library, vendor_deps=vendor_deps) or target.lock is None:
+    if not target.unchanged(digests, library, vendoring) or target.lock is None:
         return ()
     folders = [target]
     for package in target.lock.vendored:
@@ -255,7 +289,7 @@ def with_needs(
                 target.name,
                 f"`{target.package}` imports {names}, which this Python cannot import",
                 hint=f"{distro.installing(missing)}, or run `{again} --vendor-deps`, "
-                "which writes it next to this one",
+                "which writes the types that are used into this one",
             )
         )
     return tuple(package._replace(needs=quiet.get(package.out, ())) for package in done)

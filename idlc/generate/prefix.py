@@ -17,7 +17,7 @@ from idlc.generate.target import Target
 from idlc.project import prefixes, write
 from idlc.project.atomic import exclusive
 from idlc.project.library import Library
-from idlc.project.lock import Runtime, Tree
+from idlc.project.lock import Runtime, Tree, Vendoring
 from idlc.project.prefixes import DEFAULT, INDEX, Distribution, distribution
 from idlc.project.root import Root
 from idlc.project.write import Change, Plan
@@ -190,13 +190,13 @@ class Overlay(Target):
         )
 
     def unchanged(
-        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return `False`: interfaces alone do not show whether a run would change nothing.
 
         Libraries depend on the installed distribution, too.
         """
-        del inputs, library, vendor_deps
+        del inputs, library, vendoring
         return False
 
     def cause(self, change: Change) -> str:

@@ -27,6 +27,7 @@ from idlc.project.lock import (
     Obstacle,
     Runtime,
     Tree,
+    Vendoring,
     digest,
     encode,
     load_lock,
@@ -232,8 +233,7 @@ def unchanged(
     package: str,
     inputs: Mapping[str, str],
     library: Library,
-    *,
-    vendor_deps: bool = False,
+    vendoring: Vendoring = "",
 ) -> bool:
     """Return whether a run would leave the package in `out` unchanged.
 
@@ -241,7 +241,8 @@ def unchanged(
     """
     return (
         lock is not None
-        and (lock.idlc, lock.package, lock.vendor_deps) == (__version__, package, vendor_deps)
+        and (lock.idlc, lock.package) == (__version__, package)
+        and lock.vendors_as(vendoring)
         and bool(lock.converts_values) == library.distro.converts_values
         and lock.inputs == inputs
         and _outputs_stand(out, lock)
@@ -374,11 +375,11 @@ class Target:
         return False
 
     def unchanged(
-        self, inputs: Mapping[str, str], library: Library, *, vendor_deps: bool = False
+        self, inputs: Mapping[str, str], library: Library, vendoring: Vendoring = ""
     ) -> bool:
         """Return whether compiling the inputs would change nothing."""
         is_unchanged = (self.lock is None or self.lock.runtime == self.runtime) and unchanged(
-            self._path, self.lock, self.package, inputs, library, vendor_deps=vendor_deps
+            self._path, self.lock, self.package, inputs, library, vendoring
         )
         if is_unchanged:
             write.sweep(self._path)
@@ -478,6 +479,8 @@ def _reasons(old: Lock, new: Lock, *, dependencies: bool = True) -> str:
         reasons.append(f"its runtime was {old.runtime}, and is to be {new.runtime}")
     if old.package != new.package:
         reasons.append(f"the package was called `{old.package}`")
+    if (old.vendor_deps, bool(old.vendored)) != (new.vendor_deps, bool(new.vendored)):
+        reasons.append("`--vendor-deps` was another")
     for before, after in pairs:
         reasons += [f"`{name}` was added" for name in sorted(after.keys() - before.keys())]
         reasons += [f"`{name}` was removed" for name in sorted(before.keys() - after.keys())]

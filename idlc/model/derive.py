@@ -8,6 +8,14 @@ SERVICE_EVENT_INFO = ir.TypeName("service_msgs", "msg", "ServiceEventInfo")
 UUID = ir.TypeName("unique_identifier_msgs", "msg", "UUID")
 TIME = ir.TypeName("builtin_interfaces", "msg", "Time")
 
+#: What clients and servers of all actions use.
+ACTION_PROTOCOL = frozenset(
+    {
+        ir.TypeName("action_msgs", "srv", "CancelGoal"),
+        ir.TypeName("action_msgs", "msg", "GoalStatusArray"),
+    }
+)
+
 #: Packages that each kind of file needs beside the types that it names.
 IMPLICIT_PACKAGES: dict[ir.Kind, tuple[str, ...]] = {
     "msg": (),

@@ -295,6 +295,11 @@ class Model:
         self.interfaces = interfaces
         self._pool = pool
 
+    @property
+    def kinds(self) -> list[ir.Kind]:
+        """The kinds of its own interfaces, sorted."""
+        return sorted({interface.name.kind for interface in self.own})
+
     @cached_property
     def messages(self) -> Mapping[ir.TypeName, ir.Message]:
         """Every structure by name, sections and derived ones included."""

@@ -118,6 +118,9 @@ class _Header(msgspec.Struct):
 
 #: How a package has its runtime: as a copy of its own, or from the distribution idlc-runtime.
 Runtime: TypeAlias = Literal["carried", "installed"]
+#: The place of the types of other packages that are used: in the generated package, as whole
+#: packages beside it, or where they are installed.
+Vendoring: TypeAlias = Literal["private", "beside", ""]
 
 
 class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -142,6 +145,19 @@ class Lock(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     dependencies: dict[str, str]
     types: dict[str, str]
     outputs: dict[str, str]
+
+    @property
+    def vendoring(self) -> Vendoring:
+        """The place of other packages' types."""
+        if not self.vendor_deps:
+            return ""
+        return "beside" if self.vendored else "private"
+
+    def vendors_as(self, vendoring: Vendoring) -> bool:
+        """Return whether a run that vendors in this way would write the same files."""
+        if self.vendor_deps and not self.dependencies:  # the places differ for nothing
+            return bool(vendoring)
+        return self.vendoring == vendoring
 
 
 def digest(data: bytes) -> str:

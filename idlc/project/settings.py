@@ -10,7 +10,15 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeVar, get_args
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    TypeVar,
+    get_args,
+)
 
 import msgspec
 from msgspec import Meta
@@ -23,7 +31,7 @@ from idlc.diagnostics.text import did_you_mean
 from idlc.model.distros import BY_NAME, DEFAULT, Distro, split_names, unknown_distro
 from idlc.project.files import decode
 from idlc.project.find import Exclusions, exclusion
-from idlc.project.lock import Runtime
+from idlc.project.lock import Runtime, Vendoring
 from idlc.project.prefixes import distribution
 
 if TYPE_CHECKING:
@@ -33,8 +41,8 @@ if TYPE_CHECKING:
 Text = Annotated[str, Meta(title="a string")]
 Texts = Annotated[tuple[str, ...], Meta(title="a list of strings")]
 TextOrTexts = Annotated[str | tuple[str, ...], Meta(title="a string or a list of strings")]
-Switch = Annotated[bool, Meta(title="true or false")]
-Mode = Annotated[Runtime | None, Meta(title='`"carried"` or `"installed"`')]
+Mode = Annotated[Runtime | None, Meta(title='"carried" or "installed"')]
+SwitchOrBeside = Annotated[bool | Literal["beside"], Meta(title='true, false or "beside"')]
 Table = Annotated[dict[str, Any], Meta(title="a table")]
 Tables = Annotated[tuple[dict[str, Any], ...], Meta(title="a list of tables")]
 
@@ -136,7 +144,7 @@ class Settings(msgspec.Struct, frozen=True, rename="kebab"):
     out: Text = ""
     package: Text = ""
     runtime: Mode = None
-    vendor_deps: Switch = False
+    vendor_deps: SwitchOrBeside = False
     distro: TextOrTexts = ()
     templates: Text = ""
     breaking: Table = {}
@@ -157,12 +165,19 @@ class Config(msgspec.Struct, frozen=True):
     include: tuple[str, ...] = ()
     exclude: tuple[str, ...] = ()
     runtime: Runtime | None = None
-    vendor_deps: bool = False
+    vendor_deps: bool | Literal["beside"] = False
     distro: tuple[str, ...] = ()
     templates: str | None = None
     tables: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
     source: Source | None = None
     folder: Path | None = None
+
+    @property
+    def vendoring(self) -> Vendoring:
+        """The place of other packages' types that `vendor_deps` asks for."""
+        if self.vendor_deps == "beside":
+            return "beside"
+        return "private" if self.vendor_deps else ""
 
 
 def load_settings(root: Root, report: Report) -> Config:

@@ -11,7 +11,7 @@ from importlib import import_module, invalidate_caches
 from pathlib import Path
 from shutil import rmtree
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from idlc.check.compiler import Compiler, library_for, sources_of
 from idlc.diagnostics.report import Report, Severity
@@ -126,7 +126,7 @@ def _models(compiler: Compiler, names: Iterable[ir.TypeName], report: Report) ->
 
 
 def _of_recording(path: str, where: Scope, report: Report) -> tuple[Models, list[ir.TypeName]]:
-    recording = read_topics(path, report)
+    recording = read_topics(path, where.root, report)
     groups = versions(recording.topics) if recording else []
     if len(groups) != 1:
         from idlc.recordings.packages import check_versions
@@ -251,7 +251,7 @@ def class_of(topic: Topic, include: tuple[str, ...] = ()) -> Any:
         # local definitions that were used instead may change
         key = _stored(models, "" if list(report) else key)
     kind = _class(f"{LOADED}.{key}", topic.type)
-    if topic.hash not in (None, _type_of(kind).hash):
+    if topic.hash not in (None, structure_of(owner_of(kind)).hash):
         message = f"`{topic.name}`: the definition of {topic.type} is not that of what was recorded"
         warnings.warn(message, OtherDefinitionWarning, stacklevel=2)
     return kind
@@ -276,7 +276,7 @@ class MissingDefinitionWarning(UserWarning):
 def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
     """Return the class of a program; raise RecordingError if messages are of another type."""
     try:
-        class_type = _type_of(kind)
+        class_type = structure_of(owner_of(kind))
     except (AttributeError, ImportError, KeyError, TypeError):
         hint = "leave it out, or give one that `idlc gen` made"
         raise RecordingError(f"{kind!r} is no message class of idlc", hint) from None
@@ -292,23 +292,6 @@ def check_class(kind: Any, topic: Topic, include: tuple[str, ...] = ()) -> Any:
                 "leave the class out to read what was recorded",
             )
     return kind
-
-
-class _Type(NamedTuple):
-    name: str
-    hash: str
-
-
-def _type_of(kind: Any) -> _Type:
-    """Return the full name and the hash of a generated class."""
-    try:
-        structure = structure_of(owner_of(kind))
-    except ModuleNotFoundError:  # of idlc before 0.2
-        home = kind.__module__.rpartition(".")[0].rpartition(".")[0]
-        info = import_module(f"{home}._idlc.on_demand.typeinfo")
-        name = info.type_name(kind)
-        return _Type(name, info.types()["hashes"][name])
-    return _Type(structure.name, structure.hash)
 
 
 def _class(home: str, name: str) -> Any:
@@ -336,11 +319,13 @@ def _stored(models: Mapping[str, Model], key: str = "") -> str:
 
 def _files(models: Mapping[str, Model], parent: str) -> Iterator[RenderedFile]:
     """Yield the files of packages, which share the support code of this idlc."""
+    from idlc.generate.python.imports import Surroundings
     from idlc.generate.python.render import render_package
 
     runtime = (RenderedFile("_idlc.py", SUPPORT),)
     for package, model in models.items():
-        for file in render_package(model, parent, runtime):
+        surroundings = Surroundings(others=f"{parent}.")
+        for file in render_package(model, surroundings, runtime):
             yield RenderedFile(f"{package}/{file.path}", file.text)
 
 

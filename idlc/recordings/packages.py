@@ -29,7 +29,7 @@ def check_recordings(paths: Sequence[str], scope: Scope, report: Report) -> None
     """Report problems in the type definitions stored in recordings."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read_topics(path, report, check=True)
+        recording = read_topics(path, scope.root, report, check=True)
         groups = versions(recording.topics) if recording else []
         for message, hint in recording.unread if recording else ():
             problem = codes.UNREADABLE_RECORDING.of(path, message, hint=hint)
@@ -74,7 +74,7 @@ def recorded_models(
     """Yield the models of recordings, without faulty interfaces, and the names of their types."""
     local = LocalTypes(scope, report)
     for path in paths:
-        recording = read_topics(path, report)
+        recording = read_topics(path, scope.root, report)
         for version in versions(recording.topics) if recording else ():
             types = recorded_types(version, local, scope, report)
             for model in types.models.values():
@@ -89,7 +89,7 @@ def recorded_packages(
 
     `whole` packages are for a prefix, where they hide those of the same name in others.
     """
-    topics = topics_of(paths, topics_wanted, report)
+    topics = topics_of(paths, topics_wanted, scope.root, report)
     if topics is None:
         return [], {}
     groups = versions(topics)

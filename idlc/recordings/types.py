@@ -24,13 +24,13 @@ from idlc.project import inputs
 from idlc.project.library import Library
 from idlc.project.settings import Scope
 from idlc.recordings.containers.container import open_recording
-from idlc.recordings.containers.source import RecordingError, UnreadTopic
+from idlc.recordings.containers.source import RecordingError, UnreadTopic, is_local
 from idlc.recordings.definitions import ENCODINGS, RecordedDefinition, TextCache, read_definition
 from idlc.recordings.find import is_there
 from idlc.wire.layout import ContentSizes, oversized
 
 if TYPE_CHECKING:
-    pass
+    from idlc.project.root import Root
 
 
 #: The number of versions that a topic is compared with.
@@ -52,33 +52,39 @@ class Version(msgspec.Struct):
     texts: dict[ir.TypeName, Source]
 
 
-def read_topics(path: str, report: Report, *, check: bool = False) -> RecordingTopics | None:
+def read_topics(
+    path: str, root: Root, report: Report, *, check: bool = False
+) -> RecordingTopics | None:
     """Return the topics of a recording; report IDL651 and return `None` for other files.
 
-    With `check`, topics that cannot be read are in `unread`.
+    Reports name it by `path`, as the user wrote it. With `check`, topics that cannot be read are in
+    `unread`.
     """
-    if not is_there(path):
+    place = root.path(path) if is_local(path) else path
+    if not is_there(place):
         report.add(codes.NO_SUCH_PATH.of(path, f"no such file or folder: `{path}`"))
         return None
     try:
-        with open_recording(path) as container:
+        with open_recording(place) as container:
             report.notes += container.notes
             cache: TextCache = {}
             topics = tuple(read_definition(topic, path, cache) for topic in container.topics)
             return RecordingTopics(path, topics, tuple(container.unread()) if check else ())
     except RecordingError as error:
-        report.add(codes.UNREADABLE_RECORDING.of(path, error.message, hint=error.hint))
+        message = error.message.replace(place, path)
+        hint = error.hint.replace(place, path) if error.hint else None
+        report.add(codes.UNREADABLE_RECORDING.of(path, message, hint=hint))
         return None
 
 
 def topics_of(
-    paths: Sequence[str], selected: Sequence[str], report: Report
+    paths: Sequence[str], selected: Sequence[str], root: Root, report: Report
 ) -> list[RecordedDefinition] | None:
     """Return the topics of recordings, or the selected ones; `None` after an error.
 
     Reports IDL655 for a topic that is in none of them.
     """
-    recordings = [read_topics(path, report) for path in paths]
+    recordings = [read_topics(path, root, report) for path in paths]
     if None in recordings:
         return None
     topics = [topic for recording in recordings if recording for topic in recording.topics]

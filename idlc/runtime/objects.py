@@ -33,6 +33,24 @@ def owner_of(kind: type) -> Any:
     return owner
 
 
+def is_copy(kind: type, other: type) -> bool:
+    """Return whether two generated classes are of one type, as those of two libraries may be."""
+    owner, others = (getattr(type(each), "_message", None) for each in (kind, other))
+    if owner is None or others is None or owner.__name__ != others.__name__:
+        return False
+    from .typeinfo import structure_of
+
+    return structure_of(owner).hash == structure_of(others).hash
+
+
+def equal(message: Any, other: Any) -> bool:
+    """Compare a message with what is not of its class: a copy of it has the same fields."""
+    if not is_copy(type(message), type(other)):
+        return NotImplemented  # type: ignore[no-any-return]
+    slots: list[str] = owner_of(type(message)).__slots__
+    return all(same(getattr(message, slot), getattr(other, slot)) for slot in slots)
+
+
 def same(mine: Any, other: Any) -> bool:
     """Return whether two fields of numbers, bools or bytes are equal, whatever holds them."""
     kind = type(mine)

@@ -335,7 +335,7 @@ REFUSED = {
     "no TOML": ({"pyproject.toml": BUILD + "[project\n"}, "pyproject.toml:4:9"),
     "a wrong setting": ({"pyproject.toml": BUILD + "[tool.idlc]\nx = 1\n"}, "unknown setting `x`"),
     "a setting of `idlc gen` alone": (
-        {"pyproject.toml": BUILD + "[tool.idlc]\nvendor-deps = true\n"},
+        {"pyproject.toml": BUILD + '[tool.idlc]\nvendor-deps = "beside"\n'},
         "pyproject.toml:5:1",
     ),
     "modules that the wheel would not have": (

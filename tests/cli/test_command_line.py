@@ -235,7 +235,7 @@ def test_a_single_file_brings_the_neighbours_that_it_needs():
 def test_vendored_dependencies_are_whole_packages_with_locks_of_their_own():
     make("demo/msg/A.msg", "std_msgs/Header header\n")
     make("demo/action/G.action", "---\n---\n")
-    done = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps")
+    done = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps=beside")
     assert done.returncode == 0, done.stderr
     expected = {"action_msgs", "builtin_interfaces", "service_msgs", "std_msgs"}
     assert {p.name for p in Path("out").iterdir()} == expected | {"demo", "unique_identifier_msgs"}
@@ -244,10 +244,10 @@ def test_vendored_dependencies_are_whole_packages_with_locks_of_their_own():
         assert record["package"] == package
         assert Path(f"out/{package}/_idlc").is_dir()
     assert "msg/String.msg" in json.loads(Path("out/std_msgs/idlc.lock").read_text())["inputs"]
-    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps").stdout
+    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps=beside").stdout
     assert again.count("(unchanged)") == 6
     next(Path("out/std_msgs/msg").glob("_b*.py")).unlink()
-    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps").stdout
+    again = idlc("gen", "demo", "-o", "out/demo", "--vendor-deps=beside").stdout
     assert "std_msgs: 30 interfaces" in again
     assert "(1 written)" in again
 
@@ -368,10 +368,10 @@ def test_code_that_would_not_compile_is_idlcs_fault_and_not_written(monkeypatch,
     make("demo/msg/A.msg")
     real = render.render_package
 
-    def broken(model, **_):
+    def broken(*arguments):
         return tuple(
             type(file)(file.path, "def (: \\\n") if file.path == "msg/_a.py" else file
-            for file in real(model)
+            for file in real(*arguments)
         )
 
     monkeypatch.setattr("idlc.generate.python.render.render_package", broken)

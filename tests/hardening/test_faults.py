@@ -279,7 +279,7 @@ def test_two_runs_at_once(machine, versions, tmp_path):
     assert not list(out.rglob(".idlc-stage-*"))
 
 
-@pytest.mark.parametrize("options", [[], ["--vendor-deps"]])
+@pytest.mark.parametrize("options", [[], ["--vendor-deps"], ["--vendor-deps=beside"]])
 def test_a_run_waits_for_one_that_is_making_the_folders(options, tmp_path):
     """The first made `out` and not yet `out/demo`; the second must see all of it or nothing."""
     slow = (

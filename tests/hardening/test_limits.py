@@ -448,7 +448,8 @@ def test_a_chain_of_packages_as_deep_as_they_may_be_can_be_used(here):
         last = number == MAX_DEPTH - 1
         field = "int8 x\n" if last else f"p{number + 1}/M x\n"
         make(here / "src", {f"p{number}/msg/M.msg": field})
-    words = ["gen", "src/p0/msg", "--package", "p0", "-o", "out/p0", "-I", "src", "--vendor-deps"]
+    words = ["gen", "src/p0/msg", "--package", "p0", "-o", "out/p0", "-I", "src"]
+    words += ["--vendor-deps=beside"]
     status, out = limited([words])[" ".join(words)]
     assert status == 0, out
     result = subprocess.run(

@@ -5,7 +5,10 @@ import json
 import pytest
 
 from idlc.cli.main import main
+from idlc.diagnostics.report import Report
+from idlc.generate.gen import run_for
 from tests.support import recorded_text
+from tests.support.files import write
 from tests.support.generated import class_of, importable
 from tests.support.recordings import MAKERS, STORE, by_mcap, by_rosbags, messages
 
@@ -41,6 +44,38 @@ def test_the_classes_read_what_was_recorded(kind, recorded, tmp_path):
             expected = STORE.deserialize_cdr(one.data, one.type)
             assert message.header.stamp.sec == expected.header.stamp.sec
             assert message.header.frame_id == expected.header.frame_id
+
+
+@pytest.mark.parametrize("kind", ["mcap", "bag of db3"])
+def test_settings_mean_the_same_recordings_in_an_editor(kind, recorded, tmp_path, monkeypatch):
+    """An editor's server runs anywhere; it writes what the command writes in the folder."""
+    name = recorded[1][kind].name
+    (tmp_path / "bags").symlink_to(recorded[1][kind].parent)
+    write(tmp_path / "msg/Drive.msg", "float64 speed\n")
+    table = f'[tool.idlc]\npackage = "demo"\npaths = [".", "bags/{name}"]\nout = "out"\n'
+    write(tmp_path / "pyproject.toml", table)
+    run = run_for(tmp_path / "msg/Drive.msg", "demo")
+    report = Report()
+    assert run.make(report)
+    assert list(report) == []
+    monkeypatch.chdir(tmp_path)
+    assert main(["gen", "--check"]) == 0
+    assert not any(str(tmp_path) in file.read_text() for file in (tmp_path / "out").rglob("*.py"))
+
+
+def test_an_editor_reports_a_recording_by_the_name_in_the_settings(tmp_path):
+    write(tmp_path / "msg/Drive.msg", "float64 speed\n")
+    table = '[tool.idlc]\npackage = "demo"\npaths = [".", "bags/a.mcap"]\nout = "out"\n'
+    write(tmp_path / "pyproject.toml", table)
+    for content in (None, "", "no recording"):
+        if content is not None:
+            write(tmp_path / "bags/a.mcap", content)
+        report = Report()
+        assert run_for(tmp_path / "msg/Drive.msg", "demo").make(report) == ()
+        (problem,) = report
+        assert problem.where[0] == "bags/a.mcap"
+        assert "`bags/a.mcap`" in problem.message
+        assert str(tmp_path) not in f"{problem.message} {problem.hint}"
 
 
 @pytest.mark.ros

@@ -165,7 +165,7 @@ def test_an_outdated_extension_is_not_used(start, mixed):
 
 
 def test_what_rcl_reads_itself_may_be_idlcs(start, classes, tmp_path):
-    """As after --vendor-deps: idlc's action_msgs hides the one that rclpy came with."""
+    """As after --vendor-deps=beside: idlc's action_msgs hides the one that rclpy came with."""
     (tmp_path / "files/trip/action").mkdir(parents=True)
     go = tmp_path / "files/trip/action/Go.action"
     go.write_text("bool far\n---\nbool done\n---\nint32 at\n", "utf-8")
@@ -173,7 +173,7 @@ def test_what_rcl_reads_itself_may_be_idlcs(start, classes, tmp_path):
     for package in ("lifecycle_msgs", "type_description_interfaces", "rcl_interfaces"):
         generate(SHARE / package, out / package)
     shutil.copytree(classes, out, dirs_exist_ok=True)
-    generate(tmp_path / "files/trip", out / "trip", "--vendor-deps")
+    generate(tmp_path / "files/trip", out / "trip", "--vendor-deps=beside")
     _, complaints = finish(start("acts_without_a_class_of_rosidls", path=out))
     assert "_idlc" not in complaints  # rclpy has some of its own about an executor that ends
     described = json.loads(finish(start("tells_its_type_description", path=out))[0])

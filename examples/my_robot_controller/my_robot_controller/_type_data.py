@@ -74,6 +74,5 @@ JSON = (
     '},"sources":{"my_robot_controller/action/Countdown":"int32 target_count  # Where to start counting down\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
     ',"my_robot_controller/action/ExecuteTask":"string task_name  # The task to execute, e.g. \\"dock\\"\\n---\\nbool success\\n---\\nstring current_status  # What the robot is doing now, for people to read\\n"'
     ',"my_robot_controller/msg/RobotCommand":"# A robot command: how fast to drive and turn until the next one arrives.\\n\\nstring STOP=\\"stop\\"\\nstring MOVE=\\"move\\"\\nstring TURN=\\"turn\\"\\n\\nstring command_type         # What to do: STOP, MOVE or TURN\\nfloat32 linear_velocity_x   # Forward speed, negative to reverse [m/s]\\nfloat32 angular_velocity_z  # Turn rate, counter-clockwise seen from above [rad/s]\\nstring frame_id             # The frame that the velocities are given in\\n"'
-    ',"my_robot_controller/srv/AddTwoInts":"int64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"'
-    '}}'
+    ',"my_robot_controller/srv/AddTwoInts":"int64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"}}'
 )

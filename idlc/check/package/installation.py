@@ -181,9 +181,13 @@ def _missing_packages(
         return
     support = f"{package}._idlc"
     needed = [package, *(f"{package}.{kind}" for kind in _kinds(keys))]
-    if runtime == "carried":
-        inside = (name for name in view.packages(folders) if name.startswith(f"{support}."))
-        needed += [support, *sorted(inside)]
+    needed += [support] if runtime == "carried" else []
+    existing = view.packages(folders)
+    generated = [support]
+    if f"{package}._vendor" in existing:
+        generated += [f"{package}._vendor", f"{package}.vendor"]
+    inside = tuple(f"{name}." for name in generated)
+    needed += [*generated[1:], *sorted(name for name in existing if name.startswith(inside))]
     missing = [name for name in needed if not view.installed.covers(name, view.folder(name))]
     if not missing:
         yield from _absent_folders(setup, view, package, keys, folders)

@@ -115,7 +115,7 @@ class ConstantView(msgspec.Struct, frozen=True):
 class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     """A message class.
 
-    `receiver`, `options`, `boolean` and `not_implemented` are what its methods call `self`, further
+    `receiver`, `options` and `boolean` are what its methods call `self`, further
     keywords and the builtins of these names, which names of the interface may hide. `guard` is
     the head of the `if` for a constructor that was given something unusual.
     """
@@ -130,7 +130,6 @@ class MessageView(msgspec.Struct, frozen=True, kw_only=True):
     options: Code
     guard: Code
     boolean: Code
-    not_implemented: Code
 
 
 class GroupView(msgspec.Struct, frozen=True):
@@ -172,7 +171,6 @@ def message(
         options=Code(naming.options),
         guard=_statement(if_one_or_all(naming.options, doubt, 8)),
         boolean=Code(f"{naming.builtins}bool"),
-        not_implemented=Code(naming.not_implemented),
     )
 
 

@@ -189,7 +189,6 @@ class Naming(msgspec.Struct, frozen=True):
     receiver: str
     options: str
     builtins: str
-    not_implemented: str
 
     @classmethod
     def of(cls, structure: ir.Message) -> Naming:
@@ -199,22 +198,12 @@ class Naming(msgspec.Struct, frozen=True):
             receiver="_self" if "self" in names else "self",
             options="_options" if "options" in names else "options",
             builtins="_builtins." if shadows(structure) else "",
-            not_implemented=(
-                "_builtins.NotImplemented"
-                if _hides_not_implemented(structure)
-                else "NotImplemented"  # as type checkers know it
-            ),
         )
 
 
 def shadows(structure: ir.Message) -> bool:
-    """Return whether the class needs a builtin whose name a field has, or the interface."""
-    hidden = any(python_names.field(field.name) in BUILTINS for field in structure.fields)
-    return hidden or _hides_not_implemented(structure)
-
-
-def _hides_not_implemented(structure: ir.Message) -> bool:
-    return structure.name.name.partition("_")[0] == "NotImplemented"
+    """Return whether the class needs a builtin whose name a field has."""
+    return any(python_names.field(field.name) in BUILTINS for field in structure.fields)
 
 
 def support(type_: ir.FieldType) -> str:

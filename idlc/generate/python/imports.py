@@ -6,6 +6,7 @@ import builtins
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable
+from typing import NamedTuple
 
 import msgspec
 
@@ -34,17 +35,46 @@ def statements(module: str, names: Collection[str], indent: int = 0) -> list[str
     return [line for group in ordered for line in lines.import_from(module, group, indent)]
 
 
-class Homes:
-    """The module of each structure of a package, without the package and the kind.
+class Surroundings(NamedTuple):
+    """The position of what a generated package imports from outside of itself.
 
-    Those of other packages are inside the Python package `parent`, if that is not empty.
+    `runtime` is the folder of the runtime, relative to modules of messages. `others` is the prefix
+    of other packages' names; one that begins with a dot is relative to the generated package.
     """
 
+    runtime: str = ".."
+    others: str = ""
+
+    @property
+    def vendors(self) -> bool:
+        """True if the types of other packages come with this one."""
+        return self.others.startswith(".")
+
+    def module(self, type_: ir.TypeName) -> str:
+        """Return the module of another package's type, as modules of messages import it."""
+        dot = "." if self.vendors else ""
+        return f"{dot}{self.others}{type_.package}.{type_.kind}"
+
+
+#: A package whose dependencies are on the path.
+ALONE = Surroundings()
+#: A package that comes with the types that it uses.
+VENDORING = Surroundings(others=".vendor.")
+#: One of those that come with another package.
+VENDORED = Surroundings(runtime="....", others="...vendor.")
+
+
+class Homes:
+    """The module of each structure of a package, without the package and the kind."""
+
     def __init__(
-        self, interface: ir.Interface, modules: python_names.Modules, parent: str = ""
+        self,
+        interface: ir.Interface,
+        modules: python_names.Modules,
+        surroundings: Surroundings = ALONE,
     ) -> None:
         self.modules = modules
-        self.parent = f"{parent}." if parent else ""
+        self.surroundings = surroundings
         self.classes = modules[interface.name]
         self.protocol = python_names.protocol_module(self.classes)
         self.sections = {message.name for message in derive.sections(interface)}
@@ -73,12 +103,14 @@ class References:
         homes: Homes,
     ) -> None:
         self._homes = homes
+        self.surroundings = homes.surroundings
         self.package = interface.name.package
         self.kind = interface.name.kind
         self.own = {message.name for message in structures}
         named = {name for message in structures for name in message.references} - self.own
         self.others = {name for name in named if name.package != self.package}
-        self.implied = self.others if self.own & homes.derived else set()
+        is_added = bool(self.own & homes.derived) and not self.surroundings.vendors
+        self.implied = self.others if is_added else set()
         self.direct = named - self.implied
         groups = {interface.name, *(service.name for service in derive.services(interface))}
         self._names = self._named(self.own | groups, _closure(self.own, messages))
@@ -113,32 +145,31 @@ class References:
 
     def modules(self) -> list[tuple[str, str]]:
         """Return the modules of implied types, with their names in this module."""
-        return sorted({(self._outside(type_), _module(type_)) for type_ in self.implied})
-
-    def _outside(self, type_: ir.TypeName) -> str:
-        return f"{self._homes.parent}{type_.package}.{type_.kind}"
+        pairs = {(self.surroundings.module(type_), _module(type_)) for type_ in self.implied}
+        return sorted(pairs)
 
     def imports(self, types: Iterable[ir.TypeName], indent: int = 0) -> tuple[list[str], list[str]]:
-        """Return import statements from this package, and from others, sorted.
+        """Return import statements of what comes with this package, and of what may be missing.
 
-        Imports from others are indented by four more columns.
+        Both are sorted; the second are indented by four more columns.
         """
-        inside: dict[tuple[int, str], set[str]] = defaultdict(set)
+        inside: dict[str, set[str]] = defaultdict(set)
         outside: dict[str, set[str]] = defaultdict(set)
         for type_ in types:
             name: str = python_names.class_(type_)
             if self.name(type_) != name:
                 name = f"{name} as {self.name(type_)}"
             if type_.package != self.package:
-                outside[self._outside(type_)].add(name)
+                group = inside if self.surroundings.vendors else outside
+                group[self.surroundings.module(type_)].add(name)
             elif type_.kind == self.kind:
-                inside[1, f".{self._homes.of(type_)}"].add(name)
+                inside[f".{self._homes.of(type_)}"].add(name)
             else:
-                inside[0, f"..{type_.kind}.{self._homes.of(type_)}"].add(name)
+                inside[f"..{type_.kind}.{self._homes.of(type_)}"].add(name)
         return (
             [
                 line
-                for (_, module), names in sorted(inside.items())
+                for module, names in sorted(inside.items(), key=_nearness)
                 for line in statements(module, names, indent)
             ],
             [
@@ -147,6 +178,11 @@ class References:
                 for line in statements(module, names, indent + 4)
             ],
         )
+
+
+def _nearness(statement: tuple[str, set[str]]) -> tuple[int, str]:
+    module, _ = statement
+    return len(module.lstrip(".")) - len(module), module
 
 
 def _module(type_: ir.TypeName) -> str:
@@ -178,6 +214,7 @@ class PackageView(msgspec.Struct, frozen=True):
     """A package that imports its modules when a name is asked for."""
 
     title: Text
+    runtime: Code
     imports: tuple[Code, ...]
     names: tuple[NameView, ...]
 
@@ -195,7 +232,12 @@ def exported(interface: ir.Interface, modules: python_names.Modules) -> dict[str
     return names
 
 
-def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> PackageView:
+def package(
+    model: link.Model,
+    kind: ir.Kind,
+    modules: python_names.Modules,
+    surroundings: Surroundings = ALONE,
+) -> PackageView:
     """Return the view of one kind's package."""
     homes: dict[str, str] = {}
     for interface in model.own:
@@ -206,6 +248,7 @@ def package(model: link.Model, kind: ir.Kind, modules: python_names.Modules) -> 
         by_module[module].append(name)
     return PackageView(
         title=Text(f"{TITLES[kind]} of {model.package}, imported when they are asked for."),
+        runtime=Code(surroundings.runtime),
         imports=tuple(
             Code(line)
             for module in sorted(by_module, key=natural)

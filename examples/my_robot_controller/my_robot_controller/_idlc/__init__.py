@@ -38,7 +38,7 @@ from .cdr import (
     wide_texts_reader,
 )
 from .codec import Codec, Reading, construct, maker
-from .errors import DecodeError, ValidationError, importing
+from .errors import DecodeError, MissingPackageError, ValidationError, importing
 from .message import (
     Action,
     Imported,
@@ -50,7 +50,7 @@ from .message import (
     table,
 )
 from .names import lazily
-from .objects import same
+from .objects import equal, same
 from .sequences import (
     Float32Sequence,
     Float64Sequence,
@@ -114,6 +114,7 @@ __all__ = [
     "Int64Sequence",
     "ListOf",
     "Message",
+    "MissingPackageError",
     "Package",
     "Reading",
     "Service",
@@ -128,6 +129,7 @@ __all__ = [
     "complete",
     "construct",
     "dataclass",
+    "equal",
     "flags",
     "flags_writer",
     "importing",

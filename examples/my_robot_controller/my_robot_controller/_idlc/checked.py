@@ -16,7 +16,7 @@ from functools import cache
 from typing import Any
 
 from .errors import FieldCheckError, FieldNameError, FieldTypeError, ValidationError
-from .objects import owner_of
+from .objects import is_copy, owner_of
 from .typeinfo import (
     FieldInfo,
     Primitive,
@@ -192,7 +192,8 @@ def _refusal(value: Any, field: FieldInfo) -> str:
 
 def _refusal_of_element(value: Any, field: FieldInfo, *, listed: bool = False) -> str:
     if field.nested:
-        right = isinstance(value, field.nested.find_class())
+        kind = field.nested.find_class()
+        right = isinstance(value, kind) or is_copy(type(value), kind)
         return "" if right else f"a {field.nested.name}"
     if field.text:
         types: Any = str if listed else (str, UserString)

@@ -99,8 +99,8 @@ def missing_package(error: ImportError) -> MissingPackageError:
     return MissingPackageError(
         f"this message needs {package}, which cannot be imported ({error}). "
         f"Either install the ROS package (for Jazzy: pip install ros-jazzy-"
-        f"{package.replace('_', '-')}), or generate it beside this package: "
-        f"run `idlc gen` with --vendor-deps.",
+        f"{package.replace('_', '-')}), or let those who generate this code run "
+        f"`idlc gen` with --vendor-deps: then it comes with what it needs.",
         name=error.name,
         path=error.path,
     )

@@ -336,7 +336,11 @@ class Message(metaclass=MessageMeta):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         # the two oldest protocols of pickle do not know slots; theirs can say what later ones do
-        return super().__reduce_ex__(max(protocol, 2))
+        reduction = super().__reduce_ex__(max(protocol, 2))
+        from .typeinfo import structure_of
+
+        vendor = structure_of(type(self)).vendor
+        return vendor.reduced(self, reduction) if vendor else reduction
 
 
 if codec.CHECK_FIELDS:

@@ -115,9 +115,9 @@ class Types:
 
     def __init__(self, module: Any) -> None:
         content = json.loads(module.JSON)
-        self.home: str = module.__package__
+        self.home: str = module.__package__.removesuffix("._idlc")
         self.package: str = content["package"]
-        #: The prefix of other packages' modules.
+        #: The prefix of other packages' modules, relative to this one if it begins with a dot.
         self.around: str = content.get("around", "")
         self.descriptions: dict[str, Any] = content["descriptions"]
         self.hashes: dict[str, str] = content["hashes"]
@@ -150,6 +150,14 @@ class Structure:
     def hash(self) -> str:
         """The hash of the type (RIHS01)."""
         return self.types.hashes[self.name]
+
+    @property
+    def vendor(self) -> Any:
+        """The module that has the types of other packages, `None` where they are installed."""
+        around = self.types.around
+        if not around.startswith("."):
+            return None
+        return import_module(around.removesuffix("."), self.types.home)
 
     @cached_property
     def fields(self) -> tuple[FieldInfo, ...]:
@@ -188,7 +196,8 @@ class Structure:
         package, kind, short = self.name.split("/")
         root = self.types.home if self.is_own else self.types.around + package
         with importing():
-            return getattr(import_module(f"{root}.{kind}"), public_name(short))
+            module = import_module(f"{root}.{kind}", self.types.home)
+            return getattr(module, public_name(short))
 
 
 _types_of = cache(Types)
@@ -205,7 +214,11 @@ def structure_of(kind: type) -> Structure:
 @cache
 def _structure_of(owner: type) -> Structure:
     home, kind, _ = owner.__module__.rsplit(".", 2)
-    types = _types_of(import_module(f"{home}._type_data"))
+    try:
+        data = import_module(f"{home}._type_data")
+    except ModuleNotFoundError:
+        data = import_module(f"{home}._idlc.type_data")  # as before version 0.2
+    types = _types_of(data)
     return types[f"{types.package}/{kind}/{wire_name(owner.__name__)}"]
 
 

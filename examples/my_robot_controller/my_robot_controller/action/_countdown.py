@@ -44,7 +44,7 @@ class Countdown_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._target_count == other._target_count)
 
 
@@ -89,7 +89,7 @@ class Countdown_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (
             self._final_count != other._final_count or self._success != other._success
         )
@@ -128,7 +128,7 @@ class Countdown_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Countdown_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._current_count == other._current_count)
 
 

@@ -47,6 +47,5 @@ JSON = (
     ',"unique_identifier_msgs/msg/UUID":"RIHS01_1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437"'
     '},"sources":{"comments_msgs/action/Fill":"# Fills a gauge.\\nfloat32 level  # to here [l]\\n---\\nfloat32 reached  # [l]\\n---\\nfloat32 level\\n"'
     ',"comments_msgs/msg/Gauge":"# The state of a gauge, \\"quoted\\" and with a \\\\\\\\ backslash.\\n# \\"\\"\\" ends no docstring, {{ nothing }} is filled in.\\n#\\n#   Indented, for who reads it.\\n\\n# How often it is read [Hz]\\nfloat32 rate 10.0\\nuint8 level     # 0 is empty\\nuint8 EMPTY=0   # nothing [l]\\nuint8 FULL=255\\nstring<=20 label \\"it\'s \\\\\\\\\\"full\\\\\\\\\\"\\"  # what stands on it\\nstring[<=3] notes [\\"a\\", \\"it\'s\\"]   # at most three, in a comment that goes on for so long that the line has to be broken somewhere\\nint16[] samples [-1, 0, 1]\\nfloat64[9] covariance  # row by row [m^2]\\nbyte flags 7\\n"'
-    ',"comments_msgs/srv/Reset":"# Sets a gauge back.\\nstring reason  # why\\n---\\n# Whether it worked.\\nbool ok\\n"'
-    "}}"
+    ',"comments_msgs/srv/Reset":"# Sets a gauge back.\\nstring reason  # why\\n---\\n# Whether it worked.\\nbool ok\\n"}}'
 )

@@ -25,6 +25,5 @@ JSON = (
     ',"layouts_msgs/msg/Pair":"string key\\nstring value\\n"'
     ',"layouts_msgs/msg/Row":"uint32 a\\nuint16 b\\nuint8[3] c\\n"'
     ',"layouts_msgs/msg/Texts":"Pair[] pairs\\nPair[<=2] few\\nTitled[] titled\\nstring last\\n"'
-    ',"layouts_msgs/msg/Titled":"uint8 level\\nstring title\\nPair[] pairs\\nfloat64 number\\n"'
-    "}}"
+    ',"layouts_msgs/msg/Titled":"uint8 level\\nstring title\\nPair[] pairs\\nfloat64 number\\n"}}'
 )

@@ -21,6 +21,5 @@ JSON = (
     ',"service_msgs/msg/ServiceEventInfo":"RIHS01_41bcbbe07a75c9b52bc96bfd5c24d7f0fc0a08c0cb7921b3373c5732345a6f45"'
     '},"sources":{"lyrical_msgs/msg/Lists":"string[] names [\\"a\\", \\"b\\"]\\nlyrical_msgs/Words[] words\\nWords[3] three\\nbool[<=4] flags\\nbyte[2] raw\\nwstring[2] wide\\nstring[<=2] str\\nfloat32[3] position\\nuint8[] data\\nstring[] texts_in_a_field_with_one_long_name\\n"'
     ',"lyrical_msgs/msg/Words":"string text \\"none\\"\\nint32 count -1\\nbyte raw\\nbool list\\nfloat64 d 0.5\\n"'
-    ',"lyrical_msgs/srv/Run":"string[] args\\nbool wait\\n---\\nint32 status -1\\nbuiltin_interfaces/Time[] stamps\\n"'
-    "}}"
+    ',"lyrical_msgs/srv/Run":"string[] args\\nbool wait\\n---\\nint32 status -1\\nbuiltin_interfaces/Time[] stamps\\n"}}'
 )

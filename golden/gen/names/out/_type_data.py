@@ -42,6 +42,5 @@ JSON = (
     ',"names_msgs/msg/Odd":"int32 class\\nint32 serialize 3\\nint32 self\\nint32 fields_and_field_types\\nint32 int 4\\nstring list\\nbyte bytes\\nbool bool\\nfloat32 float\\nstring[] str [\\"a\\", \'b \\"c\\"\']\\nint32 message\\nint32 data\\nint32 at\\nPoint[] item\\nPoint array\\nint32[3] order [1, 2, 3]\\n"'
     ',"names_msgs/msg/Point":"float64 x\\nfloat64 y\\n"'
     ',"names_msgs/msg/Text":"geometry_msgs/Point other\\nPoint own\\nAny[<=2] any\\n"'
-    ',"names_msgs/srv/None":"---\\n"'
-    "}}"
+    ',"names_msgs/srv/None":"---\\n"}}'
 )

@@ -74,6 +74,5 @@ JSON = (
     '},"sources":{"tutorial_msgs/action/Countdown":"# Where to start counting down.\\nint32 target_count\\n---\\nint32 final_count  # The last number reached; 0 unless cancelled\\nbool success\\n---\\nint32 current_count\\n"'
     ',"tutorial_msgs/action/ExecuteTask":"string task_name  # The task to execute, e.g. \\"dock\\"\\n---\\nbool success\\n---\\nstring current_status  # What the robot is doing now, for people to read\\n"'
     ',"tutorial_msgs/msg/RobotCommand":"# A simple robot command: how fast to drive and turn until the next one arrives.\\n#\\n# Sent by the operator, obeyed by the controller node.\\n\\nstring STOP=\\"stop\\"\\nstring MOVE=\\"move\\"\\nstring TURN=\\"turn\\"\\n\\nstring command_type        # What to do: STOP, MOVE or TURN\\nfloat32 linear_velocity_x  # Forward speed, negative to reverse [m/s]\\nfloat32 angular_velocity_z # Turn rate, counter-clockwise seen from above [rad/s]\\nstring frame_id            # The frame that the velocities are given in\\n"'
-    ',"tutorial_msgs/srv/AddTwoInts":"# The service of the ROS 2 tutorials.\\nint64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"'
-    "}}"
+    ',"tutorial_msgs/srv/AddTwoInts":"# The service of the ROS 2 tutorials.\\nint64 a\\nint64 b\\n---\\nint64 sum  # a + b\\n"}}'
 )

@@ -44,7 +44,7 @@ class Fill_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._level == other._level)
 
 
@@ -81,7 +81,7 @@ class Fill_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._reached == other._reached)
 
 
@@ -118,7 +118,7 @@ class Fill_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Fill_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._level == other._level)
 
 

@@ -120,7 +120,7 @@ class Gauge(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Gauge):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._rate != other._rate:
             return False
         if self._level != other._level:

@@ -44,7 +44,7 @@ class Reset_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._reason == other._reason)
 
 
@@ -81,7 +81,7 @@ class Reset_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Reset_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._ok == other._ok)
 
 

@@ -169,7 +169,7 @@ class Everything(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Everything):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._flag != other._flag:
             return False
         if self._last != other._last:

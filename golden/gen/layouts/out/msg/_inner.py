@@ -60,7 +60,7 @@ class Inner(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Inner):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (
             self._a != other._a
             or self._b != other._b

@@ -27,5 +27,5 @@ class Nothing(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Nothing):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return True

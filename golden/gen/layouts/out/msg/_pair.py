@@ -48,5 +48,5 @@ class Pair(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Pair):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (self._key != other._key or self._value != other._value)

@@ -58,7 +58,7 @@ class Row(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Row):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._a != other._a:
             return False
         if self._b != other._b:

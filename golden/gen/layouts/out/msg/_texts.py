@@ -62,7 +62,7 @@ class Texts(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Texts):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._last != other._last:
             return False
         return (

@@ -61,7 +61,7 @@ class Titled(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Titled):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._level != other._level:
             return False
         if self._title != other._title:

@@ -138,7 +138,7 @@ class Lists(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Lists):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._flags, other._flags):
             return False
         if not _idlc.same(self._raw, other._raw):

@@ -72,7 +72,7 @@ class Words(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Words):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (
             self._text != other._text
             or self._count != other._count

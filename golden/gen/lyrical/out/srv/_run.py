@@ -55,7 +55,7 @@ class Run_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Run_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._wait != other._wait:
             return False
         return bool(self._args == other._args)
@@ -102,7 +102,7 @@ class Run_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Run_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._status != other._status:
             return False
         return bool(self._stamps == other._stamps)

@@ -58,7 +58,7 @@ class Run_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Run_Event):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._info, other._info):
             return False
         return self._request == other._request and self._response == other._response

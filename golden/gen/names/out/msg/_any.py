@@ -47,5 +47,5 @@ class Any(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Any):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._pose == other._pose)

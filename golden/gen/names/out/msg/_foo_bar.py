@@ -43,5 +43,5 @@ class FOOBar(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, FOOBar):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return self._inner == other._inner

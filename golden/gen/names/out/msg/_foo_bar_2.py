@@ -42,5 +42,5 @@ class FooBar(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, FooBar):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._a == other._a)

@@ -88,7 +88,7 @@ class Hiding(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Hiding):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._serialize != other._serialize:
             return False
         if not _idlc.same(self._deserialize, other._deserialize):

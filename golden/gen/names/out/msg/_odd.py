@@ -165,7 +165,7 @@ class Odd(_idlc.Message):  # noqa
 
     def __eq__(_self, other: _idlc.Any) -> _builtins.bool:
         if not isinstance(other, Odd):
-            return NotImplemented
+            return _idlc.equal(_self, other)
         if _self._class != other._class:
             return False
         if _self._serialize != other._serialize:

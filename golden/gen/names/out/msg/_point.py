@@ -48,5 +48,5 @@ class Point(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Point):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (self._x != other._x or self._y != other._y)

@@ -63,7 +63,7 @@ class Text(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, Text):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return (
             self._other == other._other
             and self._own == other._own

@@ -29,7 +29,7 @@ class None_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return True
 
 
@@ -51,7 +51,7 @@ class None_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, None_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return True
 
 

@@ -44,7 +44,7 @@ class ExecuteTask_Goal(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Goal):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._task_name == other._task_name)
 
 
@@ -81,7 +81,7 @@ class ExecuteTask_Result(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Result):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._success == other._success)
 
 
@@ -120,7 +120,7 @@ class ExecuteTask_Feedback(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_Feedback):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._current_status == other._current_status)
 
 

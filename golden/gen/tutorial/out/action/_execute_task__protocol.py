@@ -60,7 +60,7 @@ class ExecuteTask_SendGoal_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._goal_id, other._goal_id):
             return False
         return self._goal == other._goal
@@ -101,7 +101,7 @@ class ExecuteTask_SendGoal_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._accepted != other._accepted:
             return False
         return _idlc.same(self._stamp, other._stamp)
@@ -147,7 +147,7 @@ class ExecuteTask_SendGoal_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_SendGoal_Event):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._info, other._info):
             return False
         return self._request == other._request and self._response == other._response
@@ -186,7 +186,7 @@ class ExecuteTask_GetResult_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return _idlc.same(self._goal_id, other._goal_id)
 
 
@@ -225,7 +225,7 @@ class ExecuteTask_GetResult_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if self._status != other._status:
             return False
         return self._result == other._result
@@ -271,7 +271,7 @@ class ExecuteTask_GetResult_Event(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_GetResult_Event):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._info, other._info):
             return False
         return self._request == other._request and self._response == other._response
@@ -315,7 +315,7 @@ class ExecuteTask_FeedbackMessage(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, ExecuteTask_FeedbackMessage):
-            return NotImplemented
+            return _idlc.equal(self, other)
         if not _idlc.same(self._goal_id, other._goal_id):
             return False
         return self._feedback == other._feedback

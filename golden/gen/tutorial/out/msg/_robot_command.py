@@ -81,7 +81,7 @@ class RobotCommand(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, RobotCommand):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (
             self._command_type != other._command_type
             or self._linear_velocity_x != other._linear_velocity_x

@@ -50,7 +50,7 @@ class AddTwoInts_Request(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, AddTwoInts_Request):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return not (self._a != other._a or self._b != other._b)
 
 
@@ -87,7 +87,7 @@ class AddTwoInts_Response(_idlc.Message):  # noqa
 
     def __eq__(self, other: _idlc.Any) -> bool:
         if not isinstance(other, AddTwoInts_Response):
-            return NotImplemented
+            return _idlc.equal(self, other)
         return bool(self._sum == other._sum)
 
 
